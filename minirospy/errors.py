@@ -1,0 +1,267 @@
+"""Every error that minirospy raises on purpose.
+
+::
+
+    Exception
+    +-- MinirospyError                  a fault that we name: one clear line for a person in str()
+    |   +-- UsageError                  a command was typed wrong (exit status 2)
+    |   +-- NotFoundError               a package, node, type, topic or file that is not there (with nearest names)
+    |   +-- MasterUnreachableError      no master answers at the URI
+    |   +-- NodeUnreachableError        a node that the master knows does not answer
+    |   +-- RpcError                    a remote procedure call (XML-RPC) went wrong
+    |   |   +-- RpcFault                the peer answered with an XML-RPC fault
+    |   |   +-- RpcRefused              the peer answered with a status code other than 1
+    |   |   +-- RpcProtocolError        the peer's bytes are not HTTP or not XML-RPC
+    |   |   +-- RpcUnreachable          the peer could not be reached, or did not answer in time
+    |   +-- WireError                   bytes that are not TCPROS
+    |   |   +-- HandshakeRefused        the peer answered a connection header with ``error=``
+    |   +-- DefinitionError             a .msg, .srv or .action text that does not parse (file, line)
+    |   +-- LaunchError                 a launch file that does not load (file, line)
+    |   +-- BoardError                  the virtual board cannot be reached
+    +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
+    |   +-- ROSInitException
+    |   +-- ROSSerializationException
+    |   +-- ROSInterruptException
+    |   |   +-- ROSTimeMovedBackwardsException
+    |   +-- ROSInternalException
+    |       +-- TransportException
+    |           +-- TransportInitError
+    |           +-- TransportTerminated
+    +-- ServiceException                a service call failed, here or there
+    +-- MessageException                genpy's tree: values and bytes that do not fit a message
+        +-- SerializationError
+        +-- DeserializationError
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "BoardError",
+    "DefinitionError",
+    "DeserializationError",
+    "HandshakeRefused",
+    "LaunchError",
+    "MasterUnreachableError",
+    "MessageException",
+    "MinirospyError",
+    "NodeUnreachableError",
+    "NotFoundError",
+    "ROSException",
+    "ROSInitException",
+    "ROSInternalException",
+    "ROSInterruptException",
+    "ROSSerializationException",
+    "ROSTimeMovedBackwardsException",
+    "RpcError",
+    "RpcFault",
+    "RpcProtocolError",
+    "RpcRefused",
+    "RpcUnreachable",
+    "SerializationError",
+    "ServiceException",
+    "TransportException",
+    "TransportInitError",
+    "TransportTerminated",
+    "UsageError",
+    "WireError",
+]
+
+
+class MinirospyError(Exception):
+    """The root of our own errors; ``str()`` is one line for a person."""
+
+
+class UsageError(MinirospyError):
+    """A command was typed wrong."""
+
+
+class NotFoundError(MinirospyError):
+    """Something named does not exist; the text offers the nearest names that do.
+
+    ``kind`` is what was looked for ("package", "message type"), ``name`` what was asked,
+    ``known`` every name that exists, ``hint`` what to do.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str] = (), hint: str = "") -> None:
+        super().__init__(kind, name)
+        self.kind = kind
+        self.name = name
+        self.hint = hint
+        self.nearest: list[str] = difflib.get_close_matches(name, sorted(set(known)), n=3, cutoff=0.5)
+
+    def __str__(self) -> str:
+        text = f"{self.kind} [{self.name}] not found"
+        if self.nearest:
+            text += f"; did you mean {' or '.join(self.nearest)}?"
+        if self.hint:
+            text += f" ({self.hint})" if self.nearest else f": {self.hint}"
+        return text
+
+
+class MasterUnreachableError(MinirospyError):
+    """No master answers at ``uri``."""
+
+    def __init__(self, uri: str) -> None:
+        super().__init__(uri)
+        self.uri = uri
+
+    def __str__(self) -> str:
+        return (
+            f"no ROS master answers at {self.uri}: start one with `roscore`, "
+            "or set ROS_MASTER_URI to the machine where it runs"
+        )
+
+
+class NodeUnreachableError(MinirospyError):
+    """The node ``name``, registered at ``uri``, does not answer."""
+
+    def __init__(self, name: str, uri: str, why: str = "") -> None:
+        super().__init__(name, uri, why)
+        self.name = name
+        self.uri = uri
+        self.why = why
+
+    def __str__(self) -> str:
+        return f"node [{self.name}] does not answer at {self.uri}" + (f" ({self.why})" if self.why else "")
+
+
+class RpcError(MinirospyError):
+    """A remote procedure call went wrong."""
+
+
+class RpcFault(RpcError):
+    """The peer answered with an XML-RPC fault."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(code, text)
+        self.code = code
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"XML-RPC fault {self.code}: {self.text}"
+
+
+class RpcRefused(RpcError):
+    """A ROS API call was answered with a status ``code`` other than 1 (0 failure, -1 error)."""
+
+    def __init__(self, method: str, code: int, text: str) -> None:
+        super().__init__(method, code, text)
+        self.method = method
+        self.code = code
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"{self.method}: {self.text}"
+
+
+class RpcProtocolError(RpcError):
+    """The bytes of a peer are not HTTP, or not XML-RPC."""
+
+
+class RpcUnreachable(RpcError):
+    """The peer at ``uri`` could not be reached, or did not answer in time."""
+
+    def __init__(self, uri: str, why: str) -> None:
+        super().__init__(uri, why)
+        self.uri = uri
+        self.why = why
+
+    def __str__(self) -> str:
+        return f"no answer from {self.uri}: {self.why}"
+
+
+class WireError(MinirospyError):
+    """Bytes that are not TCPROS."""
+
+
+class HandshakeRefused(WireError):
+    """The peer answered our connection header with ``error=text``."""
+
+
+class DefinitionError(MinirospyError):
+    """An interface definition does not parse: ``where`` is the file or type, ``line`` counts from 1."""
+
+    def __init__(self, where: str, line: int, text: str) -> None:
+        super().__init__(where, line, text)
+        self.where = where
+        self.line = line
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"{self.where}:{self.line}: {self.text}"
+
+
+class LaunchError(MinirospyError):
+    """A launch file does not load: ``file`` and ``line`` (from 1; 0 where unknown)."""
+
+    def __init__(self, file: str, line: int, text: str) -> None:
+        super().__init__(file, line, text)
+        self.file = file
+        self.line = line
+        self.text = text
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.text}" if self.line else f"{self.file}: {self.text}"
+
+
+class BoardError(MinirospyError):
+    """The virtual board cannot be reached, or refused what was asked."""
+
+
+class ROSException(Exception):
+    """The root of rospy's errors."""
+
+
+class ROSInitException(ROSException):
+    """A node could not be initialised."""
+
+
+class ROSSerializationException(ROSException):
+    """A message could not be serialised or deserialised."""
+
+
+class ROSInterruptException(ROSException):
+    """A blocking call was ended by the node's shutdown."""
+
+
+class ROSTimeMovedBackwardsException(ROSInterruptException):
+    """Simulated time jumped back while somebody slept; ``time`` is the new time in seconds."""
+
+    def __init__(self, time: float) -> None:
+        super().__init__("ROS time moved backwards")
+        self.time = time
+
+
+class ROSInternalException(ROSException):
+    """A fault inside the client library."""
+
+
+class TransportException(ROSInternalException):
+    """A connection to a peer went wrong."""
+
+
+class TransportInitError(TransportException):
+    """A connection to a peer could not be set up."""
+
+
+class TransportTerminated(TransportException):
+    """A connection to a peer ended."""
+
+
+class ServiceException(Exception):
+    """A service call failed: no provider, a broken link, or the handler's own error."""
+
+
+class MessageException(Exception):
+    """Values that do not fit a message."""
+
+
+class SerializationError(MessageException):
+    """A message holds a value that its definition does not allow."""
+
+
+class DeserializationError(MessageException):
+    """Bytes that are not a message of this type."""

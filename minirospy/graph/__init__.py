@@ -1,0 +1,1 @@
+"""Pure tables of the computation graph: calls in, (answer, actions) out."""

@@ -1,0 +1,1 @@
+"""Interface definitions: .msg/.srv/.action text -> spec -> Python source -> class. Pure."""

@@ -1,0 +1,1 @@
+"""roslaunch: launch files in, running nodes out."""

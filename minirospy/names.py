@@ -1,0 +1,135 @@
+"""Graph resource names: what a name may look like, and what it resolves to.
+
+Pure. Source: http://wiki.ros.org/Names and http://wiki.ros.org/Remapping%20Arguments.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+__all__ = [
+    "Arguments",
+    "anonymous_name",
+    "canonicalize",
+    "is_global",
+    "is_legal_base_name",
+    "is_legal_name",
+    "is_private",
+    "join",
+    "namespace_of",
+    "parse_arguments",
+    "resolve",
+]
+
+_LEGAL = re.compile(r"^[~/A-Za-z][\w/]*$", re.ASCII)
+_LEGAL_BASE = re.compile(r"^[A-Za-z]\w*$", re.ASCII)
+_SPECIAL = {"__name", "__ns", "__log", "__master", "__ip", "__hostname"}
+
+
+def is_legal_name(name: str) -> bool:
+    """Whether ``name`` is a legal graph resource name; the empty name resolves to the namespace."""
+    return name == "" or (bool(_LEGAL.match(name)) and "//" not in name)
+
+
+def is_legal_base_name(name: str) -> bool:
+    """Whether ``name`` is legal without any namespace, as a node's name must be."""
+    return bool(_LEGAL_BASE.match(name))
+
+
+def is_global(name: str) -> bool:
+    """Whether ``name`` starts at the root."""
+    return name.startswith("/")
+
+
+def is_private(name: str) -> bool:
+    """Whether ``name`` starts with ``~``."""
+    return name.startswith("~")
+
+
+def canonicalize(name: str) -> str:
+    """``name`` without doubled or trailing slashes."""
+    if not name or name == "/":
+        return name
+    return ("/" if name.startswith("/") else "") + "/".join(part for part in name.split("/") if part)
+
+
+def namespace_of(name: str) -> str:
+    """The namespace that holds ``name``, with a slash at its end: ``/a/b`` -> ``/a/``."""
+    if not name:
+        return "/"
+    stem = name.rstrip("/")
+    return (stem[: stem.rfind("/") + 1] or "/") if "/" in stem else "/"
+
+
+def join(namespace: str, name: str) -> str:
+    """``name`` below ``namespace``; global and private names stay what they are."""
+    if is_global(name) or is_private(name):
+        return name
+    if namespace == "~":
+        return "~" + name
+    if not namespace:
+        return name
+    return namespace.rstrip("/") + "/" + name
+
+
+def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
+    """The global name of ``name`` as the node ``node_name`` (global) sees it, remapped."""
+    namespace = namespace_of(node_name)
+    if not name:
+        return namespace
+    name = canonicalize(name)
+    if is_global(name):
+        resolved = name
+    elif is_private(name):
+        resolved = canonicalize(node_name + "/" + name[1:])
+    else:
+        resolved = namespace + name
+    return remappings.get(resolved, resolved) if remappings else resolved
+
+
+def anonymous_name(base: str) -> str:
+    """A name that no other node has: base, host, pid and time, in rospy's form."""
+    host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
+    return f"{base}_{host}_{os.getpid()}_{int(time.time() * 1000)}"
+
+
+class Arguments(NamedTuple):
+    """A command line taken apart.
+
+    ``plain``: what is left for the program; ``remappings``: names as typed, unresolved;
+    ``parameters``: private parameters as (name without the underscore, YAML text);
+    ``special``: ``__name``, ``__ns`` and their kin.
+    """
+
+    plain: list[str]
+    remappings: dict[str, str]
+    parameters: dict[str, str]
+    special: dict[str, str]
+
+    def resolved_remappings(self, node_name: str) -> dict[str, str]:
+        """The remappings with both sides as global names."""
+        return {resolve(a, node_name): resolve(b, node_name) for a, b in self.remappings.items()}
+
+
+def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
+    """Take ``from:=to``, ``_param:=value`` and ``__special:=value`` out of a command line."""
+    parsed = Arguments([], {}, {}, {})
+    for argument in argv:
+        key, separator, value = argument.partition(":=")
+        key, value = key.strip(), value.strip()
+        if not separator or not key:
+            parsed.plain.append(argument)
+        elif key in _SPECIAL:
+            parsed.special[key] = value
+        elif key.startswith("__"):
+            continue  # reserved for clients of other languages, as rospy treats it
+        elif key.startswith("_"):
+            parsed.parameters[key[1:]] = value
+        else:
+            parsed.remappings[key] = value
+    return parsed

@@ -1,0 +1,1 @@
+"""The shells that move bytes: one asyncio loop a process, sockets, XML-RPC, nodes, the master."""

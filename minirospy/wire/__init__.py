@@ -1,0 +1,1 @@
+"""Pure protocol: bytes in, events out. Imports no asyncio, no socket, no threading."""

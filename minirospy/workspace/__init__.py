@@ -1,0 +1,1 @@
+"""ROS packages on disk: where they are, what they hold."""
