@@ -1,0 +1,41 @@
+# Two commands do it all on a fresh machine with Python 3.10+ and make: `make demo`, `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+ifeq ($(OS),Windows_NT)
+BIN := $(VENV)/Scripts
+else
+BIN := $(VENV)/bin
+endif
+STAMP := $(VENV)/.installed
+
+.PHONY: demo test interop lint bench clean help
+
+help:
+	@echo "make demo     the workshop's button lights its LED, on the virtual board"
+	@echo "make test     every test"
+	@echo "make interop  against Debian's real ROS 1, which it installs (needs apt-get and root)"
+	@echo "make lint     ruff and mypy"
+	@echo "make bench    the benchmarks"
+	@echo "make clean    remove what the above made"
+
+demo: $(STAMP)
+	@$(BIN)/minirospy demo
+
+test: $(STAMP)
+	@$(BIN)/python -m pytest
+
+lint: $(STAMP)
+	@$(BIN)/python -m ruff check .
+	@$(BIN)/python -m ruff format --check .
+	@$(BIN)/python -m mypy
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+# Made again when the project file or a definition changes; an interrupted install leaves no stamp.
+$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/idl/*.py msgs/*/*/* msgs/*/package.xml)
+	@$(PYTHON) -c "import sys; v = sys.version_info; v >= (3, 10) or sys.exit('minirospy needs Python 3.10 or newer, this is %d.%d: make PYTHON=python3.x' % v[:2])"
+	@echo "Making the environment $(VENV) ..."
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
+	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"

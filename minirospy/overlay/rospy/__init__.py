@@ -1,0 +1,1 @@
+"""rospy: filled in by minirospy."""

@@ -1,0 +1,27 @@
+"""What every test stands on: an environment of its own, so that no test meets another or the user's ROS."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _own_environment(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No ROS variable of the outside gets in; files go to a temporary folder, sockets to loopback."""
+    home: Path = tmp_path_factory.mktemp("ros")
+    for name in list(os.environ):
+        if name.startswith("ROS_") or name.startswith("MINIROSPY_"):
+            monkeypatch.delenv(name)
+    monkeypatch.setenv("ROS_HOME", str(home))
+    monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
+    monkeypatch.setenv("ROS_HOSTNAME", "localhost")
+    # A port on which nothing listens: a test that forgets its own master fails at once.
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
+    monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
+    monkeypatch.setenv("PYTHONUNBUFFERED", "1")
+    yield
