@@ -1,0 +1,46 @@
+"""ROS 1 for any computer with Python.
+
+``import minirospy as rospy`` offers what ``import rospy`` does: the names below are loaded when they are
+first used, so that a command which needs none of them starts at once.
+
+The way of a message, file by file::
+
+    Bool.msg -> idl/parse -> spec -> idl/emit -> class
+    publish  -> client/topics (serialize, caller's thread) -> runtime/topics.Publication -> runtime/tcp.OutLink
+             ==> TCP ==>
+    runtime/tcp.read_frames (worker) -> wire/framing -> runtime/topics.Subscription
+             -> client/topics (deserialize, user's function)
+
+and how the two ends find each other: client/topics -> runtime/node -> runtime/master -> graph/registry ->
+publisherUpdate -> runtime/slave -> runtime/topics -> graph/subscription (whom to connect) -> requestTopic
+-> wire/tcpros (headers).
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from minirospy.client import *  # noqa: F403 - the names that __getattr__ finds, for mypy and editors
+
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("_"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        return importlib.import_module(f"{__name__}.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"{__name__}.{name}":
+            raise
+    client = importlib.import_module("minirospy.client")
+    try:
+        return getattr(client, name)
+    except AttributeError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *importlib.import_module("minirospy.client").__all__})

@@ -1,0 +1,72 @@
+"""The bridge between a program's threads and the one asyncio loop of the process."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import threading
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+__all__ = ["LoopThread", "new_event_loop"]
+
+_T = TypeVar("_T")
+
+
+def new_event_loop() -> asyncio.AbstractEventLoop:
+    """A loop that can watch plain sockets, on every OS (Windows' default loop cannot)."""
+    return asyncio.SelectorEventLoop()
+
+
+class LoopThread:
+    """An event loop in a daemon thread. Closing is idempotent."""
+
+    def __init__(self, name: str = "minirospy-loop") -> None:
+        self.loop = new_event_loop()
+        self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
+        self._thread.start()
+
+    def run(self, coroutine: Coroutine[Any, Any, _T], timeout: float | None = None) -> _T:
+        """Run ``coroutine`` on the loop and wait for its result.
+
+        Raises TimeoutError after ``timeout`` seconds, and RuntimeError on the loop's own thread, where
+        waiting would never end.
+        """
+        if threading.current_thread() is self._thread:
+            coroutine.close()
+            raise RuntimeError("a blocking call on the event loop's thread would wait for itself")
+        future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
+        try:
+            return future.result(timeout)
+        except concurrent.futures.TimeoutError:
+            future.cancel()
+            raise TimeoutError from None
+        except BaseException:
+            future.cancel()
+            raise
+
+    def post(self, function: Callable[..., object], *args: object) -> None:
+        """Call ``function`` on the loop soon; without effect once the loop is closed."""
+        with contextlib.suppress(RuntimeError):
+            self.loop.call_soon_threadsafe(function, *args)
+
+    def close(self) -> None:
+        """End the loop: what still runs on it is cancelled."""
+        if not self._thread.is_alive():
+            return
+        self.post(self.loop.stop)
+        if threading.current_thread() is not self._thread:
+            self._thread.join(2.0)
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self.loop)
+        try:
+            self.loop.run_forever()
+        finally:
+            tasks = asyncio.all_tasks(self.loop)
+            for task in tasks:
+                task.cancel()
+            if tasks:
+                self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+            self.loop.close()

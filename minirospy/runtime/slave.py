@@ -1,0 +1,144 @@
+"""The Slave API of a node: what the master and other nodes may ask it over XML-RPC.
+
+Source: http://wiki.ros.org/ROS/Slave_API. The answers are ``[status code, text, value]``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import RpcFault
+
+if TYPE_CHECKING:
+    from minirospy.runtime.node import Node
+
+__all__ = ["SlaveApi"]
+
+_SUCCESS, _FAILURE, _ERROR = 1, 0, -1
+
+
+class SlaveApi:
+    """One method per call of the API; ``dispatch`` is what the XML-RPC server calls (on the loop)."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._methods: dict[str, Callable[..., list[Any]]] = {
+            "getBusStats": self.get_bus_stats,
+            "getBusInfo": self.get_bus_info,
+            "getMasterUri": self.get_master_uri,
+            "getName": self.get_name,
+            "getPid": self.get_pid,
+            "getPublications": self.get_publications,
+            "getSubscriptions": self.get_subscriptions,
+            "paramUpdate": self.param_update,
+            "publisherUpdate": self.publisher_update,
+            "requestTopic": self.request_topic,
+            "shutdown": self.shutdown,
+        }
+
+    def dispatch(self, method: str, args: Sequence[Any]) -> Any:
+        """The answer to one call. Raises RpcFault on a method that is not there."""
+        if method == "system.listMethods":
+            return sorted(self._methods)
+        if method == "system.multicall":
+            # A list of structs in, a list of one-element lists (or fault structs) out.
+            return [self._one_of_many(call) for call in args[0]]
+        function = self._methods.get(method)
+        if function is None:
+            raise RpcFault(1, f"method [{method}] is not supported")
+        try:
+            return function(*args)
+        except TypeError:
+            return [_ERROR, f"{method} called with wrong arguments", 0]
+
+    def get_bus_stats(self, caller_id: str) -> list[Any]:
+        """Transferred bytes and messages, by topic and connection."""
+        publications = [
+            [
+                publication.topic,
+                sum(link.sent_bytes for link in publication.links),
+                [[number, link.sent_bytes, link.sent, 1] for number, link in enumerate(publication.links)],
+            ]
+            for publication in self._node.publications.values()
+        ]
+        subscriptions = [
+            [
+                subscription.topic,
+                [[number, link.received_bytes, -1, 1] for number, link in enumerate(subscription.links)],
+            ]
+            for subscription in self._node.subscriptions.values()
+        ]
+        return [_SUCCESS, "", [publications, subscriptions, [0, 0, 0]]]
+
+    def get_bus_info(self, caller_id: str) -> list[Any]:
+        """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
+        rows: list[list[Any]] = []
+        port = self._node.tcpros_port
+        for publication in self._node.publications.values():
+            for out in publication.links:
+                what = f"TCPROS connection on port {port} to [{out.address}]"
+                rows.append([len(rows), out.peer, "o", "TCPROS", publication.topic, True, what])
+        for subscription in self._node.subscriptions.values():
+            for link in subscription.links:
+                what = f"TCPROS connection to [{link.address}]"
+                rows.append([len(rows), link.uri, "i", "TCPROS", subscription.topic, True, what])
+        return [_SUCCESS, "bus info", rows]
+
+    def get_master_uri(self, caller_id: str) -> list[Any]:
+        """The master that this node registered with."""
+        return [_SUCCESS, self._node.environment.master_uri, self._node.environment.master_uri]
+
+    def get_name(self, caller_id: str) -> list[Any]:
+        """This node's name."""
+        return [_SUCCESS, "node name", self._node.name]
+
+    def get_pid(self, caller_id: str) -> list[Any]:
+        """This process's id."""
+        return [_SUCCESS, "", os.getpid()]
+
+    def get_publications(self, caller_id: str) -> list[Any]:
+        """[topic, type] of each topic that this node publishes."""
+        rows = [[p.topic, p.type.name] for p in self._node.publications.values()]
+        return [_SUCCESS, "publications", rows]
+
+    def get_subscriptions(self, caller_id: str) -> list[Any]:
+        """[topic, type] of each topic that this node subscribes to."""
+        rows = [[s.topic, s.type.name] for s in self._node.subscriptions.values()]
+        return [_SUCCESS, "subscriptions", rows]
+
+    def param_update(self, caller_id: str, key: str, value: Any) -> list[Any]:
+        """A parameter that this node subscribed to has changed."""
+        self._node.parameter_changed(key, value)
+        return [_SUCCESS, "", 0]
+
+    def publisher_update(self, caller_id: str, topic: str, publishers: Any) -> list[Any]:
+        """The master's full list of a topic's publishers."""
+        if not isinstance(publishers, list) or not all(isinstance(uri, str) for uri in publishers):
+            return [_ERROR, "publishers must be a list of URIs", 0]
+        self._node.publishers_changed(topic, publishers)
+        return [_SUCCESS, "", 0]
+
+    def request_topic(self, caller_id: str, topic: str, protocols: Any) -> list[Any]:
+        """Where a subscriber finds the topic, by the first protocol that both sides speak."""
+        if topic not in self._node.publications:
+            return [_ERROR, f"Not a publisher of [{topic}]", []]
+        offered = protocols if isinstance(protocols, list) else []
+        if not any(isinstance(entry, list) and entry[:1] == ["TCPROS"] for entry in offered):
+            return [_FAILURE, "no supported protocol implementations", []]
+        host, port = self._node.environment.host, self._node.tcpros_port
+        return [_SUCCESS, f"ready on {host}:{port}", ["TCPROS", host, port]]
+
+    def shutdown(self, caller_id: str, reason: str = "") -> list[Any]:
+        """Stop the node."""
+        self._node.request_shutdown(f"external shutdown request from [{caller_id}]: {reason}")
+        return [_SUCCESS, "shutdown", 0]
+
+    def _one_of_many(self, call: Any) -> Any:
+        try:
+            return [self.dispatch(call["methodName"], call["params"])]
+        except RpcFault as fault:
+            return {"faultCode": fault.code, "faultString": fault.text}
+        except (KeyError, TypeError):
+            return {"faultCode": 1, "faultString": "a call is a struct of methodName and params"}

@@ -1,0 +1,55 @@
+"""Worker threads: where user code runs, so that it never runs on the loop."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+
+__all__ = ["Workers"]
+
+_IDLE_SECONDS = 10.0
+_log = logging.getLogger(__name__)
+
+
+class Workers:
+    """Daemon threads that are kept for a while when their work is done, since starting one costs.
+
+    There is no limit on their number: each connection that waits for bytes has one, and peers are
+    limited where they are accepted.
+    """
+
+    def __init__(self) -> None:
+        self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._idle = 0
+
+    def start(self, function: Callable[..., object], *args: object) -> None:
+        """Run ``function(*args)`` in a worker; an exception that it lets out is logged."""
+        with self._lock:
+            if self._idle:
+                # A claimed worker surely takes an entry: it leaves only when it can withdraw itself.
+                self._idle -= 1
+                self._work.put((function, args))
+                return
+        threading.Thread(target=self._run, args=(function, args), name="minirospy-worker", daemon=True).start()
+
+    def _run(self, function: Callable[..., object], args: tuple[object, ...]) -> None:
+        while True:
+            try:
+                function(*args)
+            except Exception:  # noqa: BLE001 - the edge to user code: a fault there must not end the worker
+                _log.exception("fault in a worker")
+            del function, args
+            with self._lock:
+                self._idle += 1
+            try:
+                function, args = self._work.get(timeout=_IDLE_SECONDS)
+            except queue.Empty:
+                with self._lock:
+                    if self._idle:
+                        self._idle -= 1
+                        return
+                # Claimed in the moment of leaving: the entry is on its way.
+                function, args = self._work.get()

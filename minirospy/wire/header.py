@@ -1,0 +1,47 @@
+"""The connection header: ``field=value`` pairs that open every TCPROS connection.
+
+Fields in, bytes out, and back. Source: http://wiki.ros.org/ROS/Connection%20Header.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+
+from minirospy.errors import WireError
+
+__all__ = ["MAX_HEADER", "Header", "parse_header", "serialize_header"]
+
+Header = dict[str, str]
+
+MAX_HEADER = 4 * 1024 * 1024
+"""Bytes that a header may have: the full texts of the largest definitions take some 20 kB."""
+
+_LENGTH = struct.Struct("<I")
+
+
+def serialize_header(fields: Mapping[str, str]) -> bytes:
+    """The header with its own length in front, fields sorted as rospy and roscpp send them."""
+    pairs = [f"{name}={fields[name]}".encode() for name in sorted(fields)]
+    body = b"".join(_LENGTH.pack(len(pair)) + pair for pair in pairs)
+    return _LENGTH.pack(len(body)) + body
+
+
+def parse_header(body: bytes) -> Header:
+    """The fields of a header whose length has been taken off. Raises WireError."""
+    fields: Header = {}
+    at = 0
+    while at < len(body):
+        if at + 4 > len(body):
+            raise WireError("connection header ends inside a field's length")
+        (length,) = _LENGTH.unpack_from(body, at)
+        at += 4
+        if at + length > len(body):
+            raise WireError(f"connection header's field of {length} bytes is longer than the header")
+        name, separator, value = body[at : at + length].partition(b"=")
+        at += length
+        if not separator:
+            raise WireError(f"connection header's field {name[:40]!r} has no '='")
+        # Others send names and definitions in any encoding; a definition's comment must not end a link.
+        fields[name.decode("utf-8", "replace")] = value.decode("utf-8", "replace")
+    return fields

@@ -1,0 +1,149 @@
+"""TCPROS roles: which header each side sends, and when the other's header is accepted.
+
+Pure decisions on fields; the sockets are in ``minirospy.runtime``.
+Source: http://wiki.ros.org/ROS/TCPROS, http://wiki.ros.org/ROS/Connection%20Header.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from minirospy.errors import HandshakeRefused
+from minirospy.wire.header import Header
+
+__all__ = [
+    "ANY",
+    "InterfaceType",
+    "check_publisher",
+    "check_service",
+    "check_service_client",
+    "check_subscriber",
+    "publisher_header",
+    "service_client_header",
+    "service_header",
+    "subscriber_header",
+]
+
+ANY = "*"
+"""The type and md5sum of one who takes whatever comes."""
+
+
+class InterfaceType(NamedTuple):
+    """What a peer is told of a message or service type: name (``pkg/Name``), md5sum, full text."""
+
+    name: str
+    md5sum: str
+    definition: str = ""
+
+
+def subscriber_header(topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False) -> Header:
+    """What a subscriber opens with."""
+    return {
+        "callerid": caller_id,
+        "md5sum": type_.md5sum,
+        "message_definition": type_.definition,
+        "tcp_nodelay": "1" if tcp_nodelay else "0",
+        "topic": topic,
+        "type": type_.name,
+    }
+
+
+def publisher_header(
+    topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
+) -> Header:
+    """What a publisher answers with; ``extra`` are the fields that the user added."""
+    return {
+        **(extra or {}),
+        "callerid": caller_id,
+        "latching": "1" if latch else "0",
+        "md5sum": type_.md5sum,
+        "message_definition": type_.definition,
+        "topic": topic,
+        "type": type_.name,
+    }
+
+
+def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
+    """Why a publisher of ``type_`` refuses the subscriber with these fields; None accepts it."""
+    for name in ("topic", "md5sum"):
+        if name not in fields:
+            return f"Missing required '{name}' field in connection header"
+    return _mismatch(fields, type_, f"topic [{topic}]")
+
+
+def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
+    """Raise HandshakeRefused unless a publisher's answer fits ``type_``."""
+    _raise_error_field(fields)
+    for name in ("md5sum", "type"):
+        if name not in fields:
+            raise HandshakeRefused(f"publisher of [{topic}] sent a connection header without [{name}]")
+    why = _mismatch(fields, type_, f"topic [{topic}]")
+    if why:
+        raise HandshakeRefused(why)
+
+
+def service_client_header(
+    service: str,
+    md5sum: str,
+    caller_id: str,
+    *,
+    persistent: bool = False,
+    probe: bool = False,
+    extra: Mapping[str, str] | None = None,
+) -> Header:
+    """What a service client opens with; ``probe`` only asks whether the service is alive."""
+    fields = {**(extra or {}), "callerid": caller_id, "md5sum": md5sum, "service": service}
+    if persistent:
+        fields["persistent"] = "1"
+    if probe:
+        fields["probe"] = "1"
+    return fields
+
+
+def service_header(type_: InterfaceType, caller_id: str, request_type: str, response_type: str) -> Header:
+    """What a service answers with."""
+    return {
+        "callerid": caller_id,
+        "md5sum": type_.md5sum,
+        "request_type": request_type,
+        "response_type": response_type,
+        "type": type_.name,
+    }
+
+
+def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
+    """Why a service of ``type_`` refuses the client with these fields; None accepts it."""
+    for name in ("service", "md5sum", "callerid"):
+        if name not in fields:
+            return f"Missing required '{name}' field in connection header"
+    if fields["md5sum"] not in (ANY, type_.md5sum):
+        return (
+            f"request from [{fields['callerid']}]: md5sums do not match: "
+            f"[{fields['md5sum']}] vs. [{type_.md5sum}]"
+        )
+    return None
+
+
+def check_service(fields: Header) -> None:
+    """Raise HandshakeRefused where a service answered with an error."""
+    _raise_error_field(fields)
+
+
+def _raise_error_field(fields: Header) -> None:
+    if "error" in fields:
+        raise HandshakeRefused(fields["error"])
+
+
+def _mismatch(fields: Header, type_: InterfaceType, what: str) -> str | None:
+    theirs = fields["md5sum"]
+    # Types are compared only once the md5sums differ: a renamed type with the same fields is compatible.
+    if ANY in (theirs, type_.md5sum) or theirs == type_.md5sum:
+        return None
+    their_type = fields.get("type", ANY)
+    if their_type not in (ANY, type_.name):
+        return f"topic types do not match: [{their_type}] vs. [{type_.name}]"
+    return (
+        f"{what}: md5sums do not match: [{theirs}] vs. [{type_.md5sum}]: "
+        f"the definitions of [{type_.name}] differ, build both sides from the same one"
+    )
