@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import logging
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from minirospy.environment import Environment
@@ -84,7 +84,7 @@ class Node:
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
             asyncio.wait_for(self._unregister_all(), _UNREGISTER_SECONDS),
-            *(asyncio.to_thread(link.flush, _FLUSH_SECONDS) for link in links if link.waiting),
+            *(link.drain(_FLUSH_SECONDS) for link in links),
             return_exceptions=True,
         )
         await self._listener.close()
@@ -112,32 +112,11 @@ class Node:
             case _:
                 raise RpcRefused(method, -1, f"the master answered {answer!r}")
 
-    async def advertise(
-        self,
-        topic: str,
-        type_: InterfaceType,
-        *,
-        queue_size: int | None = 0,
-        latch: bool = False,
-        headers: Mapping[str, str] | None = None,
-        tcp_nodelay: bool = False,
-        on_link: Callable[[tcp.OutLink, bool], None] | None = None,
-    ) -> Publication:
-        """Publish ``topic``; see :class:`Publication`. A topic that is published already is returned as it is."""
-        publication = self.publications.get(topic)
-        if publication is None:
-            publication = self.publications[topic] = Publication(
-                topic,
-                type_,
-                self.name,
-                queue_size=queue_size,
-                latch=latch,
-                headers=headers,
-                tcp_nodelay=tcp_nodelay,
-                on_link=on_link,
-            )
-            await self.master("registerPublisher", topic, type_.name, self.uri)
-        return publication
+    async def advertise(self, publication: Publication) -> None:
+        """Publish a topic from now on. One publication a topic: a second is a ValueError."""
+        if self.publications.setdefault(publication.topic, publication) is not publication:
+            raise ValueError(f"{self.name} publishes {publication.topic} already")
+        await self.master("registerPublisher", publication.topic, publication.type.name, self.uri)
 
     async def unadvertise(self, publication: Publication) -> None:
         """Stop publishing."""
@@ -148,7 +127,7 @@ class Node:
             finally:
                 publication.close()
 
-    async def subscribe(
+    def make_subscription(
         self,
         topic: str,
         type_: InterfaceType,
@@ -158,10 +137,8 @@ class Node:
         tcp_nodelay: bool = False,
         on_loop: bool = False,
     ) -> Subscription:
-        """Listen to ``topic``; see :class:`Subscription`. One subscription a topic: a second is a ValueError."""
-        if topic in self.subscriptions:
-            raise ValueError(f"{self.name} subscribes to {topic} already")
-        subscription = self.subscriptions[topic] = Subscription(
+        """A :class:`Subscription` for this node, for :meth:`subscribe`."""
+        return Subscription(
             topic,
             type_,
             self.name,
@@ -172,8 +149,14 @@ class Node:
             tcp_nodelay=tcp_nodelay,
             on_loop=on_loop,
         )
-        subscription.publishers_changed(await self.master("registerSubscriber", topic, type_.name, self.uri))
-        return subscription
+
+    async def subscribe(self, subscription: Subscription) -> None:
+        """Listen to a topic from now on. One subscription a topic: a second is a ValueError."""
+        topic = subscription.topic
+        if self.subscriptions.setdefault(topic, subscription) is not subscription:
+            raise ValueError(f"{self.name} subscribes to {topic} already")
+        uris = await self.master("registerSubscriber", topic, subscription.type.name, self.uri)
+        subscription.publishers_changed(uris)
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """Stop listening."""
@@ -182,13 +165,11 @@ class Node:
             subscription.close()
             await self.master("unregisterSubscriber", subscription.topic, self.uri)
 
-    async def serve(
+    def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
     ) -> ServiceServer:
-        """Offer a service; see :class:`ServiceServer`. One that this node has already is a ValueError."""
-        if name in self.services:
-            raise ValueError(f"service [{name}] already registered")
-        server = self.services[name] = ServiceServer(
+        """A :class:`ServiceServer` for this node, for :meth:`serve`."""
+        return ServiceServer(
             name,
             type_,
             self.name,
@@ -197,8 +178,12 @@ class Node:
             response_type=response_type,
             workers=self.workers,
         )
-        await self.master("registerService", name, self.service_uri, self.uri)
-        return server
+
+    async def serve(self, server: ServiceServer) -> None:
+        """Offer a service from now on. One of a name: a second is a ValueError."""
+        if self.services.setdefault(server.name, server) is not server:
+            raise ValueError(f"service [{server.name}] already registered")
+        await self.master("registerService", server.name, self.service_uri, self.uri)
 
     async def unserve(self, server: ServiceServer) -> None:
         """Stop offering a service; calls under way are ended."""
@@ -240,7 +225,7 @@ class Node:
         elif "topic" in fields:
             publication = self.publications.get(fields["topic"])
             if publication:
-                why = await publication.accept(sock, fields, address)
+                why = await publication.accept(sock, fields, self.name, address)
             else:
                 why = f"[{fields['topic']}] is not a published topic of {self.name}"
         else:
@@ -251,12 +236,10 @@ class Node:
             sock.close()
 
     async def _unregister_all(self) -> None:
-        calls = [
-            *(("unregisterPublisher", topic, self.uri) for topic in self.publications),
-            *(("unregisterSubscriber", topic, self.uri) for topic in self.subscriptions),
-            *(("unregisterService", name, self.service_uri) for name in self.services),
-        ]
-        if calls:
-            with contextlib.suppress(RpcError):
-                multicall = [{"methodName": m, "params": [self.name, *args]} for m, *args in calls]
-                await self._rpc.call(self.environment.master_uri, "system.multicall", multicall)
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            for topic in self.publications:
+                await self.master("unregisterPublisher", topic, self.uri)
+            for topic in self.subscriptions:
+                await self.master("unregisterSubscriber", topic, self.uri)
+            for name in self.services:
+                await self.master("unregisterService", name, self.service_uri)

@@ -16,16 +16,19 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
+from types import FrameType
 
 from minirospy.errors import WireError
 from minirospy.wire.framing import FrameReader
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [
+    "HANDSHAKE_SECONDS",
     "Listener",
     "OutLink",
     "connect",
     "hang_up",
+    "is_sending",
     "read_frames",
     "receive_header",
     "send_header",
@@ -196,8 +199,8 @@ class OutLink:
         """Start to watch for the peer's hanging up (on the loop)."""
         self._loop.add_reader(self._sock, self._readable)
 
-    def send(self, frame: bytes, *, wait: bool = False) -> None:
-        """Send ``frame``; with ``wait``, return when the socket has taken it."""
+    def send(self, frame: bytes) -> None:
+        """Send ``frame``: at once, or after those that wait."""
         with self._drained:
             if self._closed:
                 return
@@ -222,14 +225,17 @@ class OutLink:
                 self._begun = count > 0
                 self._outbox.append(memoryview(frame)[count:])
                 self._post(self._start_writing)
-            if wait:
-                while self._outbox and not self._closed:
-                    self._drained.wait(1.0)
 
-    def flush(self, timeout: float) -> None:
-        """Wait until the socket has taken all that waits, at most ``timeout`` seconds (not on the loop)."""
+    def wait(self) -> None:
+        """Return when the socket has taken all that waits, or the link is closed (not on the loop)."""
         with self._drained:
-            self._drained.wait_for(lambda: not self._outbox or self._closed, timeout)
+            self._drained.wait_for(lambda: not self._outbox or self._closed)
+
+    async def drain(self, timeout: float) -> None:
+        """The same on the loop, for at most ``timeout`` seconds."""
+        end = self._loop.time() + timeout
+        while self._outbox and self._loop.time() < end:
+            await asyncio.sleep(0.005)
 
     def close(self) -> None:
         """End the connection (on the loop). Idempotent."""
@@ -296,6 +302,18 @@ class OutLink:
         except OSError:
             pass
         self.close()
+
+
+def is_sending(frame: FrameType | None) -> bool:
+    """Whether the stack at ``frame`` is inside :meth:`OutLink.send`, where a link's lock is held.
+
+    A signal handler that finds its thread there must not send itself: it has to come back a moment later.
+    """
+    while frame is not None:
+        if frame.f_code is OutLink.send.__code__:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def read_frames(sock: socket.socket, deliver: Callable[[memoryview], None], newest: int = 0) -> None:

@@ -42,7 +42,6 @@ class Publication:
         self,
         topic: str,
         type_: InterfaceType,
-        caller_id: str,
         *,
         queue_size: int | None = 0,
         latch: bool = False,
@@ -61,14 +60,12 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[tcp.OutLink, ...] = ()
-        self._caller_id = caller_id
         self._on_link = on_link
         self._latched: bytes | None = None
         self._latch_lock = threading.Lock()
 
     def publish(self, frame: bytes) -> None:
         """Send one frame to every subscriber."""
-        wait = self.queue_size is None
         if self.latch:
             # A subscriber that joins at this moment gets the frame once: either here or on joining.
             with self._latch_lock:
@@ -77,15 +74,18 @@ class Publication:
         else:
             links = self.links
         for link in links:
-            link.send(frame, wait=wait)
+            link.send(frame)
+        if self.queue_size is None:
+            for link in links:
+                link.wait()
 
-    async def accept(self, sock: socket.socket, fields: Header, peer: str) -> str | None:
-        """Answer a subscriber's header and send to it from now on, or return why it is refused."""
+    async def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
+        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return why it is refused."""
         why = check_subscriber(fields, self.topic, self.type)
         if why:
             return why
         answer = publisher_header(
-            self.topic, self.type, self._caller_id, latch=self.latch, extra=self.headers
+            self.topic, self.type, caller_id, latch=self.latch, extra=self.headers
         )
         await tcp.send_header(sock, answer)
         tcp.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")

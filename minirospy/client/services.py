@@ -1,0 +1,287 @@
+"""Service and ServiceProxy as rospy has them. Source: http://wiki.ros.org/rospy/Overview/Services."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from typing import Any, Generic, TypeVar
+
+from minirospy.client.process import process
+from minirospy.clock import wait_for_event
+from minirospy.errors import (
+    DeserializationError,
+    HandshakeRefused,
+    MasterUnreachableError,
+    ROSException,
+    ROSInterruptException,
+    RpcError,
+    RpcRefused,
+    SerializationError,
+    ServiceException,
+    TransportException,
+    WireError,
+)
+from minirospy.idl.message import args_kwds_to_message
+from minirospy.runtime.services import ServiceClient, ServiceServer
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+__all__ = ["Service", "ServiceProxy", "wait_for_service"]
+
+_log = logging.getLogger("rosout")
+_S = TypeVar("_S", bound=Any)
+_POLL_SECONDS = 0.1
+
+
+class Service(Generic[_S]):
+    """Offers a service: ``handler(request)`` returns the response.
+
+    The handler may return a response, a dictionary of its fields, or a list or tuple of all their values.
+    What it raises goes to the client as the call's error; ``error_handler`` is told too.
+    Raises ServiceException where this node offers the service already.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[_S],
+        handler: Callable[[Any], Any],
+        buff_size: int = 65536,
+        error_handler: Callable[[Exception, type[Exception], Exception, Any], object] | None = None,
+    ) -> None:
+        self.resolved_name = process.resolve(name)
+        self.service_class = service_class
+        self.request_class: type[Any] = service_class._request_class
+        self.response_class: type[Any] = service_class._response_class
+        self.type: str = service_class._type
+        self.md5sum: str = service_class._md5sum
+        self.handler = handler
+        self.error_handler = error_handler or self._log_error
+        self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
+        self._server: ServiceServer | None = None
+        self._ended = threading.Event()
+        process.when_ready(self._register)
+
+    def shutdown(self, reason: str = "") -> None:
+        """Stop offering the service."""
+        self._ended.set()
+        server, self._server = self._server, None
+        if server and process.node and not process.is_shutdown():
+            try:
+                process.run(process.node.unserve(server))
+            except (MasterUnreachableError, RpcError) as error:
+                _log.debug("unregistering service %s: %s", self.resolved_name, error)
+
+    def spin(self) -> None:
+        """Wait until the service or the node shuts down."""
+        with process.interrupting(self._ended.set):
+            try:
+                wait_for_event(self._ended, None)
+            except KeyboardInterrupt:
+                process.signal_shutdown("keyboard interrupt")
+
+    def _register(self) -> None:
+        node = process.node
+        if node is None or process.is_shutdown():
+            return
+        if self.resolved_name in node.services:
+            raise ServiceException(f"service [{self.resolved_name}] already registered")
+        self._server = node.make_service(
+            self.resolved_name,
+            InterfaceType(self.type, self.md5sum),
+            self._handle,
+            request_type=self.request_class._type,
+            response_type=self.response_class._type,
+        )
+        try:
+            process.run(node.serve(self._server))
+        except (MasterUnreachableError, RpcError) as error:
+            _log.critical("unable to register service [%s] with master: %s", self.resolved_name, error)
+
+    def _handle(self, body: memoryview, header: Header) -> bytes:
+        """Bytes of a request in, bytes of the response out (in a worker)."""
+        try:
+            request = self.request_class()
+            request.deserialize(body if self._takes_memoryview else bytes(body))
+            request._connection_header = header
+            response = self._to_response(self.handler(request))
+            buffer = BytesIO()
+            response.serialize(buffer)
+            return buffer.getvalue()
+        except ServiceException as error:
+            _log.error("Error processing request: %s", error)
+            raise ServiceException(f"service cannot process request: {error}") from error
+        except Exception as error:  # the user's handler: its error is the client's answer
+            self.error_handler(error, type(error), error, error.__traceback__)
+            raise ServiceException(f"error processing request: {error}") from error
+
+    def _to_response(self, returned: Any) -> Any:
+        """A handler's return value as a response. Raises ServiceException."""
+        if isinstance(returned, self.response_class) or (
+            getattr(returned, "_type", None) == self.response_class._type
+        ):
+            return returned
+        if returned is None:
+            raise ServiceException("service handler returned None")
+        try:
+            if isinstance(returned, dict):
+                return self.response_class(**returned)
+            values = returned if isinstance(returned, list | tuple) else [returned]
+            return args_kwds_to_message(self.response_class, values, {})
+        except (TypeError, AttributeError) as error:
+            what = "wrong number of values" if isinstance(returned, list | tuple) else "invalid value"
+            raise ServiceException(f"handler returned {what}: {error}") from error
+
+    @staticmethod
+    def _log_error(error: Exception, _: type[Exception], __: Exception, tb: Any) -> None:
+        text = "".join(traceback.format_exception(type(error), error, tb))
+        _log.error("Error processing request: %s\n%s", error, text)
+
+
+class ServiceProxy(Generic[_S]):
+    """Calls a service: ``proxy(request)``, or with the request's fields as arguments.
+
+    ``persistent`` keeps one connection for all calls; it is made again when it breaks. A proxy may be used
+    by several threads; with ``persistent`` they wait for each other.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        service_class: type[_S],
+        persistent: bool = False,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        self.resolved_name = process.resolve(name)
+        self.service_class = service_class
+        self.request_class: type[Any] = service_class._request_class
+        self.response_class: type[Any] = service_class._response_class
+        self.type: str = service_class._type
+        self.md5sum: str = service_class._md5sum
+        self.persistent = persistent
+        self._headers = dict(headers or {})
+        self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
+        self._client: ServiceClient | None = None
+        self._lock = threading.Lock()
+
+    def __call__(self, *args: Any, **kwds: Any) -> Any:
+        """Call the service and return its response.
+
+        Raises ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        fit the request, SerializationError where a value does not.
+        """
+        return self.call(*args, **kwds)
+
+    def call(self, *args: Any, **kwds: Any) -> Any:
+        """The same as calling the proxy itself."""
+        request = args_kwds_to_message(self.request_class, args, kwds)
+        buffer = BytesIO()
+        request.serialize(buffer)
+        if not self.persistent:
+            return self._exchange(self._connect(), buffer.getvalue(), keep=False)
+        with self._lock:
+            if self._client is None:
+                self._client = self._connect()
+            return self._exchange(self._client, buffer.getvalue(), keep=True)
+
+    def wait_for_service(self, timeout: float | None = None) -> None:
+        """Wait until the service is there. Raises ROSException after ``timeout`` seconds."""
+        wait_for_service(self.resolved_name, timeout)
+
+    def close(self) -> None:
+        """Close a persistent connection."""
+        client, self._client = self._client, None
+        if client:
+            client.close()
+
+    def _connect(self) -> ServiceClient:
+        try:
+            uri = process.master.lookup_service(self.resolved_name)
+        except RpcRefused as error:
+            raise ServiceException(f"service [{self.resolved_name}] unavailable") from error
+        except (MasterUnreachableError, RpcError) as error:
+            raise ServiceException(f"unable to contact master: {error}") from error
+        try:
+            return ServiceClient(
+                uri,
+                self.resolved_name,
+                self.md5sum,
+                process.name,
+                persistent=self.persistent,
+                headers=self._headers,
+            )
+        except HandshakeRefused as error:
+            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error
+        except (OSError, WireError) as error:
+            raise ServiceException(f"unable to connect to service: {error}") from error
+
+    def _exchange(self, client: ServiceClient, request: bytes, *, keep: bool) -> Any:
+        keeping = False
+        try:
+            with process.interrupting(client.hang_up):
+                body = client.call(request)
+            keeping = keep
+        except HandshakeRefused as error:
+            keeping = keep
+            raise ServiceException(
+                f"service [{self.resolved_name}] responded with an error: {str(error).encode()!r}"
+            ) from error
+        except (OSError, WireError) as error:
+            if process.is_shutdown():
+                raise ROSInterruptException("node shutdown interrupted service call") from error
+            raise ServiceException(f"transport error completing service call: {error}") from error
+        finally:
+            if not keeping:
+                client.close()
+                if self._client is client:
+                    self._client = None
+        response = self.response_class()
+        try:
+            response.deserialize(memoryview(body) if self._takes_memoryview else body)
+        except (DeserializationError, SerializationError) as error:
+            raise TransportException(f"unable to deserialize the response: {error}") from error
+        return response
+
+
+def wait_for_service(service: str, timeout: float | None = None) -> None:
+    """Wait until a service is registered and answers.
+
+    Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down.
+    """
+    name = process.resolve(service)
+    seconds = timeout.to_sec() if hasattr(timeout, "to_sec") else timeout
+    if seconds == 0:
+        raise ValueError("timeout must be non-zero")
+    end = None if seconds is None else time.monotonic() + seconds
+    told = False
+    while not process.is_shutdown():
+        why = _probe(name)
+        if why is None:
+            return
+        if end is not None and time.monotonic() >= end:
+            raise ROSException(f"timeout exceeded while waiting for service {name}")
+        if not told:
+            _log.info("wait_for_service(%s): %s, waiting...", name, why)
+            told = True
+        pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
+        wait_for_event(process.shutting_down, pause)
+    raise ROSInterruptException("rospy shutdown")
+
+
+def _probe(name: str) -> str | None:
+    """Why the service cannot be called yet; None where it can."""
+    try:
+        uri = process.master.lookup_service(name)
+    except RpcRefused:
+        return "not registered yet"
+    except (MasterUnreachableError, RpcError) as error:
+        return f"the master does not answer ({error})"
+    try:
+        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=5.0).close()
+    except (OSError, WireError):
+        return f"failed to contact [{uri}], will keep trying"
+    return None

@@ -1,0 +1,199 @@
+"""Time as a node sees it: Time, Duration, sleep, Rate and Timer, on wall or simulated time.
+
+Source: http://wiki.ros.org/rospy/Overview/Time.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from minirospy import times
+from minirospy.client.process import process
+from minirospy.clock import SimulatedClock
+from minirospy.errors import ROSInitException, ROSInterruptException, ROSTimeMovedBackwardsException
+
+__all__ = ["Duration", "Rate", "Time", "Timer", "TimerEvent", "get_rostime", "get_time", "sleep"]
+
+_NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
+
+
+class Duration(times.Duration):
+    """A span of time, ``secs`` and ``nsecs``; may be negative."""
+
+    __slots__: list[str] = []
+
+    def __repr__(self) -> str:
+        return f"rospy.Duration[{self.to_nsec()}]"
+
+
+class Time(times.Time):
+    """A point in time, ``secs`` and ``nsecs`` since the epoch."""
+
+    __slots__: list[str] = []
+
+    def __repr__(self) -> str:
+        return f"rospy.Time[{self.to_nsec()}]"
+
+    @staticmethod
+    def now() -> Time:
+        """The current time. Raises ROSInitException before init_node."""
+        return get_rostime()
+
+    @classmethod
+    def from_seconds(cls, float_secs: float) -> Time:
+        """The older name of ``from_sec``."""
+        return cls.from_sec(float_secs)
+
+
+def get_rostime() -> Time:
+    """The current time. Raises ROSInitException before init_node."""
+    if not process.initialized:
+        raise ROSInitException(_NOT_INITIALIZED)
+    seconds, nanoseconds = divmod(process.clock.now(), 1_000_000_000)
+    return Time(seconds, nanoseconds)
+
+
+def get_time() -> float:
+    """The current time in seconds. Raises ROSInitException before init_node."""
+    if not process.initialized:
+        raise ROSInitException(_NOT_INITIALIZED)
+    return process.clock.now() / 1e9
+
+
+def sleep(duration: float | times.Duration) -> None:
+    """Sleep for ``duration`` seconds; not at all where that is negative.
+
+    Raises ROSInterruptException where the node shuts down meanwhile, ROSTimeMovedBackwardsException where
+    simulated time jumps back.
+    """
+    nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
+    if nanoseconds > 0:
+        _sleep(nanoseconds)
+
+
+class Rate:
+    """Keeps a loop at ``hz`` turns a second: ``sleep()`` makes up for what the loop's own work took."""
+
+    def __init__(self, hz: float, reset: bool = False) -> None:
+        """``reset``: begin anew where simulated time jumps back, instead of raising."""
+        self.last_time = get_rostime()
+        self.sleep_dur = times.Duration(0, int(1e9 / hz))
+        self._period = self.sleep_dur.to_nsec()
+        self._last = process.clock.now()
+        self._reset = reset
+
+    def remaining(self) -> times.Duration:
+        """What is left of this turn."""
+        return times.Duration(0, self._remaining(process.clock.now()))
+
+    def sleep(self) -> None:
+        """Sleep until the turn is over. Raises as :func:`sleep` does."""
+        try:
+            _sleep(self._remaining(process.clock.now()))
+        except ROSTimeMovedBackwardsException:
+            if not self._reset:
+                raise
+            self._set_last(process.clock.now())
+            return
+        self._set_last(self._last + self._period)
+        # Far behind, as after a pause: do not rush through the turns that were missed.
+        now = process.clock.now()
+        if now - self._last > 2 * self._period:
+            self._set_last(now)
+
+    def _set_last(self, now: int) -> None:
+        self._last = now
+        self.last_time = Time(*divmod(now, 1_000_000_000))
+
+    def _remaining(self, now: int) -> int:
+        if self._last > now:
+            # Time jumped back.
+            self._set_last(now)
+        return self._period - (now - self._last)
+
+
+class TimerEvent:
+    """What a Timer's callback is told: expected and real times of this call and of the one before.
+
+    ``last_duration`` is in seconds; everything of a call before is None the first time.
+    """
+
+    def __init__(
+        self,
+        last_expected: Time | None,
+        last_real: Time | None,
+        current_expected: Time,
+        current_real: Time,
+        last_duration: float | None,
+    ) -> None:
+        self.last_expected = last_expected
+        self.last_real = last_real
+        self.current_expected = current_expected
+        self.current_real = current_real
+        self.last_duration = last_duration
+
+
+class Timer(threading.Thread):
+    """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``."""
+
+    def __init__(
+        self,
+        period: times.Duration,
+        callback: Callable[[TimerEvent], object],
+        oneshot: bool = False,
+        reset: bool = False,
+    ) -> None:
+        super().__init__(daemon=True)
+        self._period = period
+        self._callback = callback
+        self._oneshot = oneshot
+        self._reset = reset
+        self._stop_requested = threading.Event()
+        self.start()
+
+    def shutdown(self) -> None:
+        """Call back no more."""
+        self._stop_requested.set()
+
+    def run(self) -> None:
+        """The timer's thread."""
+        rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
+        expected = rate.last_time + self._period
+        last_expected: Time | None = None
+        last_real: Time | None = None
+        last_duration: float | None = None
+        while not process.is_shutdown() and not self._stop_requested.is_set():
+            try:
+                rate.sleep()
+            except ROSInterruptException:
+                return
+            if self._stop_requested.is_set():
+                return
+            real = get_rostime()
+            start = process.clock.now()
+            self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
+            if self._oneshot:
+                return
+            last_duration = (process.clock.now() - start) / 1e9
+            last_expected, last_real = expected, real
+            expected = expected + self._period
+
+
+def follow_clock_topic(clock: SimulatedClock) -> None:
+    """Set ``clock`` from /clock (rosgraph_msgs/Clock)."""
+    from minirospy.client.topics import Subscriber
+    from rosgraph_msgs.msg import Clock
+
+    def on_clock(message: Any) -> None:
+        clock.set(message.clock.to_nsec())
+
+    Subscriber("/clock", Clock, on_clock, queue_size=1)
+
+
+def _sleep(nanoseconds: int) -> None:
+    # A node that is down already sleeps as any program does: what runs then is its clean-up.
+    stop = threading.Event() if process.is_shutdown() else process.shutting_down
+    if nanoseconds > 0 and not process.clock.sleep(nanoseconds, stop):
+        raise ROSInterruptException("ROS shutdown request")

@@ -1,0 +1,91 @@
+"""Clocks: what time it is, and waiting until a time comes.
+
+A wall clock, and a simulated one that is told the time (http://wiki.ros.org/Clock). Times are
+nanoseconds since the epoch.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from typing import Protocol
+
+from minirospy.errors import ROSTimeMovedBackwardsException
+
+__all__ = ["Clock", "SimulatedClock", "WallClock", "wait_for_event"]
+
+_SLICE = 0.05 if sys.platform == "win32" else None
+"""On Windows Ctrl-C does not end a wait of the main thread: there a wait is cut into slices."""
+
+
+def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
+    """``event.wait(timeout)`` which a signal can interrupt on every OS."""
+    if _SLICE is None:
+        return event.wait(timeout)
+    end = None if timeout is None else time.monotonic() + timeout
+    while not event.is_set():
+        rest = _SLICE if end is None else min(_SLICE, end - time.monotonic())
+        if rest <= 0:
+            return False
+        event.wait(rest)
+    return True
+
+
+class Clock(Protocol):
+    """What the sleeping functions need to know of time."""
+
+    def now(self) -> int:
+        """The time in nanoseconds."""
+
+    def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
+        """Wait so long; False where ``stop`` was set meanwhile."""
+
+
+class WallClock:
+    """The time of the machine."""
+
+    def now(self) -> int:
+        """Nanoseconds since the epoch."""
+        return time.time_ns()
+
+    def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
+        """Wait so long; False where ``stop`` was set meanwhile."""
+        return not wait_for_event(stop, max(0.0, nanoseconds / 1e9))
+
+
+class SimulatedClock:
+    """A time that somebody sets: a simulator through /clock, or a test by hand."""
+
+    def __init__(self, now: int = 0) -> None:
+        self._now = now
+        self._changed = threading.Condition()
+
+    def now(self) -> int:
+        """What was set last; 0 until then."""
+        return self._now
+
+    def set(self, now: int) -> None:
+        """Tell the time; sleepers whose time has come wake up."""
+        with self._changed:
+            self._now = now
+            self._changed.notify_all()
+
+    def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
+        """Wait until the clock has moved on so far; False where ``stop`` was set meanwhile.
+
+        While the time is 0, nobody has told it yet: the sleep begins with the first time that is told.
+        Raises ROSTimeMovedBackwardsException.
+        """
+        with self._changed:
+            while self._now == 0 and not stop.is_set():
+                self._changed.wait(0.1)
+            before = self._now
+            end = before + nanoseconds
+            while self._now < end and not stop.is_set():
+                # A set stop does not notify: look again now and then.
+                self._changed.wait(0.1)
+                if self._now < before:
+                    raise ROSTimeMovedBackwardsException(self._now / 1e9)
+                before = self._now
+            return not stop.is_set()

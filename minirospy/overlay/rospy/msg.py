@@ -1,0 +1,5 @@
+"""rospy.msg, filled in by minirospy."""
+
+from minirospy.client.topics import AnyMsg
+
+__all__ = ["AnyMsg"]

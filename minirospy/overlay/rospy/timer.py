@@ -1,0 +1,5 @@
+"""rospy.timer, filled in by minirospy."""
+
+from minirospy.client.time import Rate, Timer, TimerEvent, sleep
+
+__all__ = ["Rate", "Timer", "TimerEvent", "sleep"]
