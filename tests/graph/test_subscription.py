@@ -1,0 +1,42 @@
+"""graph/subscription: whom to connect, and when again."""
+
+from __future__ import annotations
+
+from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
+
+
+def test_new_publishers_are_connected_and_lost_ones_left() -> None:
+    plan = SubscriptionPlan()
+    assert plan.publishers_changed(["http://a", "http://b"]) == [Connect("http://a"), Connect("http://b")]
+    assert plan.publishers_changed(["http://b", "http://c"]) == [Disconnect("http://a"), Connect("http://c")]
+    assert plan.publishers == ("http://b", "http://c")
+
+
+def test_the_same_list_again_changes_nothing() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a"])
+    assert plan.publishers_changed(["http://a", "http://a"]) == []
+
+
+def test_a_link_that_fails_is_tried_again_with_growing_pauses() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a"])
+    delays = [retry.delay for _ in range(9) if (retry := plan.lost("http://a"))]
+    assert delays == sorted(delays)
+    assert (delays[0], delays[1], delays[-1]) == (0.1, 0.2, 8.0)
+
+
+def test_a_link_that_was_up_starts_with_the_short_pause() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a"])
+    for _ in range(5):
+        plan.lost("http://a")
+    plan.connected("http://a")
+    assert plan.lost("http://a") == Connect("http://a", 0.1)
+
+
+def test_a_publisher_that_left_is_not_tried_again() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a"])
+    plan.publishers_changed([])
+    assert plan.lost("http://a") is None

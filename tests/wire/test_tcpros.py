@@ -1,0 +1,89 @@
+"""wire/tcpros: who accepts whom. The two sides' checks are joined in memory."""
+
+from __future__ import annotations
+
+import pytest
+
+from minirospy.errors import HandshakeRefused
+from minirospy.wire.tcpros import (
+    InterfaceType,
+    check_publisher,
+    check_service,
+    check_service_client,
+    check_subscriber,
+    publisher_header,
+    service_client_header,
+    service_header,
+    subscriber_header,
+)
+
+BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")
+STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+ANY_TYPE = InterfaceType("*", "*")
+
+
+@pytest.mark.parametrize(("mine", "theirs"), [(BOOL, BOOL), (BOOL, ANY_TYPE), (ANY_TYPE, BOOL)])
+def test_a_fitting_pair_accepts_each_other(mine: InterfaceType, theirs: InterfaceType) -> None:
+    asked = subscriber_header("/t", theirs, "/sub")
+    assert check_subscriber(asked, "/t", mine) is None
+    check_publisher(publisher_header("/t", mine, "/pub", latch=False), "/t", theirs)
+
+
+def test_types_that_differ_are_told_apart_by_name() -> None:
+    why = check_subscriber(subscriber_header("/t", STRING, "/sub"), "/t", BOOL)
+    assert why == "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]"
+
+
+def test_a_type_of_the_same_name_with_another_definition_is_refused() -> None:
+    old = InterfaceType("std_msgs/Bool", "0" * 32)
+    why = check_subscriber(subscriber_header("/t", old, "/sub"), "/t", BOOL)
+    assert why is not None
+    assert "md5sums do not match" in why
+
+
+def test_a_renamed_type_with_the_same_fields_is_accepted() -> None:
+    renamed = InterfaceType("my_msgs/Flag", BOOL.md5sum)
+    assert check_subscriber(subscriber_header("/t", renamed, "/sub"), "/t", BOOL) is None
+
+
+@pytest.mark.parametrize("missing", ["topic", "md5sum"])
+def test_a_subscriber_must_send(missing: str) -> None:
+    fields = subscriber_header("/t", BOOL, "/sub")
+    del fields[missing]
+    assert check_subscriber(fields, "/t", BOOL) == f"Missing required '{missing}' field in connection header"
+
+
+def test_a_subscriber_need_not_send_type_definition_nor_nodelay() -> None:
+    fields = {"topic": "/t", "md5sum": BOOL.md5sum, "callerid": "/sub"}
+    assert check_subscriber(fields, "/t", BOOL) is None
+
+
+def test_a_publisher_need_only_send_md5sum_and_type() -> None:
+    check_publisher({"md5sum": BOOL.md5sum, "type": BOOL.name}, "/t", BOOL)
+
+
+def test_a_publishers_error_is_raised_with_its_text() -> None:
+    with pytest.raises(HandshakeRefused, match="no such topic"):
+        check_publisher({"error": "no such topic"}, "/t", BOOL)
+
+
+def test_a_publisher_of_another_type_is_refused() -> None:
+    with pytest.raises(HandshakeRefused, match="topic types do not match"):
+        check_publisher(publisher_header("/t", STRING, "/pub", latch=True), "/t", BOOL)
+
+
+def test_the_users_fields_do_not_replace_the_protocols() -> None:
+    header = publisher_header("/t", BOOL, "/pub", latch=True, extra={"cookies": "yes", "topic": "/x"})
+    assert (header["cookies"], header["topic"], header["latching"]) == ("yes", "/t", "1")
+
+
+def test_services() -> None:
+    client = service_client_header("/s", STRING.md5sum, "/client", persistent=True)
+    assert client["persistent"] == "1"
+    why = check_service_client(client, BOOL)
+    assert why is not None
+    assert why.startswith("request from [/client]: md5sums do not match")
+    assert check_service_client(service_client_header("/s", "*", "/client", probe=True), BOOL) is None
+    check_service(service_header(BOOL, "/server", "a/BRequest", "a/BResponse"))
+    with pytest.raises(HandshakeRefused):
+        check_service({"error": "no"})
