@@ -22,7 +22,11 @@ demo: $(STAMP)
 	@$(BIN)/minirospy demo
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest --ignore=tests/interop
+
+interop: $(STAMP)
+	@sh tests/interop/install_ros.sh
+	@$(BIN)/python -m pytest tests/interop
 
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .

@@ -1,0 +1,128 @@
+"""Real ROS 1 beside ours: masters, peers and tools of both, on ports of their own.
+
+`make interop` installs Debian's ROS 1 and runs this folder; where it is not installed, all of it is skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+REAL_PYTHON = "/usr/bin/python3"
+REAL_BIN = Path("/usr/bin")
+OUR_BIN = Path(sys.executable).parent
+
+STACKS = ("ours", "rospy", "roscpp")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if not (REAL_BIN / "rosmaster").exists():
+        for item in items:
+            if HERE in item.path.parents:
+                item.add_marker(pytest.mark.skip(reason="real ROS 1 is not installed: make interop"))
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def environment(uri: str, stack: str) -> dict[str, str]:
+    """The process environment for one of STACKS: each finds its own programs and modules first."""
+    path = str(OUR_BIN) if stack == "ours" else str(REAL_BIN)
+    return {**os.environ, "ROS_MASTER_URI": uri, "PATH": path + os.pathsep + os.environ["PATH"]}
+
+
+def start(command: list[str], uri: str, stack: str, **kwargs: object) -> subprocess.Popen[str]:
+    """Start a program of ``stack``, its streams as text pipes."""
+    streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **kwargs}
+    return subprocess.Popen(command, env=environment(uri, stack), text=True, **streams)  # type: ignore[call-overload,no-any-return]
+
+
+def stop(program: subprocess.Popen[str]) -> None:
+    """End a program, however it takes it."""
+    for end in (program.terminate, program.kill):
+        if program.poll() is not None:
+            break
+        end()
+        try:
+            program.wait(5)
+        except subprocess.TimeoutExpired:
+            continue
+    for stream in (program.stdin, program.stdout, program.stderr):
+        if stream:
+            stream.close()
+
+
+def answers(uri: str) -> bool:
+    """Whether a master answers at ``uri``."""
+    host, port = uri.removeprefix("http://").rstrip("/").rsplit(":", 1)
+    try:
+        socket.create_connection((host, int(port)), 0.5).close()
+    except OSError:
+        return False
+    return True
+
+
+@pytest.fixture(params=["our master", "real master"])
+def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
+    """The URI of a fresh master, ours and the real one in turn."""
+    port = free_port()
+    uri = f"http://localhost:{port}"
+    if request.param == "our master":
+        program = start([str(OUR_BIN / "roscore"), "-p", str(port)], uri, "ours")
+    else:
+        program = start([str(REAL_BIN / "rosmaster"), "--core", "-p", str(port)], uri, "rospy")
+    try:
+        end = time.monotonic() + 15
+        while not answers(uri):
+            assert program.poll() is None, f"the master ended: {program.communicate()}"
+            assert time.monotonic() < end, "the master does not answer"
+            time.sleep(0.05)
+        yield uri
+    finally:
+        stop(program)
+
+
+@pytest.fixture(scope="session")
+def cpp_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """peer.cpp, compiled."""
+    compiler = shutil.which("g++")
+    assert compiler
+    program = tmp_path_factory.mktemp("cpp") / "peer"
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True
+    ).stdout.split()
+    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / "peer.cpp"), *flags], check=True)
+    return program
+
+
+@pytest.fixture
+def peer(request: pytest.FixtureRequest) -> Iterator[Callable[[str, str, str], subprocess.Popen[str]]]:
+    """Start a peer: ``peer(stack, role, uri)``."""
+
+    with ExitStack() as running:
+
+        def run(stack: str, role: str, uri: str) -> subprocess.Popen[str]:
+            command = {
+                "ours": [sys.executable, str(HERE / "peer.py")],
+                "rospy": [REAL_PYTHON, str(HERE / "peer.py")],
+                "roscpp": [str(request.getfixturevalue("cpp_peer"))] if stack == "roscpp" else [],
+            }[stack]
+            program = start([*command, role], uri, stack)
+            running.callback(stop, program)
+            return program
+
+        yield run

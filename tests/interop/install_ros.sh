@@ -1,0 +1,26 @@
+#!/bin/sh
+# Real ROS 1 from Debian, the referee of the interop tests: rospy, roscpp, the commands, and what builds a C++ peer.
+# Everything goes to /usr; nothing of it is used by minirospy itself. Does nothing where it is installed already.
+set -eu
+packages="ros-core rosbash python3-rospy python3-rosmaster python3-std-srvs python3-sensor-msgs python3-nav-msgs
+python3-diagnostic-msgs python3-tf2-msgs python3-actionlib python3-numpy
+ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-actionlib-msgs ros-geometry-msgs ros-sensor-msgs ros-diagnostic-msgs
+ros-nav-msgs ros-roscpp-msg
+g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev"
+missing=""
+for package in $packages; do
+  dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || missing="$missing $package"
+done
+if [ -z "$missing" ]; then
+  exit 0
+fi
+if ! command -v apt-get >/dev/null 2>&1; then
+  echo "install_ros.sh: Debian's ROS 1 needs apt-get (Debian or Ubuntu)" >&2
+  exit 1
+fi
+as_root=""
+[ "$(id -u)" = 0 ] || as_root="sudo"
+echo "Installing Debian's ROS 1 ..."
+$as_root env DEBIAN_FRONTEND=noninteractive apt-get update -qq
+# shellcheck disable=SC2086
+$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null

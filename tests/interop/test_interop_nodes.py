@@ -1,0 +1,52 @@
+"""Nodes of ours, of rospy and of roscpp talk to each other, over our master and over the real one."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+
+import pytest
+
+Peer = Callable[[str, str, str], "subprocess.Popen[str]"]
+
+PAIRS = [("ours", "rospy"), ("rospy", "ours"), ("ours", "roscpp"), ("roscpp", "ours"), ("ours", "ours")]
+
+
+def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
+    """What a peer prints before its line "ready"."""
+    assert program.stdout
+    lines = []
+    for line in program.stdout:
+        if line.strip() == "ready":
+            return lines
+        lines.append(line.strip())
+    assert program.stderr
+    raise AssertionError(f"the peer ended before it was ready: {program.stderr.read()}")
+
+
+@pytest.mark.parametrize(("talker", "listener"), PAIRS)
+def test_messages_arrive_byte_by_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
+    """Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
+    said = lines_until_ready(peer(talker, "talk", any_master))
+    output, errors = peer(listener, "listen", any_master).communicate(timeout=40)
+    heard = [line for line in output.splitlines() if line.split()[0] in {"bool", "string", "scan", "image"}]
+    assert len(said) == 4
+    assert sorted(heard) == sorted(said), errors
+
+
+@pytest.mark.parametrize(("talker", "listener"), PAIRS)
+def test_messages_arrive_where_the_subscriber_was_first(any_master: str, peer: Peer, talker: str, listener: str) -> None:
+    hearing = peer(listener, "listen", any_master)
+    said = lines_until_ready(peer(talker, "talk", any_master))
+    output, errors = hearing.communicate(timeout=40)
+    heard = [line for line in output.splitlines() if line.split()[0] in {"bool", "string", "scan", "image"}]
+    assert sorted(heard) == sorted(said), errors
+
+
+@pytest.mark.parametrize(("server", "client"), PAIRS)
+def test_services_answer(any_master: str, peer: Peer, server: str, client: str) -> None:
+    """Each client calls with a connection a call, and with a persistent one."""
+    lines_until_ready(peer(server, "serve", any_master))
+    output, errors = peer(client, "call", any_master).communicate(timeout=40)
+    answers = [line for line in output.splitlines() if "flag:" in line]
+    assert answers == ["True flag: True", "False flag: False"] * 2, errors
