@@ -18,6 +18,7 @@
     |   +-- DefinitionError             a .msg, .srv or .action text that does not parse (file, line)
     |   +-- LaunchError                 a launch file that does not load (file, line)
     |   +-- BoardError                  the virtual board cannot be reached
+    |   +-- ValueTextError              a typed value that is not YAML, or does not fit where it goes
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
     |   +-- ROSSerializationException
@@ -66,6 +67,7 @@ __all__ = [
     "TransportInitError",
     "TransportTerminated",
     "UsageError",
+    "ValueTextError",
     "WireError",
 ]
 
@@ -209,6 +211,19 @@ class LaunchError(MinirospyError):
 
 class BoardError(MinirospyError):
     """The virtual board cannot be reached, or refused what was asked."""
+
+
+class ValueTextError(MinirospyError):
+    """A value as a person typed it (``text``, or the name of the file or parameter) cannot be used; ``why``."""
+
+    def __init__(self, text: str, why: str) -> None:
+        super().__init__(text, why)
+        self.text = text
+        self.why = why
+
+    def __str__(self) -> str:
+        shown = " ".join(self.text.split())
+        return f"[{shown if len(shown) <= 60 else shown[:57] + '...'}]: {self.why}"
 
 
 class ROSException(Exception):

@@ -1,0 +1,130 @@
+"""rosservice: which services there are, of which type; calling them.
+
+Source: http://wiki.ros.org/rosservice. What is printed is what ROS prints.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from minirospy.cli.command import Parser
+from minirospy.cli.verbs import Family, Verb
+from minirospy.errors import UsageError
+from minirospy.introspect import services
+from minirospy.introspect.graph import Graph
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status."""
+    return _FAMILY.main(argv)
+
+
+def _args(argv: Sequence[str]) -> None:
+    graph, service = _one_service("args", "Print the names of the fields of a service's request.", argv)
+    print(" ".join(services.service_arguments(services.service_type(graph, service))))
+
+
+def _info(argv: Sequence[str]) -> None:
+    graph, service = _one_service("info", "Print a service's node, URI, type and arguments.", argv)
+    detail = services.service_detail(graph, service)
+    print(f"Node: {detail.node}\nURI: {detail.uri}\nType: {detail.type}\nArgs: {' '.join(detail.arguments)}")
+
+
+def _type(argv: Sequence[str]) -> None:
+    graph, service = _one_service("type", "Print a service's type.", argv)
+    print(services.service_type(graph, service))
+
+
+def _uri(argv: Sequence[str]) -> None:
+    graph, service = _one_service("uri", "Print where a service is called.", argv)
+    print(services.service_uri(graph, service))
+
+
+def _find(argv: Sequence[str]) -> None:
+    parser = Parser("rosservice find", description="Print the services of a type.")
+    parser.add_argument("type", help="a service type, as std_srvs/SetBool")
+    options = parser.parse_args(argv)
+    print("\n".join(services.find_services_of_type(Graph.open("rosservice"), options.type)))
+
+
+def _list(argv: Sequence[str]) -> None:
+    parser = Parser("rosservice list", description="List the services, or those in a namespace.")
+    parser.add_argument("namespace", nargs="?", help="only services at or below this name")
+    parser.add_argument("-n", "--nodes", action="store_true", help="print the nodes that provide them, too")
+    options = parser.parse_args(argv)
+    graph = Graph.open("rosservice")
+    for service in services.list_services(
+        graph, graph.resolve(options.namespace) if options.namespace else "/"
+    ):
+        print(f"{service.name} {','.join(service.nodes)}" if options.nodes else service.name)
+
+
+def _call(argv: Sequence[str]) -> None:
+    parser = Parser(
+        "rosservice call",
+        description="Call a service and print its response.",
+        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order.',
+    )
+    parser.add_argument("service", help="the service's name")
+    parser.add_argument("args", nargs="*", help="the request's values")
+    parser.add_argument("-v", dest="verbose", action="store_true", help="print the request, too")
+    parser.add_argument("--wait", action="store_true", help="wait until the service is there")
+    options = parser.parse_intermixed_args(argv)
+    graph = Graph.open("rosservice")
+    service = graph.resolve(options.service)
+    if options.wait:
+        services.wait_for_service(graph, service)
+    type_ = services.service_type(graph, service)
+    for values in _requests(type_, options.args):
+        request = services.fill_request(type_, values)
+        if options.verbose:
+            print(f"{request}\n---", flush=True)
+        print(services.call_service(graph, service, type_, request), flush=True)
+
+
+def _requests(type_: str, texts: Sequence[str]) -> Iterator[list[Any]]:
+    """The values of each request: one from the command line, or one for each document on standard input."""
+    from minirospy.introspect.values import parse_documents, parse_value
+
+    names = services.service_arguments(type_)
+    if texts:
+        yield [parse_value(text) for text in texts]
+    elif not names:
+        yield []
+    elif sys.stdin.isatty():
+        raise UsageError(f"please specify service arguments: {' '.join(names)}")
+    else:
+        documents = [each for each in parse_documents(sys.stdin.read(), "standard input") if each is not None]
+        if not documents:
+            raise UsageError(f"please specify service arguments: {' '.join(names)}")
+        for document in documents:
+            yield document if isinstance(document, list) else [document]
+
+
+def _one_service(verb: str, description: str, argv: Sequence[str]) -> tuple[Graph, str]:
+    """The graph and the global name of the one service that a verb is about."""
+    parser = Parser(f"rosservice {verb}", description=description)
+    parser.add_argument("service", help="the service's name")
+    options = parser.parse_args(argv)
+    graph = Graph.open("rosservice")
+    return graph, graph.resolve(options.service)
+
+
+_FAMILY = Family(
+    "rosservice",
+    "",
+    (
+        Verb("args", "print service arguments", _args),
+        Verb("call", "call the service with the provided args", _call),
+        Verb("find", "find services by service type", _find),
+        Verb("info", "print information about service", _info),
+        Verb("list", "list active services", _list),
+        Verb("type", "print service type", _type),
+        Verb("uri", "print service ROSRPC uri", _uri),
+    ),
+    "Type rosservice <command> -h for more detailed usage, e.g. 'rosservice call -h'",
+)

@@ -1,0 +1,54 @@
+"""A command with verbs (`rostopic list`): a table of them, its help, and the way to the one typed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from minirospy.cli.command import run
+from minirospy.errors import UsageError
+
+__all__ = ["Family", "Verb"]
+
+
+class Verb(NamedTuple):
+    """One verb: its name, one line of help, and the function that takes the rest of the command line."""
+
+    name: str
+    summary: str
+    body: Callable[[Sequence[str]], int | None]
+
+
+class Family(NamedTuple):
+    """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is."""
+
+    name: str
+    headline: str
+    verbs: tuple[Verb, ...]
+    footer: str = ""
+
+    def main(self, argv: Sequence[str] | None = None) -> int:
+        """Run the verb that was typed; the exit status as :func:`minirospy.cli.command.run` gives it."""
+        words = list(sys.argv[1:] if argv is None else argv)
+        return run(self.name, lambda: self._dispatch(words))
+
+    def help(self) -> str:
+        """What `-h` prints."""
+        lines = [self.headline, ""] if self.headline else []
+        lines.append("Commands:")
+        lines += [f"\t{self.name} {verb.name}\t{verb.summary}" for verb in self.verbs]
+        return "\n".join([*lines, "", *([self.footer, ""] if self.footer else [])])
+
+    def _dispatch(self, words: list[str]) -> int | None:
+        if not words or words[0] in ("-h", "--help"):
+            print(self.help())
+            return 0 if words else 2
+        for verb in self.verbs:
+            if verb.name == words[0]:
+                return verb.body(words[1:])
+        import difflib
+
+        near = difflib.get_close_matches(words[0], [verb.name for verb in self.verbs], n=2)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise UsageError(f"there is no `{self.name} {words[0]}`{hint} (`{self.name} -h` shows what there is)")

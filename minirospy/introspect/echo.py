@@ -1,0 +1,146 @@
+"""What `rostopic echo` prints of a message, and the message that `rostopic pub` sends. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import UsageError
+from minirospy.introspect.fields import field_type, field_value, parse_path
+from minirospy.introspect.messages import MessageClasses, fill, serialize
+from minirospy.introspect.plot import plot_header, plot_row
+from minirospy.times import Time
+
+if TYPE_CHECKING:
+    from minirospy.introspect.streams import Received
+    from minirospy.introspect.topics import TopicField
+
+__all__ = ["Echo", "Filter", "fill_message"]
+
+
+class Filter:
+    """A Python expression over a message ``m`` and the name of its ``topic``, as the user typed it."""
+
+    def __init__(self, expression: str) -> None:
+        """Raises UsageError where it is not an expression."""
+        self._expression = expression
+        try:
+            self._code = compile(expression, "--filter", "eval")
+        except (SyntaxError, ValueError) as error:
+            raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
+
+    def __call__(self, message: Any, topic: str) -> bool:
+        """Whether the expression is true. Raises UsageError where it cannot be evaluated."""
+        try:
+            # The user's own code on the user's own machine, as in ROS: no input of others gets here.
+            return bool(eval(self._code, {"m": message, "topic": topic}))
+        except Exception as error:  # whatever the user's expression raises is the user's to read
+            raise UsageError(f"filter [{self._expression}]: {type(error).__name__}: {error}") from error
+
+
+class Echo:
+    """Turns the messages of a topic, or a field of them, into what is printed, each ending with a line feed.
+
+    ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
+    such fields are shown. ``width``: of numbers. ``offset``: times as differences from now.
+    """
+
+    def __init__(
+        self,
+        field: TopicField,
+        *,
+        plot: bool = False,
+        strings: bool = True,
+        arrays: bool = True,
+        width: int | None = None,
+        offset: bool = False,
+    ) -> None:
+        self._path = field.path
+        self._steps = parse_path(field.path)
+        self._plot = plot
+        self._strings = strings
+        self._arrays = arrays
+        self._width = width
+        self._offset = offset
+        self._classes = MessageClasses()
+        self._checked: type[Any] | None = None
+        self._header_written = False
+
+    def message(self, received: Received) -> Any:
+        """The message in what was received. Raises NotFoundError where it has no such field."""
+        message = self._classes.read(received)
+        if type(message) is not self._checked:
+            self._checked = type(message)
+            if type(message).__module__ != "minirospy.idl.load":
+                field_type(type(message), self._path)
+        return message
+
+    def text(self, message: Any, received: Received) -> str:
+        """What is printed of a message. Raises IndexError where the field's array is too short."""
+        value = field_value(message, self._steps)
+        return self._row(value, received) if self._plot else self._block(value)
+
+    def _row(self, value: Any, received: Received) -> str:
+        stamped = getattr(value, "_has_header", False)
+        nanoseconds = value.header.stamp.to_nsec() if stamped else int(received.time * 1e9)
+        header = ""
+        if not self._header_written:
+            self._header_written = True
+            header = plot_header(value, strings=self._strings, arrays=self._arrays) + "\n"
+        return header + plot_row(value, nanoseconds, strings=self._strings, arrays=self._arrays) + "\n"
+
+    def _block(self, value: Any) -> str:
+        from minirospy.idl.message import strify_message
+
+        if isinstance(value, bytes):
+            value = list(value)
+        if not (self._strings and self._arrays):
+            value = _elided(value, "", self._strings, self._arrays)
+        now = Time.from_sec(_now()) if self._offset else None
+        return strify_message(value, time_offset=now, fixed_numeric_width=self._width) + "\n---\n"
+
+
+def fill_message(cls: type[Any], values: Sequence[Any]) -> Any:
+    """A message of YAML values; ``now`` is the time, ``auto`` a stamped header.
+
+    Raises MessageException where they do not fit, with the names of the fields that there are.
+    """
+    now = Time.from_sec(_now())
+    from minirospy.errors import MessageException
+    from minirospy.idl.load import get_message_class
+
+    keys: dict[str, Any] = {"now": now}
+    header = get_message_class("std_msgs/Header")
+    if header is not None:
+        keys["auto"] = header(stamp=now)
+    try:
+        message = fill(cls(), values, keys)
+        serialize(message)
+    except MessageException as error:
+        text = " ".join(str(error).split())
+        raise MessageException(f"{text}; [{cls._type}] has {' '.join(cls.__slots__)}") from error
+    return message
+
+
+def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
+    """``value`` with a note in the place of strings or arrays; inner messages are changed in place."""
+    if type_.endswith("]") or isinstance(value, list | tuple):
+        element = type_.partition("[")[0]
+        if not arrays or (element == "string" and not strings):
+            return f"<array type: {element}, length: {len(value)}>"
+        if value and hasattr(value[0], "_slot_types"):
+            return [_elided(each, element, strings, arrays) for each in value]
+        return value
+    if isinstance(value, str):
+        return value if strings else f"<string length: {len(value)}>"
+    for name, slot_type in zip(
+        getattr(value, "__slots__", ()), getattr(value, "_slot_types", ()), strict=False
+    ):
+        setattr(value, name, _elided(getattr(value, name), slot_type, strings, arrays))
+    return value
+
+
+def _now() -> float:
+    import time
+
+    return time.time()

@@ -1,0 +1,100 @@
+"""A path to a field inside a message: ``pose/position/x``, ``points[0]/x``, ``ranges[1:3]``, ``points[:]/x``.
+
+Pure: a path's text comes in, steps go out; a message and steps come in, a value goes out.
+Source: http://wiki.ros.org/rostopic#rostopic_echo.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, NamedTuple
+
+from minirospy.errors import NotFoundError, UsageError
+
+__all__ = ["Step", "field_type", "field_value", "parse_path"]
+
+_STEP = re.compile(r"^(\w+)(?:\[(-?\d*)(:?)(-?\d*)\])?$")
+
+
+class Step(NamedTuple):
+    """One part of a path: a field, and where it is an array, an index or a slice into it."""
+
+    name: str
+    element: int | slice | None
+
+
+def parse_path(path: str) -> tuple[Step, ...]:
+    """The steps of a path; the empty path is the message itself. Raises UsageError."""
+    return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
+
+
+def field_value(message: Any, steps: tuple[Step, ...]) -> Any:
+    """The value at a path; a slice of messages followed by a field gives a list of that field's values.
+
+    Raises NotFoundError where a field is not there, IndexError where an array is too short.
+    """
+    value: Any = message
+    for at, (name, index) in enumerate(steps):
+        value = _attribute(value, name)
+        if index is None:
+            continue
+        if not isinstance(value, list | tuple | bytes):
+            raise NotFoundError("array", name, hint=f"the field is a single {_type_of(value)}")
+        try:
+            value = value[index]
+        except IndexError:
+            raise IndexError(f"{name}[{index}]: the array has {len(value)} elements") from None
+        rest = steps[at + 1 :]
+        if isinstance(index, slice) and rest:
+            return [field_value(element, rest) for element in value]
+    return value
+
+
+def field_type(message_class: type[Any], path: str) -> str:
+    """The ROS type of the field at a path of a message class.
+
+    Raises NotFoundError where there is no such field or the class of an inner message is not installed.
+    """
+    from minirospy.idl.load import message_class as load_class
+
+    type_: str = message_class._type
+    for at, (name, index) in enumerate(parse_path(path)):
+        if at:
+            message_class = load_class(type_.partition("[")[0])
+        if name not in message_class.__slots__:
+            raise _no_field(message_class, name)
+        type_ = message_class._slot_types[list(message_class.__slots__).index(name)]
+        if isinstance(index, int):
+            type_ = type_.partition("[")[0]
+    return type_
+
+
+def _parse_step(part: str, path: str) -> Step:
+    match = _STEP.match(part)
+    if not match:
+        raise UsageError(f"field path [{path}]: [{part}] is none of field, field[0], field[1:3]")
+    name, first, colon, last = match.groups()
+    if first is None:
+        return Step(name, None)
+    if colon:
+        return Step(name, slice(int(first) if first else None, int(last) if last else None))
+    if not first or last:
+        raise UsageError(f"field path [{path}]: [{part}] has no index")
+    return Step(name, int(first))
+
+
+def _attribute(value: Any, name: str) -> Any:
+    try:
+        return getattr(value, name)
+    except AttributeError:
+        raise _no_field(type(value), name) from None
+
+
+def _no_field(message_class: type[Any], name: str) -> NotFoundError:
+    fields = list(getattr(message_class, "__slots__", ()))
+    hint = f"[{_type_of(message_class)}] has {' '.join(fields) or 'no fields'}"
+    return NotFoundError("field", name, fields, hint)
+
+
+def _type_of(value: Any) -> str:
+    return str(getattr(value, "_type", None) or type(value).__name__)

@@ -1,0 +1,83 @@
+"""Messages of a graph's types: classes by name or by what a publisher sent, filling from YAML, bytes.
+
+Classes of types that are not installed are made from the definition in the publisher's connection header.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import MessageException, NotFoundError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from minirospy.introspect.streams import Received
+
+__all__ = ["MessageClasses", "check", "fill", "serialize"]
+
+
+class MessageClasses:
+    """Message classes for what publishers send; each is looked up or made once."""
+
+    def __init__(self) -> None:
+        self._classes: dict[tuple[str, str], type[Any]] = {}
+
+    def for_header(self, header: Mapping[str, str]) -> type[Any]:
+        """The class for a publisher's connection header: the installed one where the md5sums agree.
+
+        Raises NotFoundError where it is not installed and the publisher sent no definition, DefinitionError
+        where the definition does not parse.
+        """
+        key = (header.get("type", "*"), header.get("md5sum", "*"))
+        if key not in self._classes:
+            self._classes[key] = self._find(*key, header.get("message_definition", ""))
+        return self._classes[key]
+
+    def read(self, received: Received) -> Any:
+        """The message in what was received. Raises DeserializationError, and as :meth:`for_header`."""
+        message = self.for_header(received.header)()
+        message.deserialize(received.body)
+        message._connection_header = received.header
+        return message
+
+    @staticmethod
+    def _find(type_: str, md5sum: str, definition: str) -> type[Any]:
+        from minirospy.idl.load import class_from_text, get_message_class
+
+        installed = get_message_class(type_)
+        if installed is not None and md5sum in ("*", installed._md5sum):
+            return installed
+        if definition or installed is not None:
+            return class_from_text(type_, definition)
+        raise NotFoundError(
+            "message type", type_, hint="it is not installed, and its publisher sent no definition"
+        )
+
+
+def fill(message: Any, values: Sequence[Any], keys: Mapping[str, Any] | None = None) -> Any:
+    """``message`` with YAML values in its fields: one dictionary, or a value for each field in order.
+
+    ``keys`` are words that stand for a value, as ``now`` for a time. Raises MessageException.
+    """
+    from minirospy.idl.message import fill_message_args
+
+    # No value at all is a message of default values.
+    fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
+    return message
+
+
+def check(message: Any) -> None:
+    """Raise MessageException with the field's name where a value does not fit the definition."""
+    serialize(message)
+
+
+def serialize(message: Any) -> bytes:
+    """The bytes of a message. Raises MessageException where a value does not fit its field."""
+    buffer = BytesIO()
+    try:
+        message.serialize(buffer)
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise MessageException(f"a value does not fit [{message._type}]: {error}") from error
+    return buffer.getvalue()

@@ -1,0 +1,167 @@
+"""Nodes: which there are, what they publish, serve and are connected to; pinging and stopping them.
+
+Source: http://wiki.ros.org/rosnode, http://wiki.ros.org/ROS/Slave_API.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.errors import NodeUnreachableError, NotFoundError, RpcError, RpcRefused
+from minirospy.introspect.graph import Graph, NodeAddress, in_namespace
+from minirospy.introspect.topics import UNKNOWN_TYPE
+from minirospy.runtime.master_proxy import SlaveProxy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from minirospy.runtime.master_proxy import BusConnection
+
+__all__ = [
+    "Connections",
+    "NodeDetail",
+    "TypedName",
+    "find_node",
+    "forget_node",
+    "kill_node",
+    "list_nodes",
+    "node_connections",
+    "node_detail",
+    "ping_node",
+    "unreachable_nodes",
+]
+
+
+class TypedName(NamedTuple):
+    """A topic and its type."""
+
+    name: str
+    type: str
+
+
+class NodeDetail(NamedTuple):
+    """What the master knows of a node."""
+
+    name: str
+    uri: str | None
+    publications: list[TypedName]
+    subscriptions: list[TypedName]
+    services: list[str]
+
+
+class Connections(NamedTuple):
+    """What a node says of itself."""
+
+    pid: int
+    links: list[BusConnection]
+
+
+def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
+    """The sorted names of the nodes at or below ``namespace``."""
+    state = graph.state()
+    found: set[str] = set()
+    for table in (state.publishers, state.subscribers, state.services):
+        for nodes in table.values():
+            found.update(nodes)
+    return sorted(node for node in found if in_namespace(node, namespace))
+
+
+def find_node(graph: Graph, name: str) -> NodeAddress:
+    """A node (global name) and its URI. Raises NotFoundError with the nearest names."""
+    uri = graph.node_uri(name)
+    if uri is None:
+        raise NotFoundError("node", name, list_nodes(graph))
+    return NodeAddress(name, uri)
+
+
+def node_detail(graph: Graph, name: str) -> NodeDetail:
+    """What the master knows of a node (global name). Raises NotFoundError."""
+    state = graph.state()
+    # Types as publishers told them: of a topic that nobody publishes, rosnode says "unknown type".
+    types = dict(graph.master.get_published_topics())
+
+    def topics(table: Mapping[str, list[str]]) -> list[TypedName]:
+        mine = sorted(topic for topic, nodes in table.items() if name in nodes)
+        return [TypedName(topic, types.get(topic, UNKNOWN_TYPE)) for topic in mine]
+
+    services = sorted(service for service, nodes in state.services.items() if name in nodes)
+    publications, subscriptions = topics(state.publishers), topics(state.subscribers)
+    uri = graph.node_uri(name)
+    if uri is None and not (publications or subscriptions or services):
+        raise NotFoundError("node", name, list_nodes(graph))
+    return NodeDetail(name, uri, publications, subscriptions, services)
+
+
+def node_connections(graph: Graph, node: NodeAddress) -> Connections:
+    """The process id and the connections of a node, from itself. Raises NodeUnreachableError."""
+    with _named(node), contextlib.closing(_slave(graph, node, timeout=5.0)) as slave:
+        return Connections(slave.get_pid(), slave.get_bus_info())
+
+
+def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
+    """The seconds that a call to a node takes. Raises NodeUnreachableError."""
+    with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
+        start = time.perf_counter()
+        slave.get_pid()
+        return time.perf_counter() - start
+
+
+def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
+    """Ask a node to shut down. A node that is gone already is as good as stopped."""
+    with contextlib.suppress(RpcError), contextlib.closing(_slave(graph, node, timeout=3.0)) as slave:
+        slave.shutdown(reason)
+
+
+def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
+    """The registered nodes that do not answer."""
+    nodes = graph.addresses(list_nodes(graph))
+    return [node for node in nodes if node.uri is not None and not _answers(graph, node, timeout)]
+
+
+def forget_node(graph: Graph, node: NodeAddress) -> None:
+    """Take everything that a node registered out of the master."""
+    from minirospy.runtime.master_proxy import MasterProxy
+
+    state = graph.state()
+    uri = node.uri or ""
+    # In the node's own name: the master removes only what the caller registered.
+    master = MasterProxy(graph.master.uri, node.name)
+    try:
+        for topic in _held_by(state.publishers, node.name):
+            master.unregister_publisher(topic, uri)
+        for topic in _held_by(state.subscribers, node.name):
+            master.unregister_subscriber(topic, uri)
+        for service in _held_by(state.services, node.name):
+            with contextlib.suppress(RpcRefused):
+                master.unregister_service(service, master.lookup_service(service))
+    finally:
+        master.close()
+
+
+def _answers(graph: Graph, node: NodeAddress, timeout: float) -> bool:
+    try:
+        ping_node(graph, node, timeout)
+    except NodeUnreachableError:
+        return False
+    return True
+
+
+def _held_by(table: Mapping[str, Iterable[str]], node: str) -> list[str]:
+    return [name for name, nodes in table.items() if node in nodes]
+
+
+def _slave(graph: Graph, node: NodeAddress, timeout: float) -> SlaveProxy:
+    if node.uri is None:
+        raise NodeUnreachableError(node.name, "?", "the master does not know its address")
+    return SlaveProxy(node.uri, "/" + graph.tool, timeout)
+
+
+@contextlib.contextmanager
+def _named(node: NodeAddress) -> Iterator[None]:
+    """Faults of a call to ``node``, named after it."""
+    try:
+        yield
+    except RpcError as error:
+        raise NodeUnreachableError(node.name, node.uri or "?", str(error)) from error

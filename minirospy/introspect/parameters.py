@@ -1,0 +1,118 @@
+"""The parameter server's values: read, set, delete, load from YAML and dump to it.
+
+Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/ROS/Parameter%20Server%20API.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from minirospy.errors import NotFoundError, RpcRefused, ValueTextError
+from minirospy.introspect.graph import Graph
+from minirospy.introspect.values import check_parameter, format_value, parse_documents
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+__all__ = [
+    "ParameterFile",
+    "delete_parameter",
+    "dump_parameters",
+    "flatten",
+    "get_parameter",
+    "list_parameters",
+    "parse_parameters",
+    "set_parameter",
+]
+
+_NAMESPACE_KEY = "_ns"
+
+
+class ParameterFile(NamedTuple):
+    """One document of a parameter file: its values, and the namespace that they go into.
+
+    ``own_namespace``: the document itself said so, by the key ``_ns``.
+    """
+
+    namespace: str
+    values: Any
+    own_namespace: bool
+
+
+def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
+    """The sorted names of the parameters below ``namespace``."""
+    prefix = namespace.rstrip("/") + "/"
+    return sorted(name for name in graph.master.get_param_names() if name.startswith(prefix))
+
+
+def get_parameter(graph: Graph, name: str) -> Any:
+    """The value of a parameter (global name); a namespace is a dictionary. Raises NotFoundError."""
+    try:
+        return graph.master.get_param(name)
+    except RpcRefused:
+        raise _not_set(graph, name) from None
+
+
+def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
+    """Set a parameter; a dictionary sets each of its own and leaves those beside them, as rosparam does.
+
+    The single parameters that were set come back. Raises ValueTextError on what none can hold.
+    """
+    if name == "/" and not isinstance(value, dict):
+        raise ValueTextError(name, "the root holds parameters, it is none: give a dictionary or a name")
+    check_parameter(value, name)
+    singles = list(flatten(name, value))
+    for single, single_value in singles:
+        graph.master.set_param(single, single_value)
+    return singles
+
+
+def delete_parameter(graph: Graph, name: str) -> None:
+    """Delete a parameter or namespace. Raises NotFoundError."""
+    try:
+        graph.master.delete_param(name)
+    except RpcRefused:
+        raise _not_set(graph, name) from None
+
+
+def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
+    """The documents of a parameter file named ``where``, to be set below ``namespace`` (global).
+
+    Raises ValueTextError where it is not YAML, or values stand at the root without a name.
+    """
+    files = []
+    for document in parse_documents(text, where):
+        if document is None:
+            continue
+        target, own = namespace, False
+        if isinstance(document, dict) and _NAMESPACE_KEY in document:
+            own_namespace = str(document.pop(_NAMESPACE_KEY))
+            target, own = _join(namespace, own_namespace), True
+        if target == "/" and not isinstance(document, dict):
+            raise ValueTextError(where, "the values have no names: give a namespace to load them into")
+        check_parameter(document, target)
+        files.append(ParameterFile(target, document, own))
+    return files
+
+
+def dump_parameters(values: Any) -> str:
+    """Values as the text of a parameter file."""
+    text = format_value(values)
+    return text if text.endswith("\n") else text + "\n"
+
+
+def flatten(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Each single parameter at or below ``name``, in the order that the values have."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from flatten(_join(name, str(key)), inner)
+    else:
+        yield name, value
+
+
+def _join(namespace: str, name: str) -> str:
+    return name if name.startswith("/") else namespace.rstrip("/") + "/" + name
+
+
+def _not_set(graph: Graph, name: str) -> NotFoundError:
+    return NotFoundError("parameter", name, graph.master.get_param_names())

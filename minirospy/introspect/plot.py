@@ -1,0 +1,47 @@
+"""Messages as rows of comma-separated values, as `rostopic echo -p` prints them for plotting tools.
+
+Pure. Arrays become columns with their index at the end; bytes are left out, since no plot wants them.
+Source: http://wiki.ros.org/rostopic#rostopic_echo (-p).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+__all__ = ["plot_header", "plot_row"]
+
+
+class _Cell(NamedTuple):
+    name: str
+    text: str
+
+
+def plot_header(value: Any, *, strings: bool = True, arrays: bool = True) -> str:
+    """The line of column names for messages like ``value``."""
+    return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays))
+
+
+def plot_row(value: Any, nanoseconds: int, *, strings: bool = True, arrays: bool = True) -> str:
+    """The line of values, with the message's time in front."""
+    return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays))
+
+
+def _cells(name: str, value: Any, strings: bool, arrays: bool) -> Iterator[_Cell]:
+    # Plain ``if``s, most frequent first: this runs for every value of every message.
+    if isinstance(value, bool):
+        yield _Cell(name, str(int(value)))
+    elif isinstance(value, int | float):
+        yield _Cell(name, str(value))
+    elif isinstance(value, str):
+        if strings:
+            yield _Cell(name, value)
+    elif hasattr(value, "to_nsec"):
+        yield _Cell(name, str(value.to_nsec()))
+    elif isinstance(value, list | tuple):
+        if arrays:
+            for index, element in enumerate(value):
+                yield from _cells(f"{name}{index}", element, strings, arrays)
+    else:
+        for field in getattr(value, "__slots__", ()):
+            yield from _cells(f"{name}.{field}", getattr(value, field), strings, arrays)

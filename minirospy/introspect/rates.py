@@ -1,0 +1,117 @@
+"""Rate, bandwidth and delay of a topic over a window of messages.
+
+Pure: arrival times (seconds) and sizes (bytes) come in, statistics go out.
+Source: http://wiki.ros.org/rostopic (hz, bw, delay).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+__all__ = ["Bandwidth", "BandwidthWindow", "DelayWindow", "RateWindow", "Spread"]
+
+UNBOUNDED = 50000
+"""Messages that a window without a limit keeps: a long measurement must not eat the memory."""
+
+
+class Spread(NamedTuple):
+    """Mean, extremes and standard deviation of some seconds, and how many messages they come from."""
+
+    mean: float
+    min: float
+    max: float
+    std_dev: float
+    window: int
+
+    @property
+    def rate(self) -> float:
+        """Messages a second, where the seconds lie between messages."""
+        return 1.0 / self.mean if self.mean > 0 else 0.0
+
+
+class Bandwidth(NamedTuple):
+    """Bytes a second, and the sizes of the messages that they come from."""
+
+    rate: float
+    mean: float
+    min: int
+    max: int
+    window: int
+
+
+class RateWindow:
+    """The pauses between the latest messages (at most ``size`` of them; 0 for no limit)."""
+
+    def __init__(self, size: int = 0) -> None:
+        self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
+        self._last: float | None = None
+        self._arrived = 0
+        self._reported = 0
+
+    def add(self, time: float) -> None:
+        """A message has come."""
+        self._arrived += 1
+        if self._last is not None and time >= self._last:
+            self._pauses.append(time - self._last)
+        elif self._last is not None:
+            # Time was set back: what was measured before says nothing of now.
+            self._pauses.clear()
+        self._last = time
+
+    def report(self) -> Spread | None:
+        """The statistics; None where nothing has come since the last report, or too little yet."""
+        if self._arrived == self._reported or not self._pauses:
+            return None
+        self._reported = self._arrived
+        return _spread(list(self._pauses), len(self._pauses) + 1)
+
+
+class BandwidthWindow:
+    """The sizes of the latest messages (at most ``size`` of them)."""
+
+    def __init__(self, size: int = 0) -> None:
+        self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
+
+    def add(self, time: float, size: int) -> None:
+        """A message of ``size`` bytes has come."""
+        self._messages.append((time, size))
+
+    def report(self, now: float) -> Bandwidth | None:
+        """The statistics; None while fewer than two messages have come."""
+        messages = list(self._messages)
+        if len(messages) < 2:
+            return None
+        sizes = [size for _, size in messages]
+        total = sum(sizes)
+        seconds = max(now - messages[0][0], 1e-9)
+        return Bandwidth(total / seconds, total / len(sizes), min(sizes), max(sizes), len(sizes))
+
+
+class DelayWindow:
+    """How late the latest messages came after their stamps (at most ``size`` of them; 0 for no limit)."""
+
+    def __init__(self, size: int = 0) -> None:
+        self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
+        self._arrived = 0
+        self._reported = 0
+
+    def add(self, time: float, stamp: float) -> None:
+        """A message stamped ``stamp`` has come."""
+        self._arrived += 1
+        self._delays.append(time - stamp)
+
+    def report(self) -> Spread | None:
+        """The statistics; None where nothing has come since the last report."""
+        if self._arrived == self._reported:
+            return None
+        self._reported = self._arrived
+        return _spread(list(self._delays), len(self._delays))
+
+
+def _spread(values: Sequence[float], window: int) -> Spread:
+    mean = sum(values) / len(values)
+    std_dev = math.sqrt(sum((value - mean) ** 2 for value in values) / len(values))
+    return Spread(mean, min(values), max(values), std_dev, window)

@@ -1,0 +1,183 @@
+"""Services: which there are, of which type, who offers them; calling one.
+
+Source: http://wiki.ros.org/rosservice, http://wiki.ros.org/ROS/TCPROS ("Services").
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from minirospy.errors import (
+    HandshakeRefused,
+    NodeUnreachableError,
+    RpcRefused,
+    ServiceException,
+    WireError,
+)
+from minirospy.introspect.graph import Graph, in_namespace, unknown_service
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from minirospy.runtime.services import ServiceClient
+
+__all__ = [
+    "ServiceDetail",
+    "ServiceNode",
+    "call_service",
+    "fill_request",
+    "find_services_of_type",
+    "list_services",
+    "service_arguments",
+    "service_detail",
+    "service_type",
+    "service_uri",
+    "wait_for_service",
+]
+
+_POLL_SECONDS = 0.1
+_PROBE_SECONDS = 5.0
+_ANY = "*"
+
+
+class ServiceNode(NamedTuple):
+    """A service and the nodes that offer it (the last one registered answers)."""
+
+    name: str
+    nodes: tuple[str, ...]
+
+
+class ServiceDetail(NamedTuple):
+    """A service: who offers it, where, its type, and the fields of its request."""
+
+    name: str
+    node: str
+    uri: str
+    type: str
+    arguments: list[str]
+
+
+def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
+    """The services at or below ``namespace``, sorted by name."""
+    state = graph.state()
+    return [
+        ServiceNode(name, tuple(state.services[name]))
+        for name in sorted(state.services)
+        if in_namespace(name, namespace)
+    ]
+
+
+def service_uri(graph: Graph, service: str) -> str:
+    """Where a service is called (``rosrpc://host:port``). Raises NotFoundError."""
+    try:
+        return graph.master.lookup_service(service)
+    except RpcRefused:
+        raise unknown_service(graph, service) from None
+
+
+def service_type(graph: Graph, service: str) -> str:
+    """The type of a service, asked from the node that offers it.
+
+    Raises NotFoundError, NodeUnreachableError.
+    """
+    return _probe(graph, service, service_uri(graph, service))
+
+
+def service_detail(graph: Graph, service: str) -> ServiceDetail:
+    """All there is to know of a service. Raises NotFoundError, NodeUnreachableError."""
+    nodes = graph.state().services.get(service)
+    if not nodes:
+        raise unknown_service(graph, service)
+    uri = service_uri(graph, service)
+    type_ = _probe(graph, service, uri)
+    return ServiceDetail(service, nodes[0], uri, type_, service_arguments(type_))
+
+
+def service_arguments(type_: str) -> list[str]:
+    """The names of the fields of a service type's request. Raises NotFoundError where it is not installed."""
+    from minirospy.idl.load import service_class
+
+    return list(service_class(type_)._request_class.__slots__)
+
+
+def find_services_of_type(graph: Graph, type_: str) -> list[str]:
+    """The sorted names of the services of a type; a service that does not answer has none."""
+    return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
+
+
+def wait_for_service(graph: Graph, service: str, timeout: float | None = None) -> bool:
+    """Wait until a service is registered and answers; False where ``timeout`` seconds were not enough."""
+    end = None if timeout is None else time.monotonic() + timeout
+    while end is None or time.monotonic() < end:
+        if _probed_type(graph, service):
+            return True
+        time.sleep(_POLL_SECONDS)
+    return False
+
+
+def fill_request(type_: str, arguments: Sequence[Any]) -> Any:
+    """A request of a service type, filled from YAML values (one dictionary, or all fields in order).
+
+    Raises NotFoundError where the type is not installed, MessageException where the values do not fit.
+    """
+    from minirospy.idl.load import service_class
+    from minirospy.introspect.messages import fill
+
+    return fill(service_class(type_)._request_class(), arguments)
+
+
+def call_service(graph: Graph, service: str, type_: str, request: Any) -> Any:
+    """The response to a filled request. Raises NotFoundError, ServiceException with the handler's text."""
+    from minirospy.idl.load import service_class
+    from minirospy.introspect.messages import check, serialize
+
+    cls = service_class(type_)
+    check(request)
+    uri = service_uri(graph, service)
+    try:
+        client = _connect(graph, service, uri, cls._md5sum)
+    except HandshakeRefused as error:
+        raise ServiceException(f"service [{service}] refused the connection: {error}") from error
+    except (OSError, WireError) as error:
+        raise NodeUnreachableError(service, uri, str(error)) from error
+    try:
+        body = client.call(serialize(request))
+    except HandshakeRefused as error:
+        raise ServiceException(f"service [{service}] responded with an error: {error}") from error
+    except (OSError, WireError) as error:
+        raise ServiceException(
+            f"service [{service}] ended the connection during the call: {error}"
+        ) from error
+    finally:
+        client.close()
+    response = cls._response_class()
+    response.deserialize(body)
+    return response
+
+
+def _probed_type(graph: Graph, service: str) -> str | None:
+    """A service's type; None where it is not there or does not answer."""
+    try:
+        return _probe(graph, service, graph.master.lookup_service(service))
+    except (RpcRefused, NodeUnreachableError):
+        return None
+
+
+def _probe(graph: Graph, service: str, uri: str) -> str:
+    try:
+        client = _connect(graph, service, uri, _ANY, probe=True)
+    except (OSError, WireError) as error:
+        raise NodeUnreachableError(service, uri, str(error)) from error
+    client.close()
+    type_ = client.header.get("type")
+    if not type_:
+        raise NodeUnreachableError(service, uri, "it does not tell its type")
+    return type_
+
+
+def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
+    # Imported here: it stands beside asyncio code, which listing needs none of.
+    from minirospy.runtime.services import ServiceClient
+
+    return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

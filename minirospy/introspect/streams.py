@@ -1,0 +1,218 @@
+"""Listening and publishing: a node of the tool's own, several in a process allowed.
+
+Bytes arrive in a worker of each connection; :class:`Inbox` hands them to the thread that asks, and holds the
+publishers back while that thread is busy (a slow terminal is not a growing memory).
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from minirospy.errors import MessageException, MinirospyError
+from minirospy.introspect.messages import MessageClasses, serialize
+from minirospy.introspect.topics import TopicField, find_topic
+from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.node import Node
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+
+    from minirospy.environment import Environment
+    from minirospy.introspect.graph import Graph
+    from minirospy.wire.header import Header
+
+__all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
+
+_POLL_SECONDS = 0.1
+_WAITING = 64
+"""Messages that may wait for the reader."""
+
+_SLICE = 0.05 if sys.platform == "win32" else 3600.0
+"""On Windows Ctrl-C does not end a wait of the main thread: there a wait is cut into slices."""
+
+
+class Received(NamedTuple):
+    """A message as it came: its bytes, its publisher's connection header, when (seconds since the epoch)."""
+
+    body: bytes
+    header: Header
+    time: float
+
+
+class ToolNode:
+    """A node ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it is asked to stop.
+
+    Raises MasterUnreachableError where no master answers.
+    """
+
+    def __init__(self, environment: Environment, tool: str) -> None:
+        self.name = f"{environment.namespace.rstrip('/')}/{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
+        self.ended = threading.Event()
+        self.classes = MessageClasses()
+        self._fault: Exception | None = None
+        self._on_end: list[Callable[[], object]] = []
+        self._loop = LoopThread(f"{tool}-loop")
+        self._node = Node(self.name, environment, on_shutdown=self._asked_to_stop)
+        try:
+            self._loop.run(self._node.start())
+        except BaseException:
+            self._loop.close()
+            raise
+
+    def __enter__(self) -> ToolNode:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the graph. Idempotent."""
+        self._end()
+        self._loop.run(self._node.close())
+        self._loop.close()
+
+    def wait(self, seconds: float) -> bool:
+        """Sleep so long, or until the node is asked to stop: True then. Raises what :meth:`measure` met."""
+        end = time.monotonic() + seconds
+        while not self.ended.is_set():
+            rest = end - time.monotonic()
+            if rest <= 0:
+                return False
+            self.ended.wait(min(rest, _SLICE))
+        if self._fault:
+            raise self._fault
+        return True
+
+    def listen(
+        self, topic: str, deliver: Callable[[memoryview, Header], None], *, tcp_nodelay: bool = False
+    ) -> None:
+        """Call ``deliver(bytes, header)`` in a worker with each message of a topic, whatever its type.
+
+        The bytes are valid during the call only.
+        """
+        subscription = self._node.make_subscription(
+            topic, InterfaceType(ANY, ANY), deliver, tcp_nodelay=tcp_nodelay
+        )
+        self._loop.run(self._node.subscribe(subscription))
+
+    def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
+        """Call ``add`` in a worker with each message of a topic; a fault of it is raised in :meth:`wait`."""
+
+        def deliver(body: memoryview, header: Header) -> None:
+            try:
+                add(Received(bytes(body), header, time.time()))
+            except (MinirospyError, MessageException) as error:
+                self._fault = error
+                self._end()
+
+        self.listen(topic, deliver, tcp_nodelay=tcp_nodelay)
+
+    def stop(self) -> None:
+        """End :meth:`wait` and the reading of inboxes."""
+        self._end()
+
+    def inbox(self, topic: str) -> Inbox:
+        """The messages of a topic, to be read by one thread."""
+        inbox = Inbox()
+        self._on_end.append(inbox.close)
+        self.listen(topic, inbox.put)
+        return inbox
+
+    def publisher(
+        self, topic: str, message_class: type[Any], *, latch: bool, queue_size: int = 100
+    ) -> TopicPublisher:
+        """Publish a topic of an installed message class from now on."""
+        type_ = InterfaceType(message_class._type, message_class._md5sum, message_class._full_text)
+        publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
+        self._loop.run(self._node.advertise(publication))
+        return TopicPublisher(publication, bool(message_class._has_header))
+
+    def _asked_to_stop(self, _reason: str) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        self.ended.set()
+        for function in self._on_end:
+            function()
+
+
+class Inbox:
+    """Messages between the workers that receive them and the one thread that reads them."""
+
+    def __init__(self) -> None:
+        self._messages: queue.Queue[Received | None] = queue.Queue(_WAITING)
+        self._closed = threading.Event()
+
+    def put(self, body: memoryview, header: Header) -> None:
+        """A message has come; waits while too many are unread."""
+        received = Received(bytes(body), header, time.time())
+        while not self._closed.is_set():
+            try:
+                self._messages.put(received, timeout=0.2)
+            except queue.Full:
+                continue
+            return
+
+    def close(self) -> None:
+        """End the reading: what has come is still read."""
+        if not self._closed.is_set():
+            self._closed.set()
+            try:
+                self._messages.put_nowait(None)
+            except queue.Full:
+                pass  # the reader sees it when it has read what is there
+
+    def __iter__(self) -> Iterator[Received]:
+        while True:
+            try:
+                received = self._messages.get(timeout=min(_SLICE, 1.0))
+            except queue.Empty:
+                if self._closed.is_set():
+                    return
+                continue
+            if received is None:
+                return
+            yield received
+
+
+class TopicPublisher:
+    """Publishes messages on one topic, from one thread."""
+
+    def __init__(self, publication: Publication, has_header: bool) -> None:
+        self._publication = publication
+        self._has_header = has_header
+        self._sequence = 0
+
+    @property
+    def connections(self) -> int:
+        """How many subscribers are connected."""
+        return len(self._publication.links)
+
+    def publish(self, message: Any) -> None:
+        """Send a message; its header is numbered. Raises MessageException where a value does not fit."""
+        if self._has_header:
+            self._sequence += 1
+            message.header.seq = self._sequence
+        body = serialize(message)
+        self._publication.publish(len(body).to_bytes(4, "little") + body)
+
+
+def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
+    """The topic that ``name`` is, or is a field of, once it is published; ``on_waiting`` is called once."""
+    field = find_topic(graph, name)
+    if field is None:
+        on_waiting()
+    while field is None:
+        time.sleep(_POLL_SECONDS)
+        field = find_topic(graph, name)
+    return field

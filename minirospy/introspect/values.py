@@ -1,0 +1,175 @@
+"""Values as people type and read them: YAML text in, parameter values out, and back.
+
+Pure. Simple values, which most parameters are, are read and written without importing a YAML library: that
+import costs more than all else that `rosparam get` does. ``deg(90)`` and ``rad(pi/2)`` are angles in radians.
+Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+from minirospy.errors import ValueTextError
+
+__all__ = ["check_parameter", "format_pretty", "format_value", "parse_documents", "parse_value"]
+
+_PLAIN_TEXT = re.compile(r"[A-Za-z/_][A-Za-z0-9/_]+\Z", re.ASCII)
+_PLAIN_INT = re.compile(r"(?:0|-?[1-9][0-9]{0,8})\Z", re.ASCII)
+_PLAIN_FLOAT = re.compile(r"-?[0-9]{1,9}\.[0-9]{1,9}\Z", re.ASCII)
+_WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "null"})
+_TRUTH = {"true": True, "True": True, "false": False, "False": False}
+_DOCUMENT_END = "\n...\n"
+_INT32 = 2**31
+_ANGLE = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
+
+
+def parse_value(text: str) -> Any:
+    """The value of a YAML text. Raises ValueTextError."""
+    word = text.strip()
+    if _PLAIN_INT.match(word):
+        return int(word)
+    if _PLAIN_FLOAT.match(word):
+        return float(word)
+    if word in _TRUTH:
+        return _TRUTH[word]
+    if _PLAIN_TEXT.match(word) and word.lower() not in _WORDS_WITH_MEANING:
+        return word
+    import yaml
+
+    try:
+        return yaml.load(text, Loader=_loader())
+    except yaml.YAMLError as error:
+        raise ValueTextError(text, _complaint(error)) from error
+
+
+def parse_documents(text: str, where: str) -> Iterator[Any]:
+    """The values of the documents of a YAML text, ``---`` between them. Raises ValueTextError."""
+    import yaml
+
+    try:
+        yield from yaml.load_all(text, Loader=_loader())
+    except yaml.YAMLError as error:
+        raise ValueTextError(where, _complaint(error)) from error
+
+
+def format_value(value: Any) -> str:
+    """A value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, str) and _PLAIN_TEXT.match(value) and value.lower() not in _WORDS_WITH_MEANING:
+        return value
+    import yaml
+
+    return yaml.safe_dump(value).removesuffix(_DOCUMENT_END)
+
+
+def format_pretty(value: Any) -> str:
+    """A value for people's eyes, as `rosparam get -p` prints it: texts bare, not to be parsed again."""
+    if isinstance(value, dict):
+        return "\n".join(_pretty_lines(value, ""))
+    return value if isinstance(value, str) else format_value(value)
+
+
+def check_parameter(value: Any, name: str) -> None:
+    """Raise ValueTextError where a value, or one inside it, is nothing that a parameter can hold."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                raise ValueTextError(name, f"the key {key!r} is not a text: put it in quotes")
+            check_parameter(inner, f"{name.rstrip('/')}/{key}")
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            check_parameter(inner, name)
+    elif value is None:
+        raise ValueTextError(name, "null is not a value of a parameter: use '' or delete the parameter")
+    elif isinstance(value, int) and not -_INT32 <= value < _INT32:
+        raise ValueTextError(name, f"{value} is more than a parameter's 32 bits hold: write {value}.0")
+    elif not isinstance(value, bool | int | float | str | bytes):
+        raise ValueTextError(
+            name,
+            f"a {type(value).__name__} is no parameter: quote {str(value)!r} twice for the text",
+        )
+
+
+def _pretty_lines(table: dict[str, Any], indent: str) -> Iterator[str]:
+    for key in sorted(table):
+        value = table[key]
+        if isinstance(value, dict) and value:
+            yield f"{indent}{key}:"
+            yield from _pretty_lines(value, indent + "  ")
+        elif isinstance(value, str) and "\n" in value:
+            yield f"{indent}{key}: |"
+            yield from (f"{indent}  {line}" for line in value.split("\n"))
+        else:
+            text = value if isinstance(value, str) else format_value(value).removesuffix("\n")
+            yield f"{indent}{key}: {text}"
+
+
+def _complaint(error: Exception) -> str:
+    """A YAML library's complaint on one line."""
+    problem = " ".join(str(getattr(error, "problem", None) or error).split())
+    mark = getattr(error, "problem_mark", None)
+    return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
+
+
+@lru_cache(maxsize=1)
+def _loader() -> type[Any]:
+    """A safe YAML loader that knows angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
+    import yaml
+
+    class AngleLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+        pass
+
+    def construct(unit: float) -> Any:
+        def angle(loader: Any, node: Any) -> float:
+            text = loader.construct_scalar(node)
+            match = _ANGLE.match(text)
+            try:
+                return unit * _arithmetic(match.group(2) if match else text)
+            except (ValueError, SyntaxError, ArithmeticError) as error:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"[{text}] is not an angle: {error}", node.start_mark
+                ) from error
+
+        return angle
+
+    for tag, name, unit in (("!degrees", "deg", math.pi / 180.0), ("!radians", "rad", 1.0)):
+        AngleLoader.add_constructor(tag, construct(unit))
+        AngleLoader.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
+    return AngleLoader
+
+
+def _arithmetic(text: str) -> float:
+    """The value of a sum over numbers and ``pi``. Raises ValueError, SyntaxError or ArithmeticError."""
+    import ast
+    import operator
+
+    binary = {
+        ast.Add: operator.add,
+        ast.Sub: operator.sub,
+        ast.Mult: operator.mul,
+        ast.Div: operator.truediv,
+    }
+
+    def value(node: ast.expr) -> float:
+        match node:
+            case ast.Constant(value=int() | float() as number):
+                return float(number)
+            case ast.Name(id="pi"):
+                return math.pi
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return -value(inner)
+            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                return value(inner)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
+                return float(binary[type(op)](value(left), value(right)))
+            case _:
+                raise ValueError("only numbers, pi, + - * / and brackets")
+
+    return value(ast.parse(text.strip(), mode="eval").body)
