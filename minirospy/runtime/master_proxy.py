@@ -1,0 +1,207 @@
+"""The master and the nodes as Python objects: typed calls, answers unwrapped, errors named.
+
+Blocking, without asyncio. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API,
+http://wiki.ros.org/ROS/Parameter%20Server%20API.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from minirospy.errors import MasterUnreachableError, RpcRefused, RpcUnreachable
+from minirospy.runtime.rpc_client import RpcClient
+
+__all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "unwrap"]
+
+
+class SystemState(NamedTuple):
+    """Who publishes, subscribes and serves: topic or service name -> node names."""
+
+    publishers: dict[str, list[str]]
+    subscribers: dict[str, list[str]]
+    services: dict[str, list[str]]
+
+
+class BusConnection(NamedTuple):
+    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` where it tells."""
+
+    id: Any
+    destination: str
+    direction: str
+    transport: str
+    topic: str
+    connected: bool = True
+    info: str = ""
+
+
+def unwrap(method: str, answer: Any) -> Any:
+    """The value of a ROS API answer. Raises RpcRefused where its status is not 1."""
+    match answer:
+        case [1, _, value]:
+            return value
+        case [int(code), text, *_]:
+            raise RpcRefused(method, code, str(text))
+        case _:
+            raise RpcRefused(method, -1, f"answered {answer!r}")
+
+
+class MasterProxy:
+    """The master at ``uri``, called as the node ``caller_id``.
+
+    Each method raises MasterUnreachableError where it does not answer, RpcRefused where it says no.
+    """
+
+    def __init__(self, uri: str, caller_id: str, timeout: float = 5.0) -> None:
+        self.uri = uri
+        self.caller_id = caller_id
+        try:
+            self._client = RpcClient(uri, timeout)
+        except RpcUnreachable as error:
+            raise MasterUnreachableError(uri) from error
+
+    def call(self, method: str, *args: Any) -> Any:
+        """Any method of the API; the caller's id is put in front."""
+        try:
+            return unwrap(method, self._client.call(method, self.caller_id, *args))
+        except RpcUnreachable as error:
+            raise MasterUnreachableError(self.uri) from error
+
+    def close(self) -> None:
+        """Close the connections. Idempotent."""
+        self._client.close()
+
+    def get_pid(self) -> int:
+        """The master's process id."""
+        return int(self.call("getPid"))
+
+    def get_uri(self) -> str:
+        """The URI that the master tells of itself."""
+        return str(self.call("getUri"))
+
+    def lookup_node(self, name: str) -> str:
+        """The URI of a node's Slave API."""
+        return str(self.call("lookupNode", name))
+
+    def get_published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
+        """(topic, type) of each published topic at or below ``subgraph``."""
+        return [(topic, type_) for topic, type_ in self.call("getPublishedTopics", subgraph)]
+
+    def get_topic_types(self) -> dict[str, str]:
+        """The type of each topic that the master knows."""
+        return dict(self.call("getTopicTypes"))
+
+    def get_system_state(self) -> SystemState:
+        """Who publishes, subscribes and serves what."""
+        return SystemState(*(dict(table) for table in self.call("getSystemState")))
+
+    def lookup_service(self, name: str) -> str:
+        """The URI (rosrpc://host:port) of a service."""
+        return str(self.call("lookupService", name))
+
+    def register_publisher(self, topic: str, type_: str, caller_api: str) -> list[str]:
+        """Register a publisher; the URIs of the topic's subscribers."""
+        return list(self.call("registerPublisher", topic, type_, caller_api))
+
+    def unregister_publisher(self, topic: str, caller_api: str) -> int:
+        """Take a publisher back; how many there were (0 or 1)."""
+        return int(self.call("unregisterPublisher", topic, caller_api))
+
+    def register_subscriber(self, topic: str, type_: str, caller_api: str) -> list[str]:
+        """Register a subscriber; the URIs of the topic's publishers."""
+        return list(self.call("registerSubscriber", topic, type_, caller_api))
+
+    def unregister_subscriber(self, topic: str, caller_api: str) -> int:
+        """Take a subscriber back; how many there were (0 or 1)."""
+        return int(self.call("unregisterSubscriber", topic, caller_api))
+
+    def register_service(self, name: str, service_api: str, caller_api: str) -> None:
+        """Register a service at ``service_api`` (rosrpc://host:port)."""
+        self.call("registerService", name, service_api, caller_api)
+
+    def unregister_service(self, name: str, service_api: str) -> int:
+        """Take a service back; how many there were (0 or 1)."""
+        return int(self.call("unregisterService", name, service_api))
+
+    def get_param(self, key: str) -> Any:
+        """A parameter, or a dictionary of those below ``key``."""
+        return self.call("getParam", key)
+
+    def set_param(self, key: str, value: Any) -> None:
+        """Set a parameter; a dictionary replaces the namespace ``key``."""
+        self.call("setParam", key, value)
+
+    def has_param(self, key: str) -> bool:
+        """Whether a parameter or namespace is set."""
+        return bool(self.call("hasParam", key))
+
+    def delete_param(self, key: str) -> None:
+        """Delete a parameter or namespace."""
+        self.call("deleteParam", key)
+
+    def search_param(self, key: str) -> str | None:
+        """The nearest parameter of this name, upwards from the caller's namespace; None where there is none."""
+        try:
+            return str(self.call("searchParam", key))
+        except RpcRefused:
+            return None
+
+    def get_param_names(self) -> list[str]:
+        """The names of all parameters."""
+        return list(self.call("getParamNames"))
+
+    def subscribe_param(self, caller_api: str, key: str) -> Any:
+        """Be told of changes at or below ``key``; its value now."""
+        return self.call("subscribeParam", caller_api, key)
+
+    def unsubscribe_param(self, caller_api: str, key: str) -> int:
+        """Be told no more."""
+        return int(self.call("unsubscribeParam", caller_api, key))
+
+
+class SlaveProxy:
+    """A node at ``uri``. Each method raises RpcUnreachable, RpcRefused or another RpcError."""
+
+    def __init__(self, uri: str, caller_id: str, timeout: float = 3.0) -> None:
+        self.uri = uri
+        self.caller_id = caller_id
+        self._client = RpcClient(uri, timeout)
+
+    def call(self, method: str, *args: Any) -> Any:
+        """Any method of the API; the caller's id is put in front."""
+        return unwrap(method, self._client.call(method, self.caller_id, *args))
+
+    def close(self) -> None:
+        """Close the connections. Idempotent."""
+        self._client.close()
+
+    def get_pid(self) -> int:
+        """The node's process id."""
+        return int(self.call("getPid"))
+
+    def get_bus_info(self) -> list[BusConnection]:
+        """The node's connections."""
+        return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
+
+    def get_bus_stats(self) -> list[Any]:
+        """Statistics, as the node tells them."""
+        return list(self.call("getBusStats"))
+
+    def get_master_uri(self) -> str:
+        """The master that the node registered with."""
+        return str(self.call("getMasterUri"))
+
+    def shutdown(self, reason: str = "") -> None:
+        """Ask the node to stop."""
+        self.call("shutdown", reason)
+
+    def get_subscriptions(self) -> list[tuple[str, str]]:
+        """(topic, type) of what the node subscribes to."""
+        return [(topic, type_) for topic, type_ in self.call("getSubscriptions")]
+
+    def get_publications(self) -> list[tuple[str, str]]:
+        """(topic, type) of what the node publishes."""
+        return [(topic, type_) for topic, type_ in self.call("getPublications")]
+
+    def request_topic(self, topic: str, protocols: list[list[Any]]) -> list[Any]:
+        """Where the topic is found, as [protocol, host, port]."""
+        return list(self.call("requestTopic", topic, protocols))

@@ -1,0 +1,102 @@
+"""A blocking XML-RPC client: it works in the caller's thread and imports no asyncio."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections import deque
+from typing import Any
+from urllib.parse import urlsplit
+
+from minirospy.errors import RpcProtocolError, RpcUnreachable
+from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
+from minirospy.wire.xmlrpc import parse_response, serialize_call
+
+__all__ = ["RpcClient", "parse_http_uri"]
+
+_RECEIVE = 65536
+
+
+class RpcClient:
+    """Calls methods of one server. Any number of threads may call; connections are kept and reused.
+
+    A call takes a connection out of the pool while it lasts, so that a signal handler which calls in the
+    middle of another call of the same thread gets one of its own.
+    """
+
+    def __init__(self, uri: str, timeout: float = 5.0) -> None:
+        """``timeout`` in seconds bounds connecting, and each wait for bytes. Raises RpcUnreachable on a bad URI."""
+        self.uri = uri
+        self._host, self._port, self._path = parse_http_uri(uri)
+        self._timeout = timeout
+        self._idle: deque[socket.socket] = deque()
+
+    def call(self, method: str, *args: Any) -> Any:
+        """The value that ``method`` answers.
+
+        Raises RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
+        """
+        request = serialize_request(f"{self._host}:{self._port}", self._path, serialize_call(method, args))
+        message = self._exchange(request)
+        if message.status != 200:
+            raise RpcProtocolError(f"{self.uri} answered {message.start}")
+        return parse_response(message.body)
+
+    def close(self) -> None:
+        """Close the kept connections. Idempotent."""
+        while self._idle:
+            self._idle.pop().close()
+
+    def _exchange(self, request: bytes) -> HttpMessage:
+        try:
+            sock: socket.socket | None = self._idle.pop()
+        except IndexError:
+            sock = None
+        if sock is not None:
+            # A kept connection may have been closed by the peer meanwhile: then once more on a new one.
+            with contextlib.suppress(OSError, EOFError):
+                return self._ask(sock, request)
+        try:
+            return self._ask(self._connect(), request)
+        except TimeoutError as error:
+            raise RpcUnreachable(self.uri, f"timed out after {self._timeout:g} s") from error
+        except (OSError, EOFError) as error:
+            raise RpcUnreachable(self.uri, str(error) or "the connection was closed") from error
+
+    def _connect(self) -> socket.socket:
+        sock = socket.create_connection((self._host, self._port), self._timeout)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return sock
+
+    def _ask(self, sock: socket.socket, request: bytes) -> HttpMessage:
+        reader = HttpReader()
+        try:
+            sock.sendall(request)
+            while True:
+                data = sock.recv(_RECEIVE)
+                if not data and reader.is_idle:
+                    raise EOFError("the connection was closed without an answer")
+                messages = reader.feed(data)
+                if messages:
+                    break
+        except BaseException:
+            sock.close()
+            raise
+        if messages[0].keep_alive:
+            self._idle.append(sock)
+        else:
+            sock.close()
+        return messages[0]
+
+
+def parse_http_uri(uri: str) -> tuple[str, int, str]:
+    """(host, port, path) of ``http://host:port/path``. Raises RpcUnreachable."""
+    try:
+        parts = urlsplit(uri)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if not host or not port:
+        raise RpcUnreachable(uri, "not a URI of the form http://host:port")
+    # "localhost" may name IPv6 first, where no server of ROS 1 listens.
+    return ("127.0.0.1" if host == "localhost" else host), port, parts.path or "/"

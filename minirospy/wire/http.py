@@ -1,0 +1,203 @@
+"""HTTP/1.1 as XML-RPC needs it: POST requests and their answers, with keep-alive.
+
+Pure: bytes in, messages out. Source: RFC 9112.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import NamedTuple
+
+from minirospy.errors import RpcProtocolError
+
+__all__ = ["MAX_BODY", "HttpMessage", "HttpReader", "serialize_error", "serialize_request", "serialize_response"]
+
+MAX_BODY = 64 * 1024 * 1024
+"""Bytes that a body may have: a parameter may hold a robot's whole description."""
+
+_MAX_HEAD = 64 * 1024
+_CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
+_REASONS = {400: "Bad Request", 405: "Method Not Allowed", 413: "Content Too Large", 500: "Internal Server Error"}
+
+
+class HttpMessage(NamedTuple):
+    """A request or an answer. ``start`` is its first line, ``headers`` have lower-case names."""
+
+    start: str
+    headers: dict[str, str]
+    body: bytes
+
+    @property
+    def keep_alive(self) -> bool:
+        """Whether the connection serves another request after this one."""
+        connection = self.headers.get("connection", "").lower()
+        if "HTTP/1.0" in self.start:
+            return "keep-alive" in connection
+        return "close" not in connection
+
+    @property
+    def method(self) -> str:
+        """A request's method."""
+        return self.start.partition(" ")[0]
+
+    @property
+    def status(self) -> int:
+        """An answer's status code; 0 where there is none."""
+        parts = self.start.split(" ", 2)
+        return int(parts[1]) if len(parts) > 1 and parts[1].isdigit() else 0
+
+
+class HttpReader:
+    """Bytes in, whole messages out, several of them where they were pipelined."""
+
+    def __init__(self, max_body: int = MAX_BODY) -> None:
+        self._max_body = max_body
+        self._buffer = bytearray()
+        self._ended = False
+        self._in_body = False
+        self._parser = self._parse()
+        self.wants_continue = False
+        """Whether the peer waits for :meth:`continue_line` before it sends its body."""
+        next(self._parser)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no message has begun."""
+        return not self._buffer and not self._in_body
+
+    def feed(self, data: bytes) -> list[HttpMessage]:
+        """The messages that are complete with ``data``; b"" means that the peer has ended.
+
+        Raises RpcProtocolError.
+        """
+        if data:
+            self._buffer += data
+        else:
+            self._ended = True
+        messages = []
+        while True:
+            message = self._parser.send(None)
+            if message is None:
+                return messages
+            messages.append(message)
+
+    def continue_line(self) -> bytes:
+        """What a peer that sent ``Expect: 100-continue`` waits for."""
+        self.wants_continue = False
+        return _CONTINUE
+
+    def _parse(self) -> Generator[HttpMessage | None, None, None]:
+        yield None
+        while True:
+            head = yield from self._until(b"\r\n\r\n")
+            start, *lines = head.decode("latin-1").split("\r\n")
+            if not _is_start_line(start):
+                raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
+            headers = {}
+            for line in lines:
+                name, separator, value = line.partition(":")
+                if not separator:
+                    raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
+                headers[name.strip().lower()] = value.strip()
+            self.wants_continue = headers.get("expect", "").lower() == "100-continue"
+            self._in_body = True
+            body = yield from self._body(start, headers)
+            self._in_body = self.wants_continue = False
+            yield HttpMessage(start, headers, body)
+
+    def _body(self, start: str, headers: dict[str, str]) -> Generator[None, None, bytes]:
+        if "chunked" in headers.get("transfer-encoding", "").lower():
+            return (yield from self._chunks())
+        length = headers.get("content-length")
+        if length is None:
+            if start.startswith("HTTP/"):
+                # An answer without a length goes on until the peer ends.
+                while not self._ended:
+                    self._check(len(self._buffer))
+                    yield None
+                return self._take(len(self._buffer))
+            return b""
+        if not length.isdigit():
+            raise RpcProtocolError(f"bad Content-Length {length[:20]!r}")
+        self._check(int(length))
+        return (yield from self._exactly(int(length)))
+
+    def _chunks(self) -> Generator[None, None, bytes]:
+        body = bytearray()
+        while True:
+            line = (yield from self._until(b"\r\n")).partition(b";")[0].strip()
+            try:
+                size = int(line, 16)
+            except ValueError:
+                raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}") from None
+            if size < 0:
+                raise RpcProtocolError("negative chunk size")
+            self._check(len(body) + size)
+            if not size:
+                while (yield from self._until(b"\r\n")):
+                    pass
+                return bytes(body)
+            body += yield from self._exactly(size)
+            if (yield from self._until(b"\r\n")):
+                raise RpcProtocolError("a chunk is longer than its size")
+
+    def _until(self, mark: bytes) -> Generator[None, None, bytes]:
+        looked = 0
+        while (at := self._buffer.find(mark, max(0, looked - len(mark)))) < 0:
+            looked = len(self._buffer)
+            if looked > _MAX_HEAD:
+                raise RpcProtocolError("HTTP header too long")
+            if self._ended and self._buffer:
+                raise RpcProtocolError("the peer ended inside a message")
+            yield None
+        data = self._take(at)
+        del self._buffer[: len(mark)]
+        return data
+
+    def _exactly(self, count: int) -> Generator[None, None, bytes]:
+        while len(self._buffer) < count:
+            if self._ended:
+                raise RpcProtocolError("the peer ended inside a message")
+            yield None
+        return self._take(count)
+
+    def _take(self, count: int) -> bytes:
+        data = bytes(self._buffer[:count])
+        del self._buffer[:count]
+        return data
+
+    def _check(self, size: int) -> None:
+        if size > self._max_body:
+            raise RpcProtocolError(f"an HTTP body of {size} bytes is over the limit of {self._max_body}")
+
+
+def serialize_request(host: str, path: str, body: bytes) -> bytes:
+    """A POST of ``body``."""
+    head = (
+        f"POST {path or '/'} HTTP/1.1\r\nHost: {host}\r\nUser-Agent: minirospy\r\n"
+        f"Content-Type: text/xml\r\nContent-Length: {len(body)}\r\n\r\n"
+    )
+    return head.encode("latin-1", "replace") + body
+
+
+def serialize_response(body: bytes, *, keep_alive: bool = True) -> bytes:
+    """A successful answer."""
+    connection = "" if keep_alive else "Connection: close\r\n"
+    head = f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {len(body)}\r\n\r\n"
+    return head.encode() + body
+
+
+def serialize_error(status: int, text: str) -> bytes:
+    """A refusal, after which the connection ends."""
+    body = (text + "\n").encode()
+    return (
+        f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: text/plain; charset=utf-8\r\n"
+        f"Connection: close\r\nContent-Length: {len(body)}\r\n\r\n"
+    ).encode() + body
+
+
+def _is_start_line(line: str) -> bool:
+    if line.startswith("HTTP/"):
+        return True
+    words = line.split(" ")
+    return len(words) == 3 and words[2].startswith("HTTP/1.")
