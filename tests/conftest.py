@@ -25,3 +25,26 @@ def _own_environment(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pyte
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
     yield
+
+
+@pytest.fixture
+def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The URI of a master of the test's own, which ROS_MASTER_URI names while the test runs."""
+    from minirospy.runtime.loop import LoopThread
+    from minirospy.runtime.master import Master
+
+    loop = LoopThread("test-master")
+
+    async def start() -> Master:
+        serving = Master()
+        await serving.start()
+        return serving
+
+    serving = loop.run(start())
+    uri = f"http://localhost:{serving.port}"
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    try:
+        yield uri
+    finally:
+        loop.run(serving.close(), 5.0)
+        loop.close()
