@@ -1,0 +1,175 @@
+"""What a board does: operations in, changed pins out. Pure.
+
+A pin is an input or an output. An output's level is its latch; an input's is what the world drives it to
+(a pressed button, a jumper wire), else its pull resistor, else 0. The latch outlives the direction and the
+process that wrote it, as on a Raspberry Pi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+__all__ = [
+    "BUTTONS",
+    "LEDS",
+    "PINS",
+    "BoardModel",
+    "Change",
+    "Force",
+    "Function",
+    "Operation",
+    "OperationError",
+    "Pin",
+    "Press",
+    "Pull",
+    "Release",
+    "Setup",
+    "Write",
+]
+
+PINS = 54
+"""Pins of the chip in BCM numbering: 0 to 53."""
+
+LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}
+"""BCM pin -> colour of the light that is wired to it."""
+
+BUTTONS = (11, 12)
+"""BCM pins of the wired buttons: a resistor holds them at 0, pressing makes them 1."""
+
+
+class Function(IntEnum):
+    """What a pin does, with RPi.GPIO's numbers."""
+
+    OUT = 0
+    IN = 1
+
+
+class Pull(IntEnum):
+    """The resistor inside the chip, with RPi.GPIO's numbers."""
+
+    OFF = 20
+    DOWN = 21
+    UP = 22
+
+
+class Pin(NamedTuple):
+    """One pin; ``world`` is the level that it is driven to from outside, or None when nothing drives it."""
+
+    function: Function = Function.IN
+    pull: Pull = Pull.OFF
+    world: int | None = None
+    latch: int = 0
+
+    @property
+    def level(self) -> int:
+        """What reading the pin gives: 0 or 1."""
+        if self.function is Function.OUT:
+            return self.latch
+        if self.world is not None:
+            return self.world
+        return 1 if self.pull is Pull.UP else 0
+
+
+class Setup(NamedTuple):
+    """Choose a pin's function; ``initial`` is an output's first level, None keeps the latch."""
+
+    pin: int
+    function: int
+    pull: int = Pull.OFF
+    initial: int | None = None
+
+
+class Write(NamedTuple):
+    """Set the latches of several pins at once: ((pin, level), ...)."""
+
+    levels: Sequence[Sequence[int]]
+
+
+class Press(NamedTuple):
+    """A finger pushes the button at ``pin``."""
+
+    pin: int
+
+
+class Release(NamedTuple):
+    """The finger leaves the button at ``pin``."""
+
+    pin: int
+
+
+class Force(NamedTuple):
+    """A wire puts ``level`` on an input; an output's latch is set, as another program would."""
+
+    pin: int
+    level: int
+
+
+Operation = Setup | Write | Press | Release | Force
+
+
+class Change(NamedTuple):
+    """``pin`` is now ``state``; ``edge`` says whether its level changed."""
+
+    pin: int
+    state: Pin
+    edge: bool
+
+
+class OperationError(ValueError):
+    """An operation with a pin, level, function or pull that does not exist."""
+
+
+class BoardModel:
+    """All the pins of one board."""
+
+    def __init__(self, pins: Sequence[Pin] | None = None) -> None:
+        fresh = [Pin(world=0 if number in BUTTONS else None) for number in range(PINS)]
+        self.pins: list[Pin] = list(pins) if pins is not None else fresh
+
+    def apply(self, operation: Operation) -> list[Change]:
+        """Carry one operation out whole; the pins that differ. Raises OperationError and changes nothing."""
+        match operation:
+            case Setup(pin, function, pull, initial):
+                wanted = self._set_up(_pin(pin), function, pull, initial)
+            case Write(levels):
+                wanted = {_pin(pin): self.pins[pin]._replace(latch=_level(level)) for pin, level in levels}
+            case Press(pin):
+                wanted = {_pin(pin): self.pins[pin]._replace(world=self._pressed(pin))}
+            case Release(pin):
+                wanted = {_pin(pin): self.pins[pin]._replace(world=0 if pin in BUTTONS else None)}
+            case Force(pin, level):
+                is_output = self.pins[_pin(pin)].function is Function.OUT
+                part = {"latch": _level(level)} if is_output else {"world": _level(level)}
+                wanted = {pin: self.pins[pin]._replace(**part)}
+        changes = []
+        for pin, state in wanted.items():
+            before = self.pins[pin]
+            if state != before:
+                self.pins[pin] = state
+                changes.append(Change(pin, state, state.level != before.level))
+        return changes
+
+    def _set_up(self, pin: int, function: int, pull: int, initial: int | None) -> dict[int, Pin]:
+        try:
+            state = self.pins[pin]._replace(function=Function(function), pull=Pull(pull))
+        except ValueError as error:
+            raise OperationError(str(error)) from error
+        return {pin: state if initial is None else state._replace(latch=_level(initial))}
+
+    def _pressed(self, pin: int) -> int:
+        # A button added to a pin with a pull-up connects it to ground; the wired ones connect to 3.3 V.
+        return 0 if pin not in BUTTONS and self.pins[pin].pull is Pull.UP else 1
+
+
+def _pin(pin: int) -> int:
+    if not (isinstance(pin, int) and 0 <= pin < PINS):
+        raise OperationError(f"there is no pin {pin!r}: BCM numbers are 0 to {PINS - 1}")
+    return pin
+
+
+def _level(level: int) -> int:
+    if level not in {0, 1}:
+        raise OperationError(f"a level is 0 or 1, not {level!r}")
+    return int(level)

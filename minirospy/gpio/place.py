@@ -1,0 +1,99 @@
+"""Where a board lives: its name in, the paths of its socket, lock and saved pins out.
+
+``MINIROSPY_BOARD`` names the board (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder that holds
+it, by default one in the temporary folder that only this user may enter.
+"""
+
+from __future__ import annotations
+
+import getpass
+import os
+import re
+import socket
+import stat
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from minirospy.errors import BoardError
+
+__all__ = ["Place"]
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]{1,60}")
+_SOCKET_PATH_LIMIT = 100
+"""Bytes in a Unix socket's path; macOS allows 103, Linux 107."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """One board's name and folder."""
+
+    name: str
+    folder: Path
+
+    @classmethod
+    def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> Place:
+        """The place of board ``name`` (default: what the environment says).
+
+        Raises BoardError on a name that is no file name.
+        """
+        environ = os.environ if environ is None else environ
+        name = name or environ.get("MINIROSPY_BOARD") or "default"
+        if not _NAME.fullmatch(name) or name.startswith("."):
+            raise BoardError(
+                f"the board's name [{name}] may hold letters, digits, `_`, `-` and `.` (up to 60)"
+            )
+        given = environ.get("MINIROSPY_RUNTIME_DIR")
+        folder = Path(given) if given else Path(tempfile.gettempdir()) / f"minirospy-{_user()}"
+        return cls(name, folder.absolute())
+
+    def prepare(self) -> None:
+        """Make the folder; raises BoardError when it cannot be made or others may write to it."""
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            found = self.folder.lstat()
+        except OSError as error:
+            raise BoardError(f"the board's folder {self.folder} cannot be made: {error.strerror}") from error
+        if sys.platform != "win32" and (found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) & 0o022):
+            raise BoardError(
+                f"the board's folder {self.folder} is open to others: remove it, or set MINIROSPY_RUNTIME_DIR"
+            )
+
+    @property
+    def uses_unix_socket(self) -> bool:
+        """Whether the server listens on ``socket_path``; else on loopback TCP, as ``address_path`` says."""
+        has_unix = sys.platform != "win32" and hasattr(socket, "AF_UNIX")
+        return has_unix and len(os.fsencode(self.socket_path)) <= _SOCKET_PATH_LIMIT
+
+    @property
+    def socket_path(self) -> Path:
+        """The Unix socket."""
+        return self.folder / f"{self.name}.sock"
+
+    @property
+    def address_path(self) -> Path:
+        """The file with "port token" of a TCP server; only this user may read it."""
+        return self.folder / f"{self.name}.address"
+
+    @property
+    def lock_path(self) -> Path:
+        """The file that the one server keeps locked."""
+        return self.folder / f"{self.name}.lock"
+
+    @property
+    def state_path(self) -> Path:
+        """The pins as the last server left them."""
+        return self.folder / f"{self.name}.pins"
+
+    @property
+    def log_path(self) -> Path:
+        """What a failing server had to say."""
+        return self.folder / f"{self.name}.log"
+
+
+def _user() -> str:
+    if sys.platform != "win32":
+        return str(os.getuid())
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", getpass.getuser())
