@@ -140,9 +140,11 @@ class BoardModel:
             case Release(pin):
                 wanted = {_pin(pin): self.pins[pin]._replace(world=0 if pin in BUTTONS else None)}
             case Force(pin, level):
-                is_output = self.pins[_pin(pin)].function is Function.OUT
-                part = {"latch": _level(level)} if is_output else {"world": _level(level)}
-                wanted = {pin: self.pins[pin]._replace(**part)}
+                before = self.pins[_pin(pin)]
+                if before.function is Function.OUT:
+                    wanted = {pin: before._replace(latch=_level(level))}
+                else:
+                    wanted = {pin: before._replace(world=_level(level))}
         changes = []
         for pin, state in wanted.items():
             before = self.pins[pin]
@@ -170,6 +172,6 @@ def _pin(pin: int) -> int:
 
 
 def _level(level: int) -> int:
-    if level not in {0, 1}:
+    if not isinstance(level, int) or level not in {0, 1}:
         raise OperationError(f"a level is 0 or 1, not {level!r}")
     return int(level)

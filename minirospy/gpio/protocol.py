@@ -7,17 +7,16 @@ change, and Done to a client for the requests it carried out, after the Changed 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
-import msgpack
+import msgpack  # type: ignore[import-untyped]
 
 from minirospy.gpio.model import (
     PINS,
     Force,
     Function,
     Operation,
-    OperationError,
     Pin,
     Press,
     Pull,
@@ -141,43 +140,42 @@ def decode_pins(block: bytes) -> list[Pin]:
     return messages[0].pins
 
 
-def _message(item: tuple[object, ...]) -> Message:
-    number, *fields = item
-    kind = _KINDS[_natural(number)]
-    if kind is Request:
-        return Request(_natural(fields[0]), _operation(fields[1]))
-    if kind is Welcome:
-        pins = [_pin(pin) for pin in fields[1]]  # type: ignore[attr-defined]
-        if len(pins) != PINS:
-            raise ProtocolError(f"{len(pins)} pins instead of {PINS}")
-        return Welcome(_natural(fields[0]), pins)
-    if kind is Changed:
-        pin, state, edge, time = fields
-        return Changed(_natural(pin), _pin(state), bool(edge), float(time))  # type: ignore[arg-type]
-    if kind is Done:
-        return Done(_natural(*fields))
-    if kind is Refused:
-        return Refused(_natural(fields[0]), str(fields[1]))
-    return Hello(_natural(fields[0]), str(fields[1]))
+def _message(item: Any) -> Message:
+    return _READERS[_natural(item[0])](*item[1:])
 
 
-def _operation(item: object) -> Operation | None:
+def _request(number: Any, item: Any) -> Request:
     if item is None:
-        return None
-    number, *fields = item  # type: ignore[misc]
-    operation: Operation = _OPERATIONS[_natural(number)](*fields)
+        return Request(_natural(number), None)
+    operation = _OPERATIONS[_natural(item[0])](*item[1:])
     if isinstance(operation, Write):
-        for pair in operation.levels:
-            _pin_number, _level = pair
-    return operation
+        operation = Write(tuple((pin, level) for pin, level in operation.levels))
+    return Request(_natural(number), operation)
 
 
-def _pin(item: object) -> Pin:
-    function, pull, world, latch = item  # type: ignore[misc]
+def _welcome(version: Any, items: Any) -> Welcome:
+    pins = [_pin(*item) for item in items]
+    if len(pins) != PINS:
+        raise ProtocolError(f"{len(pins)} pins instead of {PINS}")
+    return Welcome(_natural(version), pins)
+
+
+def _pin(function: Any, pull: Any, world: Any, latch: Any) -> Pin:
     return Pin(Function(function), Pull(pull), None if world is None else int(bool(world)), int(bool(latch)))
 
 
-def _natural(item: object) -> int:
+def _natural(item: Any) -> int:
     if not isinstance(item, int) or item < 0:
         raise ProtocolError(f"{item!r} is not a number from 0")
     return item
+
+
+_READERS: tuple[Callable[..., Message], ...] = (
+    lambda version, token: Hello(_natural(version), str(token)),
+    _request,
+    _welcome,
+    lambda pin, state, edge, time: Changed(_natural(pin), _pin(*state), bool(edge), float(time)),
+    lambda number: Done(_natural(number)),
+    lambda number, why: Refused(_natural(number), str(why)),
+)
+"""In the order of _KINDS."""

@@ -1,0 +1,355 @@
+"""A process's connection to a board: operations in, the mirrored pins and edges out.
+
+Blocking, for any thread; one reader thread keeps the mirror. When no server answers, one is started; when it
+dies, the next one is, and what was not yet acknowledged is sent again: the caller notices nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.errors import BoardError
+from minirospy.gpio.model import Function, Operation, Pin, Setup, Write
+from minirospy.gpio.place import Place
+from minirospy.gpio.protocol import (
+    VERSION,
+    Changed,
+    Done,
+    Hello,
+    Message,
+    ProtocolError,
+    Refused,
+    Request,
+    Stream,
+    Welcome,
+    serialize,
+)
+
+if TYPE_CHECKING:
+    import subprocess
+
+__all__ = ["Edge", "Link"]
+
+START_PATIENCE = 15.0
+"""Seconds for a server to start; a loaded small machine needs two or three."""
+
+ANSWER_PATIENCE = 20.0
+"""Seconds for an answer: longer than a dead server takes to be replaced."""
+
+CLOSE_PATIENCE = 0.5
+"""Seconds that close() waits until the last outputs have arrived."""
+
+MAX_UNACKNOWLEDGED = 10_000
+"""Requests under way; beyond, an output waits for the server."""
+
+
+class Edge(NamedTuple):
+    """Pin ``pin`` (BCM) went to ``level`` at ``time`` (Unix seconds)."""
+
+    pin: int
+    level: int
+    time: float
+
+
+class Link:
+    """One connection. ``levels`` mirrors every pin's level and is always the same list: reading it is the
+    fast way to read a pin. ``on_edge`` is called on the reader thread, for every edge on the board.
+
+    Raises BoardError when no server can be started.
+    """
+
+    def __init__(self, place: Place, on_edge: Callable[[Edge], None] | None = None) -> None:
+        self._place = place
+        self._on_edge = on_edge
+        # Re-entrant: a signal handler (a node's shutdown hook) may set pins while its thread is in here.
+        self._news = threading.Condition(threading.RLock())
+        self._number = 0
+        self._acknowledged = 0
+        self._unacknowledged: deque[tuple[int, bytes]] = deque()
+        self._written: dict[int, int] = {}
+        self._refused: dict[int, str] = {}
+        self._mine: set[int] = set()
+        self._failure: BoardError | None = None
+        self._closed = False
+        self._connection: _Connection | None = _reach(place, lambda: False)
+        self.states: list[Pin] = list(self._connection.pins)
+        self.levels: list[int] = [pin.level for pin in self.states]
+        self._reader = threading.Thread(target=self._read, name="gpio-mirror", daemon=True)
+        self._reader.start()
+
+    def call(self, operation: Operation | None, timeout: float = ANSWER_PATIENCE) -> None:
+        """Carry ``operation`` out; when this returns, the mirror shows it. None only waits for what was sent.
+
+        Raises BoardError when the board refuses or does not answer within ``timeout`` seconds.
+        """
+        with self._news:
+            number = self._send(operation)
+            if isinstance(operation, Setup):
+                self._mine.add(operation.pin)
+            answered = self._news.wait_for(lambda: self._acknowledged >= number or self._failure, timeout)
+            if self._failure is not None:
+                raise self._failure
+            if number in self._refused:
+                raise BoardError(self._refused.pop(number))
+            if not answered:
+                raise BoardError(f"the virtual board [{self._place.name}] does not answer")
+
+    def write(self, levels: Sequence[tuple[int, int]]) -> None:
+        """Set the latches of output pins, in order, without waiting; the mirror shows it at once."""
+        with self._news:
+            if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
+                self.call(None)
+            number = self._send(Write(levels))
+            for pin, level in levels:
+                if self.states[pin].function is Function.OUT:
+                    self.levels[pin] = level
+                    self._written[pin] = number
+
+    def close(self) -> None:
+        """Wait shortly for the last outputs, then hang up. The pins stay as they are."""
+        if self._closed:
+            return
+        with contextlib.suppress(BoardError):
+            self.call(None, CLOSE_PATIENCE)
+        with self._news:
+            self._closed = True
+            if self._connection is not None:
+                self._connection.hang_up()
+        if threading.current_thread() is not self._reader:
+            self._reader.join(CLOSE_PATIENCE)
+
+    def _send(self, operation: Operation | None) -> int:
+        if self._closed:
+            raise BoardError(f"the connection to the virtual board [{self._place.name}] is closed")
+        if self._failure is not None:
+            raise self._failure
+        self._number += 1
+        data = serialize(Request(self._number, operation))
+        self._unacknowledged.append((self._number, data))
+        if self._connection is not None:
+            self._connection.send(data)
+        return self._number
+
+    def _read(self) -> None:
+        connection = self._connection
+        while connection is not None:
+            for messages in connection.incoming():
+                with self._news:
+                    edges = [edge for message in messages if (edge := self._take(message))]
+                    self._news.notify_all()
+                self._report(edges)
+            connection.hang_up()
+            connection = self._reconnect()
+
+    def _reconnect(self) -> _Connection | None:
+        with self._news:
+            self._connection = None
+        if self._closed:
+            return None
+        try:
+            connection = _reach(self._place, lambda: self._closed)
+        except BoardError as error:
+            with self._news:
+                self._failure = error
+                self._news.notify_all()
+            return None
+        with self._news:
+            if self._closed:
+                connection.hang_up()
+                return None
+            now = time.time()
+            edges = []
+            # A server that was killed may not have saved its last changes: what this process set up is set
+            # up again, with the levels that it last knew.
+            for pin in sorted(self._mine):
+                state = self.states[pin]
+                latch = state.latch if state.function is Function.OUT else None
+                connection.send(serialize(Request(0, Setup(pin, state.function, state.pull, latch))))
+            for pin, state in enumerate(connection.pins):
+                if pin not in self._mine:
+                    edge = self._take(Changed(pin, state, state.level != self.states[pin].level, now))
+                    edges += [edge] if edge else []
+            for _number, data in self._unacknowledged:
+                connection.send(data)
+            self._connection = connection
+        self._report(edges)
+        return connection
+
+    def _take(self, message: Message) -> Edge | None:
+        """Mirror one message (under the lock); the edge that it tells of."""
+        if isinstance(message, Changed):
+            self.states[message.pin] = message.state
+            level = message.state.level
+            # News from before our own latest write would take it back for a moment.
+            if message.pin not in self._written:
+                self.levels[message.pin] = level
+            return Edge(message.pin, level, message.time) if message.edge else None
+        if isinstance(message, Refused):
+            self._refused[message.number] = message.why
+            self._acknowledge(message.number)
+        elif isinstance(message, Done):
+            self._acknowledge(message.number)
+        return None
+
+    def _acknowledge(self, number: int) -> None:
+        self._acknowledged = max(self._acknowledged, number)
+        while self._unacknowledged and self._unacknowledged[0][0] <= number:
+            self._unacknowledged.popleft()
+        for pin in [pin for pin, written in self._written.items() if written <= number]:
+            del self._written[pin]
+            self.levels[pin] = self.states[pin].level
+
+    def _report(self, edges: list[Edge]) -> None:
+        if self._on_edge is not None:
+            for edge in edges:
+                self._on_edge(edge)
+
+
+class _Connection:
+    """A socket on which the server has said Welcome: ``pins`` are those that it told of."""
+
+    def __init__(self, link: socket.socket, stream: Stream, pins: list[Pin], more: list[Message]) -> None:
+        self._socket = link
+        self._stream = stream
+        self._more = more
+        self.pins = pins
+
+    def send(self, data: bytes) -> None:
+        # A server that died is noticed, and replaced, by the reader.
+        with contextlib.suppress(OSError):
+            self._socket.sendall(data)
+
+    def incoming(self) -> _Incoming:
+        return _Incoming(self._socket, self._stream, self._more)
+
+    def hang_up(self) -> None:
+        # shutdown first: it wakes the reader, a mere close would not.
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+
+class _Incoming:
+    """The batches of messages that arrive until the connection ends."""
+
+    def __init__(self, link: socket.socket, stream: Stream, more: list[Message]) -> None:
+        self._socket = link
+        self._stream = stream
+        self._more = more
+
+    def __iter__(self) -> _Incoming:
+        return self
+
+    def __next__(self) -> list[Message]:
+        if self._more:
+            more, self._more = self._more, []
+            return more
+        try:
+            data = self._socket.recv(65536)
+            if data:
+                return list(self._stream.feed(data))
+        except (OSError, ProtocolError):
+            pass
+        raise StopIteration
+
+
+def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
+    """Connect to the board's server; start one when none answers."""
+    place.prepare()
+    deadline = time.monotonic() + START_PATIENCE
+    process: subprocess.Popen[bytes] | None = None
+    pause = 0.004
+    while True:
+        connection = _connect(place)
+        if connection is not None:
+            return connection
+        status = None if process is None else process.poll()
+        if status or given_up() or time.monotonic() > deadline:
+            raise BoardError(f"the virtual board [{place.name}] does not start{_last_words(place)}")
+        if process is None or status is not None:
+            # Status 0 without an answer: it met a server that was just ending.
+            process = _start_server(place)
+        time.sleep(pause)
+        pause = min(pause * 1.3, 0.05)
+
+
+def _connect(place: Place) -> _Connection | None:
+    """The connection, after Hello and Welcome, or None when nobody answers."""
+    token = ""
+    try:
+        if sys.platform != "win32" and place.uses_unix_socket:
+            link = socket.socket(socket.AF_UNIX)
+            target: str | tuple[str, int] = str(place.socket_path)
+        else:
+            port, token = place.address_path.read_text().split()
+            link = socket.socket(socket.AF_INET)
+            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            target = ("127.0.0.1", int(port))
+    except (OSError, ValueError):
+        return None
+    try:
+        link.settimeout(5.0)
+        link.connect(target)
+        link.sendall(serialize(Hello(VERSION, token)))
+        stream = Stream()
+        messages: list[Message] = []
+        while not messages:
+            data = link.recv(65536)
+            if not data:
+                raise ConnectionResetError
+            messages += stream.feed(data)
+        link.settimeout(None)
+    except (OSError, ProtocolError):
+        link.close()
+        return None
+    welcome, *more = messages
+    if not isinstance(welcome, Welcome) or welcome.version != VERSION:
+        link.close()
+        raise BoardError(
+            f"the virtual board [{place.name}] is kept by another version of minirospy: end its users"
+        )
+    return _Connection(link, stream, welcome.pins, more)
+
+
+def _start_server(place: Place) -> subprocess.Popen[bytes]:
+    """A server process of its own session, which outlives this one as long as the board has users."""
+    import subprocess
+
+    if not sys.executable:
+        raise BoardError("the virtual board cannot be started: sys.executable is not set")
+    root = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
+    flags = 0
+    if sys.platform == "win32":
+        flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
+    with place.log_path.open("ab") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "minirospy.gpio.server", str(place.folder), place.name],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            cwd=place.folder,
+            env={**os.environ, "PYTHONPATH": path},
+            start_new_session=True,
+            creationflags=flags,
+        )
+    # Somebody must fetch its exit status, or a long-lived client keeps a zombie.
+    threading.Thread(target=process.wait, name="gpio-server-wait", daemon=True).start()
+    return process
+
+
+def _last_words(place: Place) -> str:
+    try:
+        lines = place.log_path.read_text(errors="replace").strip().splitlines()
+    except OSError:
+        return ""
+    return f": {lines[-1]} ({place.log_path})" if lines else ""

@@ -1,0 +1,236 @@
+"""The process that holds one board: `python -m minirospy.gpio.server FOLDER NAME`.
+
+The first client starts it and it ends by itself shortly after the last one left; a lock file lets exactly one
+live. The pins are written to a file when they change, so the next server goes on where this one stopped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import secrets
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from minirospy.gpio.model import BoardModel, OperationError, Pin
+from minirospy.gpio.place import Place
+from minirospy.gpio.protocol import (
+    VERSION,
+    Changed,
+    Done,
+    Hello,
+    Message,
+    ProtocolError,
+    Refused,
+    Request,
+    Stream,
+    Welcome,
+    decode_pins,
+    encode_pins,
+    serialize,
+)
+
+__all__ = ["main"]
+
+LINGER = 1.5
+"""Seconds that a board without clients waits for the next one."""
+
+SAVE_AFTER = 0.05
+"""Seconds from a change to its file: a fast blinker is written 20 times a second, not at each change."""
+
+MAX_UNSENT = 1 << 20
+"""Bytes that wait for a client that does not read; then it is dropped, and joins anew when it wakes up."""
+
+LOCK_PATIENCE = 5.0
+"""Seconds to wait for the lock of a server that is about to end."""
+
+
+def main(argv: list[str]) -> int:
+    """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
+    place = Place(argv[1], Path(argv[0]))
+    with _locked(place) as owned:
+        if owned:
+            asyncio.run(_Server(place).serve())
+    return 0
+
+
+class _Server:
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._token = "" if place.uses_unix_socket else secrets.token_hex(16)
+        self._model = BoardModel(_saved(place))
+        self._clients: set[_Client] = set()
+        self._abandoned = asyncio.Event()
+        self._saving: asyncio.TimerHandle | None = None
+        self._leaving: asyncio.TimerHandle | None = None
+
+    async def serve(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._wait_for_clients()
+        if sys.platform != "win32" and self._place.uses_unix_socket:
+            self._place.socket_path.unlink(missing_ok=True)
+            server = await loop.create_unix_server(lambda: _Client(self), self._place.socket_path)
+            address = self._place.socket_path
+        else:
+            server = await loop.create_server(lambda: _Client(self), "127.0.0.1", 0)
+            address = self._place.address_path
+            _write_private(address, f"{server.sockets[0].getsockname()[1]} {self._token}".encode())
+        try:
+            await self._abandoned.wait()
+        finally:
+            server.close()
+            address.unlink(missing_ok=True)
+            for client in list(self._clients):
+                client.drop()
+            self._save()
+
+    def admits(self, hello: Hello) -> bool:
+        return secrets.compare_digest(hello.token.encode(), self._token.encode())
+
+    def join(self, client: _Client) -> None:
+        self._clients.add(client)
+        if self._leaving is not None:
+            self._leaving.cancel()
+        client.send(serialize(Welcome(VERSION, self._model.pins)))
+
+    def leave(self, client: _Client) -> None:
+        self._clients.discard(client)
+        if not self._clients:
+            self._wait_for_clients()
+
+    def carry_out(self, request: Request) -> Message:
+        """Apply and tell everybody; the answer is for the one who asked."""
+        if request.operation is None:
+            return Done(request.number)
+        try:
+            changes = self._model.apply(request.operation)
+        except OperationError as error:
+            return Refused(request.number, str(error))
+        if changes:
+            now = time.time()
+            news = b"".join(
+                serialize(Changed(change.pin, change.state, change.edge, now)) for change in changes
+            )
+            for client in list(self._clients):
+                client.send(news)
+            if self._saving is None:
+                self._saving = asyncio.get_running_loop().call_later(SAVE_AFTER, self._save)
+        return Done(request.number)
+
+    def _wait_for_clients(self) -> None:
+        if self._leaving is not None:
+            self._leaving.cancel()
+        self._leaving = asyncio.get_running_loop().call_later(LINGER, self._abandoned.set)
+
+    def _save(self) -> None:
+        if self._saving is not None:
+            self._saving.cancel()
+            self._saving = None
+        # A removed folder (a test's, a cleaned /tmp) is no reason to fail the clients.
+        with contextlib.suppress(OSError):
+            _write_private(self._place.state_path, encode_pins(self._model.pins))
+
+
+class _Client(asyncio.Protocol):
+    """One connection: reads messages, hands them on, writes answers."""
+
+    def __init__(self, server: _Server) -> None:
+        self._server = server
+        self._stream = Stream()
+        self._admitted = False
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        answers: list[Message] = []
+        try:
+            for message in self._stream.feed(data):
+                self._take(message, answers)
+        except ProtocolError:
+            self.drop()
+            return
+        # One Done speaks for all before it: a burst of outputs is answered once.
+        done = [answer for answer in answers if isinstance(answer, Done)]
+        refused = [answer for answer in answers if isinstance(answer, Refused)]
+        if answers:
+            self.send(b"".join(serialize(answer) for answer in [*refused, *done[-1:]]))
+
+    def _take(self, message: Message, answers: list[Message]) -> None:
+        if self._admitted and isinstance(message, Request):
+            answers.append(self._server.carry_out(message))
+        elif not self._admitted and isinstance(message, Hello) and self._server.admits(message):
+            self._admitted = True
+            self._server.join(self)
+        else:
+            raise ProtocolError("not now")
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._server.leave(self)
+
+    def send(self, data: bytes) -> None:
+        if self._transport is None or self._transport.is_closing():
+            return
+        self._transport.write(data)
+        if self._transport.get_write_buffer_size() > MAX_UNSENT:
+            self.drop()
+
+    def drop(self) -> None:
+        if self._transport is not None:
+            self._transport.abort()
+
+
+def _saved(place: Place) -> list[Pin] | None:
+    try:
+        return decode_pins(place.state_path.read_bytes())
+    except (OSError, ProtocolError):
+        return None
+
+
+def _write_private(path: Path, data: bytes) -> None:
+    """Replace ``path`` whole, readable by this user only."""
+    fresh = path.with_name(path.name + ".new")
+    fresh.unlink(missing_ok=True)
+    with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(data)
+    fresh.replace(path)
+
+
+@contextlib.contextmanager
+def _locked(place: Place) -> Iterator[bool]:
+    """Whether this process got the board's lock; waits a little for one that is about to end."""
+    deadline = time.monotonic() + LOCK_PATIENCE
+    with os.fdopen(os.open(place.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:
+        while not (owned := _try_lock(file.fileno())):
+            if time.monotonic() > deadline or _somebody_answers(place):
+                break
+            time.sleep(0.02)
+        yield owned
+
+
+def _try_lock(handle: int) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _somebody_answers(place: Place) -> bool:
+    return (place.socket_path if place.uses_unix_socket else place.address_path).exists()
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
