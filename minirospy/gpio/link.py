@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -228,38 +228,19 @@ class _Connection:
         with contextlib.suppress(OSError):
             self._socket.sendall(data)
 
-    def incoming(self) -> _Incoming:
-        return _Incoming(self._socket, self._stream, self._more)
+    def incoming(self) -> Iterator[list[Message]]:
+        """The batches of messages that arrive until the connection ends."""
+        if self._more:
+            yield self._more
+        with contextlib.suppress(OSError, ProtocolError):
+            while data := self._socket.recv(65536):
+                yield list(self._stream.feed(data))
 
     def hang_up(self) -> None:
         # shutdown first: it wakes the reader, a mere close would not.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
-
-
-class _Incoming:
-    """The batches of messages that arrive until the connection ends."""
-
-    def __init__(self, link: socket.socket, stream: Stream, more: list[Message]) -> None:
-        self._socket = link
-        self._stream = stream
-        self._more = more
-
-    def __iter__(self) -> _Incoming:
-        return self
-
-    def __next__(self) -> list[Message]:
-        if self._more:
-            more, self._more = self._more, []
-            return more
-        try:
-            data = self._socket.recv(65536)
-            if data:
-                return list(self._stream.feed(data))
-        except (OSError, ProtocolError):
-            pass
-        raise StopIteration
 
 
 def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
@@ -314,9 +295,7 @@ def _connect(place: Place) -> _Connection | None:
     welcome, *more = messages
     if not isinstance(welcome, Welcome) or welcome.version != VERSION:
         link.close()
-        raise BoardError(
-            f"the virtual board [{place.name}] is kept by another version of minirospy: end its users"
-        )
+X
     return _Connection(link, stream, welcome.pins, more)
 
 

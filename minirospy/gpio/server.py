@@ -111,9 +111,8 @@ class _Server:
             return Refused(request.number, str(error))
         if changes:
             now = time.time()
-            news = b"".join(
-                serialize(Changed(change.pin, change.state, change.edge, now)) for change in changes
-            )
+            changed = [Changed(change.pin, change.state, change.edge, now) for change in changes]
+            news = b"".join(serialize(message) for message in changed)
             for client in list(self._clients):
                 client.send(news)
             if self._saving is None:
@@ -156,8 +155,8 @@ class _Client(asyncio.Protocol):
             self.drop()
             return
         # One Done speaks for all before it: a burst of outputs is answered once.
-        done = [answer for answer in answers if isinstance(answer, Done)]
-        refused = [answer for answer in answers if isinstance(answer, Refused)]
+        done: list[Message] = [answer for answer in answers if isinstance(answer, Done)]
+        refused: list[Message] = [answer for answer in answers if isinstance(answer, Refused)]
         if answers:
             self.send(b"".join(serialize(answer) for answer in [*refused, *done[-1:]]))
 

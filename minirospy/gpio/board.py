@@ -1,0 +1,131 @@
+"""The virtual board for programs that play the world: press its buttons, look at its lights.
+
+::
+
+    with Board() as board:
+        board.press(11)
+        for edge in board.watch([7], timeout=1.0):
+            print(edge.pin, edge.level)
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from types import TracebackType
+
+from minirospy.errors import BoardError
+from minirospy.gpio.link import Edge, Link
+from minirospy.gpio.model import PINS, Force, Pin, Press, Release
+from minirospy.gpio.place import Place
+
+__all__ = ["Board", "BoardState", "Edge"]
+
+
+@dataclass(frozen=True)
+class BoardState:
+    """The board at one moment: ``pins[n]`` is BCM pin n (function, pull, level, ...)."""
+
+    name: str
+    pins: tuple[Pin, ...]
+
+    def level(self, pin: int) -> int:
+        """The level of ``pin``: 0 or 1."""
+        return self.pins[pin].level
+
+
+class Board:
+    """The board ``name`` (default: MINIROSPY_BOARD, else "default"), started when it is not there yet.
+
+    For any thread. Pins are BCM numbers, 0 to 53. Every method raises BoardError on a pin that does not
+    exist and on a board that does not answer.
+    """
+
+    def __init__(self, name: str | None = None) -> None:
+        place = Place.find(name)
+        self._watchers: list[queue.SimpleQueue[Edge]] = []
+        self._lock = threading.Lock()
+        self.name = place.name
+        self._link = Link(place, self._spread)
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def press(self, pin: int) -> None:
+        """Push the button at ``pin``, until :meth:`release`.
+
+        The wired buttons (11, 12) then read 1; a button at any other pin reads 1 too, unless the pin has its
+        pull-up on: then it connects to ground and reads 0.
+        """
+        self._link.call(Press(pin))
+
+    def release(self, pin: int) -> None:
+        """Let go of the button at ``pin``; a level that :meth:`set` put there goes too."""
+        self._link.call(Release(pin))
+
+    def set(self, pin: int, level: int) -> None:
+        """Drive an input to ``level`` (0 or 1) from outside; set an output as a second program would."""
+        self._link.call(Force(pin, level))
+
+    def get(self, pin: int) -> int:
+        """The level of ``pin``: 0 or 1."""
+        return self._link.levels[_checked(pin)]
+
+    def levels(self) -> dict[int, int]:
+        """BCM pin -> level, of all pins."""
+        return dict(enumerate(self._link.levels))
+
+    def state(self) -> BoardState:
+        """A snapshot that does not change any more."""
+        return BoardState(self.name, tuple(self._link.states))
+
+    def watch(self, pins: Iterable[int] | None = None, timeout: float | None = None) -> Iterator[Edge]:
+        """The edges of ``pins`` (default: all) from this call on, as they come.
+
+        Ends when ``timeout`` seconds have passed in all (None: never).
+        """
+        chosen = None if pins is None else frozenset(_checked(pin) for pin in pins)
+        arrived: queue.SimpleQueue[Edge] = queue.SimpleQueue()
+        with self._lock:
+            self._watchers.append(arrived)
+        deadline = None if timeout is None else time.monotonic() + timeout
+        return self._edges(arrived, chosen, deadline)
+
+    def close(self) -> None:
+        """Hang up; the pins stay as they are. Once or often."""
+        self._link.close()
+
+    def _edges(
+        self, arrived: queue.SimpleQueue[Edge], chosen: frozenset[int] | None, deadline: float | None
+    ) -> Iterator[Edge]:
+        try:
+            while True:
+                left = None if deadline is None else max(0.0, deadline - time.monotonic())
+                try:
+                    edge = arrived.get(timeout=left)
+                except queue.Empty:
+                    return
+                if chosen is None or edge.pin in chosen:
+                    yield edge
+        finally:
+            with self._lock:
+                self._watchers.remove(arrived)
+
+    def _spread(self, edge: Edge) -> None:
+        with self._lock:
+            for watcher in self._watchers:
+                watcher.put(edge)
+
+
+def _checked(pin: int) -> int:
+    if not (isinstance(pin, int) and 0 <= pin < PINS):
+        raise BoardError(f"there is no pin {pin!r}: BCM numbers are 0 to {PINS - 1}")
+    return pin
