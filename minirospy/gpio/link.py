@@ -295,7 +295,7 @@ def _connect(place: Place) -> _Connection | None:
     welcome, *more = messages
     if not isinstance(welcome, Welcome) or welcome.version != VERSION:
         link.close()
-X
+        raise BoardError(f"the virtual board [{place.name}] is in use by another version of minirospy")
     return _Connection(link, stream, welcome.pins, more)
 
 
