@@ -1,0 +1,45 @@
+"""`python -m minirospy.idl [SOURCE [TARGET]]`: compile definitions into Python modules.
+
+SOURCE is a folder of packages (default: minirospy's own ``msgs``), TARGET the folder that gets them (default:
+minirospy's own overlay).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.cli.command import Parser, run
+from minirospy.idl.load import Catalogue, write_package
+
+__all__ = ["main"]
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status as in minirospy.cli.command."""
+    parser = Parser(prog="python -m minirospy.idl", description="Compile definitions into Python modules.")
+    parser.add_argument("source", nargs="?", type=Path, help="a folder of packages with msg, srv, action folders")
+    parser.add_argument("target", nargs="?", type=Path, help="the folder that gets the Python packages")
+
+    def body() -> None:
+        options = parser.parse_args(argv)
+        own = next(p for p in (_PACKAGE.parent / "msgs", _PACKAGE / "share" / "msgs") if p.is_dir())
+        catalogue = Catalogue.below(*([options.source] if options.source else []), own)
+        chosen = Catalogue.below(options.source or own).packages
+        if not chosen:
+            parser.error(f"no package with a msg, srv or action folder below {options.source}")
+        written = [
+            path
+            for package in chosen
+            for path in write_package(catalogue, package, options.target or _PACKAGE / "overlay")
+        ]
+        print(f"{len(chosen)} packages, {len(written)} modules written")
+
+    return run("minirospy.idl", lambda: body())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,238 @@
+"""Definitions on disk and classes in memory: finding, compiling, importing.
+
+A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes come from the generated modules, or are made from
+a full text at run time.
+"""
+
+from __future__ import annotations
+
+import importlib
+import linecache
+import sys
+import types
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from minirospy.errors import DefinitionError, NotFoundError
+from minirospy.idl.spec import ActionSpec, MessageSpec, ServiceSpec
+
+__all__ = [
+    "Catalogue",
+    "class_from_text",
+    "get_message_class",
+    "get_service_class",
+    "message_class",
+    "service_class",
+    "write_package",
+]
+
+_SEPARATOR = "=" * 80
+
+
+class Catalogue:
+    """The definitions below some folders: package name -> package folder. Specs are parsed once."""
+
+    def __init__(self, packages: dict[str, Path]) -> None:
+        self.packages = packages
+        self._specs: dict[str, MessageSpec] = {}
+
+    @classmethod
+    def below(cls, *roots: Path) -> Catalogue:
+        """Every folder in ``roots`` that holds definitions; an earlier root hides a later one's package."""
+        found: dict[str, Path] = {}
+        for root in roots:
+            for folder in sorted(root.iterdir()) if root.is_dir() else []:
+                if any((folder / kind).is_dir() for kind in ("msg", "srv", "action")):
+                    found.setdefault(folder.name, folder)
+        return cls(found)
+
+    def message(self, full_name: str) -> MessageSpec:
+        """The spec of ``pkg/Name``. Raises NotFoundError, DefinitionError."""
+        if full_name not in self._specs:
+            self._specs[full_name] = self._parse_message(full_name)
+        return self._specs[full_name]
+
+    def messages(self, package: str) -> list[MessageSpec]:
+        """All messages of a package, those of its actions included, by name."""
+        folder = self.packages[package]
+        names = {path.stem for path in (folder / "msg").glob("*.msg")}
+        for action in self.actions(package):
+            names |= {message.name for message in action.messages}
+        return [self.message(f"{package}/{name}") for name in sorted(names)]
+
+    def services(self, package: str) -> list[ServiceSpec]:
+        """All services of a package, by name."""
+        from minirospy.idl.parse import parse_service
+
+        return [
+            parse_service(path.read_text(encoding="utf-8"), package, path.stem, str(path))
+            for path in sorted((self.packages[package] / "srv").glob("*.srv"))
+        ]
+
+    def actions(self, package: str) -> list[ActionSpec]:
+        """All actions of a package, by name."""
+        from minirospy.idl.parse import parse_action
+
+        found = []
+        for path in sorted((self.packages[package] / "action").glob("*.action")):
+            action = parse_action(path.read_text(encoding="utf-8"), package, path.stem, str(path))
+            self._specs.update({message.full_name: message for message in action.messages})
+            found.append(action)
+        return found
+
+    def _parse_message(self, full_name: str) -> MessageSpec:
+        from minirospy.idl.parse import parse_message
+
+        package, _, name = full_name.partition("/")
+        folder = self.packages.get(package)
+        if folder is None:
+            raise NotFoundError("package", package, self.packages, f"it should define [{full_name}]")
+        path = folder / "msg" / f"{name}.msg"
+        if not path.is_file():
+            self.actions(package)
+            if full_name in self._specs:
+                return self._specs[full_name]
+            known = [f"{package}/{other.stem}" for other in (folder / "msg").glob("*.msg")]
+            raise NotFoundError("message type", full_name, known)
+        return parse_message(path.read_text(encoding="utf-8"), package, name, str(path))
+
+
+def write_package(catalogue: Catalogue, package: str, root: Path) -> list[Path]:
+    """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
+
+    A file whose text would be the same is left alone. Raises DefinitionError, NotFoundError.
+    """
+    from minirospy.idl.emit import emit_message, emit_package, emit_service
+
+    sources: dict[str, str] = {}
+    msgs: dict[str, list[str]] = {}
+    for message in catalogue.messages(package):
+        sources[f"msg/_{message.name}.py"] = emit_message(message, catalogue.message)
+        msgs[f"_{message.name}"] = [message.name]
+    srvs: dict[str, list[str]] = {}
+    for service in catalogue.services(package):
+        sources[f"srv/_{service.name}.py"] = emit_service(service, catalogue.message)
+        srvs[f"_{service.name}"] = [service.name, service.request.name, service.response.name]
+    for kind, modules in (("msg", msgs), ("srv", srvs)):
+        if modules:
+            sources[f"{kind}/__init__.py"] = emit_package(package, kind, modules)
+    folder = root / package
+    if not (folder / "__init__.py").exists():
+        sources["__init__.py"] = f'"""{package}: generated by minirospy from its definitions."""\n'
+    written = []
+    for name, source in sources.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_text(encoding="utf-8") != source:
+            path.write_text(source, encoding="utf-8")
+            written.append(path)
+    return written
+
+
+def get_message_class(name: str) -> Any:
+    """The class of ``pkg/Name``, or None where no module defines it."""
+    return _imported(name, "msg")
+
+
+def get_service_class(name: str) -> Any:
+    """The class of the service ``pkg/Name``, or None where no module defines it."""
+    return _imported(name, "srv")
+
+
+def message_class(name: str) -> Any:
+    """The class of ``pkg/Name``. Raises NotFoundError with the nearest names."""
+    found = get_message_class(name)
+    if found is None:
+        raise NotFoundError("message type", name, _known("msg"), "types are written package/Type")
+    return found
+
+
+def service_class(name: str) -> Any:
+    """The class of the service ``pkg/Name``. Raises NotFoundError with the nearest names."""
+    found = get_service_class(name)
+    if found is None:
+        raise NotFoundError("service type", name, _known("srv"), "types are written package/Type")
+    return found
+
+
+@lru_cache(maxsize=256)
+def class_from_text(full_name: str, text: str) -> Any:
+    """A message class from a full text, as a publisher sends it, for a type that is not installed.
+
+    Raises DefinitionError.
+    """
+    from minirospy.idl.emit import emit_message
+    from minirospy.idl.parse import parse_message
+
+    specs: dict[str, MessageSpec] = {}
+    for number, part in enumerate(text.split(_SEPARATOR + "\n")):
+        name, body = full_name, part
+        if number:
+            head, _, body = part.partition("\n")
+            name = head.removeprefix("MSG:").strip()
+        package, _, short = name.partition("/")
+        specs.setdefault(name, parse_message(body, package, short))
+
+    def lookup(name: str) -> MessageSpec:
+        if name not in specs:
+            raise DefinitionError(full_name, 1, f"the full text lacks [{name}]")
+        return specs[name]
+
+    made: dict[str, Any] = {}
+
+    def make(name: str) -> Any:
+        """Run the generated source; its imports of other types find those made here."""
+        if name not in made:
+            for field in lookup(name).fields:
+                if not field.type.is_primitive:
+                    make(field.type.base)
+            source = emit_message(lookup(name), lookup)
+            made[name] = _run(source, name, made)
+        return made[name]
+
+    return make(full_name)
+
+
+def _run(source: str, name: str, made: dict[str, Any]) -> Any:
+    file = f"<generated {name}>"
+    module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
+    kept = []
+    for line in source.split("\n"):
+        if line.startswith("from ") and ".msg._" in line:
+            package, _, rest = line.removeprefix("from ").partition(".msg._")
+            short = rest.split(" ", 1)[0]
+            module.__dict__[line.rsplit(" as ", 1)[1]] = made[f"{package}/{short}"]
+            line = ""  # noqa: PLW2901 - the line number stays what the traceback shows
+        kept.append(line)
+    text = "\n".join(kept)
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    exec(compile(text, file, "exec"), module.__dict__)
+    return module.__dict__[name.partition("/")[2]]
+
+
+def _imported(name: str, kind: str) -> Any:
+    package, separator, short = name.partition("/")
+    if package == "Header" and not separator and kind == "msg":
+        package, short = "std_msgs", "Header"
+    if not short or "/" in short:
+        return None
+    try:
+        module = importlib.import_module(f"{package}.{kind}")
+    except ModuleNotFoundError as error:
+        if error.name and not f"{package}.{kind}".startswith(error.name):
+            raise
+        return None
+    found = getattr(module, short, None)
+    return found if hasattr(found, "_md5sum") and hasattr(found, "_type") else None
+
+
+def _known(kind: str) -> Iterable[str]:
+    """The types of all packages on sys.path that hold generated modules."""
+    for entry in sys.path:
+        folder = Path(entry or ".")
+        for module in folder.glob(f"*/{kind}/_*.py"):
+            if module.stem != "__init__":
+                yield f"{module.parent.parent.name}/{module.stem[1:]}"
+

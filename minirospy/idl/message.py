@@ -1,0 +1,441 @@
+"""What generated messages stand on: the base class, checks, the text of a message, and filling from values.
+
+The names and rules are genpy's, since user code relies on them: http://docs.ros.org/api/genpy/html/.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from minirospy.errors import (
+    DeserializationError,
+    MessageException,
+    SerializationError,
+)
+from minirospy.times import Duration, Time, TVal
+
+__all__ = [
+    "DeserializationError",
+    "Message",
+    "MessageException",
+    "SerializationError",
+    "args_kwds_to_message",
+    "check_type",
+    "fill_message_args",
+    "get_printable_message_args",
+    "strify_message",
+]
+
+_INTEGERS = {
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)},
+    "byte": (-128, 128),
+    "char": (0, 256),
+}
+_PLAIN = re.compile(r"^[A-Za-z_/][A-Za-z0-9_/.]*$", re.ASCII)
+_NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
+_ESCAPES = {
+    "\0": "\\0", "\a": "\\a", "\b": "\\b", "\t": "\\t", "\n": "\\n", "\v": "\\v", "\f": "\\f", "\r": "\\r",
+    "\x1b": "\\e", '"': '\\"', "\\": "\\\\", "\x85": "\\N", "\xa0": "\\_", "\u2028": "\\L", "\u2029": "\\P",
+}  # fmt: skip
+
+
+class Message:
+    """The base of all messages. Subclasses have ``_type``, ``_md5sum``, ``_full_text``, ``_slot_types``."""
+
+    __slots__ = ["_connection_header"]
+    _slot_types: list[str] = []
+    _connection_header: dict[str, str]
+
+    def __init__(self, *args: Any, **kwds: Any) -> None:
+        """All fields in order, or some by name; None stands for a field's default.
+
+        Raises TypeError on a wrong number of values, AttributeError on a name that is not a field.
+        """
+        if args and kwds:
+            raise TypeError("Message constructor may only use args OR keywords, not both")
+        names = self.__slots__
+        if args:
+            if len(args) != len(names):
+                raise TypeError(
+                    f"Invalid number of arguments, args should be {list(names)!s} args are{args}"
+                )
+            for name, value in zip(names, args, strict=True):
+                setattr(self, name, value)
+            return
+        for name in kwds:
+            if name not in names:
+                raise AttributeError(f"{name} is not an attribute of {type(self).__name__}")
+        for name in names:
+            setattr(self, name, kwds.get(name))
+
+    def serialize(self, buff: Any) -> None:
+        """Write this message to ``buff``."""
+
+    def deserialize(self, str: Any) -> Message:
+        """Read this message from bytes."""
+        return self
+
+    def __getstate__(self) -> list[Any]:
+        return [getattr(self, name) for name in self.__slots__]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        for name, value in zip(self.__slots__, state, strict=True):
+            setattr(self, name, value)
+
+    def _get_types(self) -> list[str]:
+        return self._slot_types
+
+    def _check_types(self, exc: Exception | None = None) -> None:
+        """Raise SerializationError on the first field whose value does not fit; else for ``exc`` itself."""
+        for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
+            check_type(name, type_, getattr(self, name))
+        if exc is not None:
+            raise SerializationError(str(exc))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return False
+        return all(getattr(self, name) == getattr(other, name) for name in self.__slots__)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        return strify_message(self)
+
+    __repr__ = __str__
+
+
+def check_type(field_name: str, field_type: str, field_val: Any) -> None:
+    """Raise SerializationError unless the value fits a field of this type (``int8``, ``string[]``, ``pkg/Name``)."""
+    if field_type.endswith("]"):
+        _check_array(field_name, field_type.partition("[")[0], field_val)
+    elif field_type in _CHECKS:
+        _CHECKS[field_type](field_name, field_type, field_val)
+    elif not hasattr(field_val, "_type") or not hasattr(field_val, "_check_types"):
+        raise SerializationError(f"field {field_name} must be a [{field_type}] instance instead of a {type(field_val)}")
+    else:
+        if field_val._type != field_type:
+            raise SerializationError(f"field {field_name} must be of type [{field_type}]")
+        for name, type_ in zip(field_val.__slots__, field_val._slot_types, strict=True):
+            check_type(f"{field_name}.{name}", type_, getattr(field_val, name))
+
+
+def args_kwds_to_message(data_class: type[Any], args: Sequence[Any], kwds: Mapping[str, Any]) -> Any:
+    """The message that publish() or a service call was given: itself, or made from field values.
+
+    Raises TypeError or AttributeError where they do not fit.
+    """
+    if args and kwds:
+        raise TypeError("publish() can be called with arguments or keywords, but not both.")
+    if kwds:
+        return data_class(**kwds)
+    if not args:
+        return data_class()
+    if len(args) == 1:
+        only = args[0]
+        if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
+            return only
+        if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
+            raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")  # type: ignore[attr-defined]
+        if isinstance(only, list | tuple) and len(data_class.__slots__) != 1:
+            return data_class(*only)
+    return data_class(*args)
+
+
+def fill_message_args(msg: Any, msg_args: Any, keys: Mapping[str, Any] | None = None) -> None:
+    """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
+
+    ``keys`` are words that stand for values ("now", "auto"). Raises MessageException where a name or a number
+    of values does not fit, ValueError on values that cannot be fields.
+    """
+    if not hasattr(msg, "_slot_types"):
+        raise ValueError(f"msg must be a Message instance: {msg}")
+    words = keys or {}
+    if isinstance(msg_args, dict):
+        msg_args = [msg_args] if msg_args else [{}]
+    elif not isinstance(msg_args, list | tuple):
+        raise ValueError(f"invalid msg_args type: {msg_args}")
+    if len(msg_args) == 1 and isinstance(msg_args[0], dict):
+        _fill(msg, msg_args[0], words, "")
+    elif len(msg_args) == 1 and msg_args[0] is None and not msg.__slots__:
+        return
+    else:
+        _fill(msg, list(msg_args), words, "")
+
+
+def get_printable_message_args(msg: Any, buff: Any = None, prefix: str = "") -> str:
+    """The names of a message's fields in order, nested ones with dots."""
+    found: list[str] = []
+
+    def walk(current: Any, path: str) -> None:
+        for name in current.__slots__:
+            value = getattr(current, name)
+            if hasattr(value, "_slot_types") and not isinstance(value, TVal):
+                walk(value, f"{path}{name}.")
+            else:
+                found.append(path + name)
+
+    walk(msg, prefix)
+    return " ".join(found)
+
+
+def strify_message(
+    val: Any,
+    indent: str = "",
+    time_offset: Any = None,
+    current_time: Any = None,
+    field_filter: Callable[[Any], Sequence[str]] | None = None,
+    fixed_numeric_width: int | None = None,
+) -> str:
+    """The text of a value as `rostopic echo` prints it: YAML.
+
+    ``field_filter`` chooses the fields of a message; ``fixed_numeric_width`` pads numbers;
+    ``time_offset`` is taken off times.
+    """
+    if isinstance(val, bool) or val is None:
+        return str(val)
+    if isinstance(val, int | float):
+        return _number(val, fixed_numeric_width)
+    if isinstance(val, str):
+        return _quoted(val) if val else "''"
+    if isinstance(val, TVal):
+        return _time_text(val, indent, time_offset)
+    if isinstance(val, bytes | bytearray | memoryview):
+        return str(val)
+    options = (time_offset, current_time, field_filter, fixed_numeric_width)
+    if isinstance(val, list | tuple):
+        return _list_text(val, indent, options)
+    if hasattr(val, "tolist"):
+        return _list_text(val.tolist(), indent, options)
+    if hasattr(val, "_slot_types"):
+        return _message_text(val, indent, options)
+    return str(val)
+
+
+# --- text
+
+
+def _message_text(message: Any, indent: str, options: tuple[Any, ...]) -> str:
+    field_filter = options[2]
+    names = field_filter(message) if field_filter else message.__slots__
+    types = dict(zip(message.__slots__, message._slot_types, strict=True))
+    lines = []
+    for name in names:
+        value = getattr(message, name)
+        type_ = types[name]
+        if type_.startswith(("uint8[", "char[")) and isinstance(value, bytes | bytearray | memoryview):
+            # Bytes are numbers to the reader.
+            value = list(value)
+        lines.append(f"{indent}{name}: {strify_message(value, indent + '  ', *options)}")
+    text = "\n".join(lines)
+    return "\n" + text if indent else text
+
+
+def _list_text(values: Sequence[Any], indent: str, options: tuple[Any, ...]) -> str:
+    if not values:
+        return "[]"
+    first = values[0]
+    if isinstance(first, int | float):
+        width = options[3]
+        return "[" + ", ".join(_number(value, width) for value in values) + "]"
+    if isinstance(first, str):
+        return "".join(f"\n{indent}- {_item(value)}" for value in values)
+    if isinstance(first, TVal) or hasattr(first, "_slot_types"):
+        inner = indent + "  "
+        return "".join(f"\n{indent}- {strify_message(value, inner, *options)}" for value in values)
+    return "".join(f"\n{indent}- {strify_message(value, '', *options)}" for value in values)
+
+
+def _time_text(value: TVal, indent: str, offset: Any) -> str:
+    if offset is not None and isinstance(value, Time):
+        value = value - offset
+    return f"\n{indent}secs: {value.secs}\n{indent}nsecs: {value.nsecs:>9}"
+
+
+def _number(value: Any, width: int | None) -> str:
+    if width is None or isinstance(value, bool):
+        return str(value)
+    if isinstance(value, float):
+        text = f"{value:.{max(width - 2, 0)}f}" if width else str(value)
+        return text[: max(width, text.find("."))]
+    return f"{value:{width}d}"
+
+
+def _quoted(text: str) -> str:
+    if text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
+        return f'"{text}"'
+    return '"' + "".join(_ESCAPES.get(c) or _escaped(c) for c in text) + '"'
+
+
+def _escaped(character: str) -> str:
+    if " " <= character <= "~":
+        return character
+    code = ord(character)
+    if code < 0x100:
+        return f"\\x{code:02X}"
+    return f"\\u{code:04X}" if code < 0x10000 else f"\\U{code:08X}"
+
+
+def _item(text: Any) -> str:
+    """A string in a list, as YAML writes it where it may leave quotes out."""
+    if not isinstance(text, str):
+        return str(text)
+    if _PLAIN.match(text) and text.lower() not in _NOT_PLAIN:
+        return text
+    import yaml
+
+    return str(yaml.dump(text, width=sys.maxsize)).removesuffix("\n").removesuffix("\n...")
+
+
+# --- checks
+
+
+def _check_bool(name: str, type_: str, value: Any) -> None:
+    if value not in (True, False, 0, 1):
+        raise SerializationError(f"field {name} is not a bool")
+
+
+def _check_integer(name: str, type_: str, value: Any) -> None:
+    low, high = _INTEGERS[type_]
+    if not hasattr(value, "__index__"):
+        raise SerializationError(f"field {name} must be an integer type")
+    if value < 0 <= low:
+        raise SerializationError(f"field {name} must be unsigned integer type")
+    if not low <= value < high:
+        raise SerializationError(f"field {name} exceeds specified width [{type_}]")
+
+
+def _check_float(name: str, type_: str, value: Any) -> None:
+    if not isinstance(value, int | float) and not hasattr(value, "__float__"):
+        raise SerializationError(f"field {name} must be float type")
+
+
+def _check_string(name: str, type_: str, value: Any) -> None:
+    if not isinstance(value, str | bytes):
+        raise SerializationError(f"field {name} must be of type bytes or an ascii string")
+
+
+def _check_time(name: str, type_: str, value: Any) -> None:
+    if not hasattr(value, "secs") or not hasattr(value, "nsecs"):
+        raise SerializationError(f"field {name} must be of type {type_.capitalize()}")
+
+
+_CHECKS: dict[str, Callable[[str, str, Any], None]] = {
+    "bool": _check_bool,
+    "string": _check_string,
+    "float32": _check_float,
+    "float64": _check_float,
+    "time": _check_time,
+    "duration": _check_time,
+    **dict.fromkeys(_INTEGERS, _check_integer),
+}
+
+
+def _check_array(name: str, base: str, value: Any) -> None:
+    if isinstance(value, bytes | bytearray | memoryview) and base in ("uint8", "char"):
+        return
+    if isinstance(value, str | bytes):
+        raise SerializationError(
+            f"field {name} must be a list or tuple type. Only uint8[] can be a string"
+        )
+    if not isinstance(value, list | tuple) and not hasattr(value, "__array__") and not hasattr(value, "tolist"):
+        raise SerializationError(f"field {name} must be a list or tuple type")
+    for item in value:
+        check_type(f"{name}[]", base, item)
+
+
+# --- filling
+
+
+def _takes(data_class: type[Any], only: Any) -> bool:
+    return len(data_class.__slots__) == 1 and data_class._slot_types[0] == getattr(only, "_type", None)
+
+
+def _fill(message: Any, values: Any, words: Mapping[str, Any], path: str) -> None:
+    if isinstance(values, dict):
+        types = dict(zip(message.__slots__, message._slot_types, strict=True))
+        for name, value in values.items():
+            if name not in types:
+                raise MessageException(f"No field name [{path}{name}]")
+            _fill_field(message, name, types[name], value, words, path)
+        return
+    if not isinstance(values, list | tuple):
+        raise ValueError(f"invalid msg_args type: {values}")
+    if len(values) != len(message.__slots__):
+        what = "Too many" if len(values) > len(message.__slots__) else "Not enough"
+        raise MessageException(
+            f"{what} arguments:\n * Given: {list(values)}\n * Expected: {list(message.__slots__)}"
+        )
+    for name, type_, value in zip(message.__slots__, message._slot_types, values, strict=True):
+        _fill_field(message, name, type_, value, words, path)
+
+
+def _fill_field(message: Any, name: str, type_: str, value: Any, words: Mapping[str, Any], path: str) -> None:
+    current = getattr(message, name)
+    if isinstance(current, TVal):
+        setattr(message, name, _filled_time(current, value, words))
+    elif hasattr(current, "_slot_types"):
+        if isinstance(value, str):
+            setattr(message, name, _word(value, words))
+        else:
+            _fill(current, value, words, f"{path}{name}.")
+    elif type_.endswith("]"):
+        setattr(message, name, _filled_array(name, type_, value, words, path))
+    else:
+        setattr(message, name, value)
+
+
+def _filled_array(name: str, type_: str, values: Any, words: Mapping[str, Any], path: str) -> Any:
+    base = type_.partition("[")[0]
+    if isinstance(values, bytes) and base in ("uint8", "char"):
+        return values
+    if not isinstance(values, list | tuple):
+        raise MessageException(
+            f"Field [{path}{name}] must be a list or tuple instead of: {type(values).__name__}"
+        )
+    if base in ("time", "duration"):
+        kind = Time if base == "time" else Duration
+        return [_filled_time(kind(), value, words) for value in values]
+    if base in _CHECKS:
+        return list(values)
+    from minirospy.idl.load import message_class
+
+    element_class = message_class(base)
+    filled = []
+    for value in values:
+        element = element_class()
+        _fill(element, value, words, f"{path}{name}[].")
+        filled.append(element)
+    return filled
+
+
+def _filled_time(current: TVal, value: Any, words: Mapping[str, Any]) -> Any:
+    match value:
+        case str():
+            return _word(value, words)
+        case {"secs": int(secs), "nsecs": int(nsecs)}:
+            return type(current)(secs, nsecs)
+        case {"secs": int(secs)} if len(value) == 1:
+            return type(current)(secs, current.nsecs)
+        case {"nsecs": int(nsecs)} if len(value) == 1:
+            return type(current)(current.secs, nsecs)
+        case [int(secs), int(nsecs)]:
+            return type(current)(secs, nsecs)
+        case bool():
+            pass
+        case int():
+            # A plain number is nanoseconds, as genpy has it.
+            return type(current)(0, value)
+        case TVal():
+            return value
+    raise ValueError(f"invalid msg_args type: {value}")
+
+
+def _word(word: str, words: Mapping[str, Any]) -> Any:
+    if word not in words:
+        raise MessageException(f"No key named [{word}]")
+    return words[word]

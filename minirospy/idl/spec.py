@@ -1,0 +1,110 @@
+"""The spec tree: what a .msg, .srv or .action text says."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+__all__ = ["PRIMITIVES", "ActionSpec", "Constant", "Field", "FieldType", "MessageSpec", "ServiceSpec"]
+
+PRIMITIVES = {
+    "bool": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+    "byte": "b",
+    "char": "B",
+    "time": "II",
+    "duration": "ii",
+    "string": "",
+}
+"""Primitive type -> its letters for ``struct``; a string has none."""
+
+
+class FieldType(NamedTuple):
+    """A field's type: a primitive or ``pkg/Name``; ``length`` of an array is None where it varies."""
+
+    base: str
+    is_array: bool = False
+    length: int | None = None
+
+    def __str__(self) -> str:
+        if not self.is_array:
+            return self.base
+        return f"{self.base}[{'' if self.length is None else self.length}]"
+
+    @property
+    def is_primitive(self) -> bool:
+        """Whether the base is one of PRIMITIVES."""
+        return self.base in PRIMITIVES
+
+    @property
+    def is_bytes(self) -> bool:
+        """Whether Python holds it as bytes."""
+        return self.is_array and self.base in ("uint8", "char")
+
+
+class Field(NamedTuple):
+    """A field, with its name as in the definition."""
+
+    name: str
+    type: FieldType
+
+
+class Constant(NamedTuple):
+    """A constant: its value, and its text as in the definition, which the md5sum counts."""
+
+    name: str
+    type: str
+    value: bool | int | float | str
+    text: str
+
+
+class MessageSpec(NamedTuple):
+    """A message."""
+
+    package: str
+    name: str
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...]
+    text: str
+
+    @property
+    def full_name(self) -> str:
+        """``pkg/Name``."""
+        return f"{self.package}/{self.name}"
+
+    @property
+    def has_header(self) -> bool:
+        """Whether it starts with a header that publishers fill in."""
+        return bool(self.fields) and self.fields[0] == Field("header", FieldType("std_msgs/Header"))
+
+
+class ServiceSpec(NamedTuple):
+    """A service."""
+
+    package: str
+    name: str
+    request: MessageSpec
+    response: MessageSpec
+    text: str
+
+    @property
+    def full_name(self) -> str:
+        """``pkg/Name``."""
+        return f"{self.package}/{self.name}"
+
+
+class ActionSpec(NamedTuple):
+    """An action: the seven messages that it stands for (http://wiki.ros.org/actionlib)."""
+
+    package: str
+    name: str
+    messages: tuple[MessageSpec, ...]
+    text: str

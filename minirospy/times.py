@@ -1,0 +1,200 @@
+"""Times and durations as ROS messages hold them: seconds and nanoseconds, normalised.
+
+Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+__all__ = ["Duration", "TVal", "Time"]
+
+_BILLION = 1_000_000_000
+_V = TypeVar("_V", bound="TVal")
+
+
+class TVal:
+    """What Time and Duration share: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalised."""
+
+    __slots__ = ["nsecs", "secs"]
+
+    def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
+        """``secs`` may be a float where ``nsecs`` is 0. Raises ValueError or TypeError."""
+        if isinstance(secs, float):
+            if nsecs:
+                raise ValueError("if secs is a float, nsecs cannot be set")
+            total = int(secs)
+            nsecs = round((secs - total) * 1e9)
+            secs = total
+        self.secs: int = int(secs)
+        self.nsecs: int = int(nsecs)
+        self.canon()
+
+    @classmethod
+    def from_sec(cls: type[_V], float_secs: float) -> _V:
+        """From seconds as a float."""
+        secs = int(float_secs)
+        return cls(secs, int((float_secs - secs) * 1e9))
+
+    def is_zero(self) -> bool:
+        """Whether it is zero."""
+        return not (self.secs or self.nsecs)
+
+    def set(self, secs: int, nsecs: int) -> None:
+        """Set both parts, as they are."""
+        self.secs = secs
+        self.nsecs = nsecs
+
+    def canon(self) -> None:
+        """Normalise, so that 0 <= nsecs < 1e9."""
+        if not 0 <= self.nsecs < _BILLION:
+            carry, self.nsecs = divmod(self.nsecs, _BILLION)
+            self.secs += carry
+
+    def to_sec(self) -> float:
+        """Seconds as a float."""
+        return self.secs + self.nsecs / 1e9
+
+    def to_nsec(self) -> int:
+        """Nanoseconds."""
+        return self.secs * _BILLION + self.nsecs
+
+    def __bool__(self) -> bool:
+        return bool(self.secs or self.nsecs)
+
+    def __hash__(self) -> int:
+        return hash(("time" if isinstance(self, Time) else "duration", self.secs, self.nsecs))
+
+    def __str__(self) -> str:
+        return str(self.to_nsec())
+
+    def __repr__(self) -> str:
+        return f"genpy.{type(self).__name__}[{self.to_nsec()}]"
+
+    def __getstate__(self) -> list[int]:
+        return [self.secs, self.nsecs]
+
+    def __setstate__(self, state: list[int]) -> None:
+        self.secs, self.nsecs = state
+
+    def _of(self: _V, nanoseconds: int) -> _V:
+        return type(self)(*divmod(nanoseconds, _BILLION))
+
+
+class Time(TVal):
+    """A point in time since the epoch; never negative."""
+
+    __slots__: list[str] = []
+
+    def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
+        super().__init__(secs, nsecs)
+        if self.secs < 0:
+            raise TypeError("time values must be positive")
+
+    def to_time(self) -> float:
+        """The same as ``to_sec``, as ``time.time()`` counts."""
+        return self.to_sec()
+
+    def __add__(self, other: Any) -> Time:
+        if not isinstance(other, Duration):
+            return NotImplemented
+        return self._of(self.to_nsec() + other.to_nsec())
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        if isinstance(other, Time):
+            return Duration(*divmod(self.to_nsec() - other.to_nsec(), _BILLION))
+        if isinstance(other, Duration):
+            return self._of(self.to_nsec() - other.to_nsec())
+        return NotImplemented
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Time) and self.to_nsec() == other.to_nsec()
+
+    def __lt__(self, other: Any) -> bool:
+        return self.to_nsec() < other.to_nsec() if isinstance(other, Time) else NotImplemented
+
+    def __le__(self, other: Any) -> bool:
+        return self.to_nsec() <= other.to_nsec() if isinstance(other, Time) else NotImplemented
+
+    def __gt__(self, other: Any) -> bool:
+        return self.to_nsec() > other.to_nsec() if isinstance(other, Time) else NotImplemented
+
+    def __ge__(self, other: Any) -> bool:
+        return self.to_nsec() >= other.to_nsec() if isinstance(other, Time) else NotImplemented
+
+    __hash__ = TVal.__hash__
+
+
+class Duration(TVal):
+    """A span of time; may be negative, then with negative ``secs`` and ``nsecs`` counted up."""
+
+    __slots__: list[str] = []
+
+    def __add__(self, other: Any) -> Any:
+        if isinstance(other, Duration):
+            return self._of(self.to_nsec() + other.to_nsec())
+        return NotImplemented
+
+    def __sub__(self, other: Any) -> Duration:
+        if isinstance(other, Duration):
+            return self._of(self.to_nsec() - other.to_nsec())
+        return NotImplemented
+
+    def __neg__(self) -> Duration:
+        return self._of(-self.to_nsec())
+
+    def __abs__(self) -> Duration:
+        return self._of(abs(self.to_nsec()))
+
+    def __mul__(self, factor: Any) -> Duration:
+        if isinstance(factor, int):
+            return self._of(self.to_nsec() * factor)
+        if isinstance(factor, float):
+            return type(self).from_sec(self.to_sec() * factor)
+        return NotImplemented
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        if isinstance(other, int | float):
+            return type(self).from_sec(self.to_sec() / float(other))
+        if isinstance(other, Duration):
+            return self.to_sec() / other.to_sec()
+        return NotImplemented
+
+    def __floordiv__(self, other: Any) -> Any:
+        if isinstance(other, int | float):
+            return type(self).from_sec(self.to_sec() // other)
+        if isinstance(other, Duration):
+            return int(self.to_sec() // other.to_sec())
+        return NotImplemented
+
+    def __mod__(self, other: Any) -> Duration:
+        if isinstance(other, Duration):
+            return self._of(self.to_nsec() % other.to_nsec())
+        return NotImplemented
+
+    def __divmod__(self, other: Any) -> tuple[int, Duration]:
+        if isinstance(other, Duration):
+            whole, rest = divmod(self.to_nsec(), other.to_nsec())
+            return whole, self._of(rest)
+        return NotImplemented
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Duration) and self.to_nsec() == other.to_nsec()
+
+    def __lt__(self, other: Any) -> bool:
+        return self.to_nsec() < other.to_nsec() if isinstance(other, Duration) else NotImplemented
+
+    def __le__(self, other: Any) -> bool:
+        return self.to_nsec() <= other.to_nsec() if isinstance(other, Duration) else NotImplemented
+
+    def __gt__(self, other: Any) -> bool:
+        return self.to_nsec() > other.to_nsec() if isinstance(other, Duration) else NotImplemented
+
+    def __ge__(self, other: Any) -> bool:
+        return self.to_nsec() >= other.to_nsec() if isinstance(other, Duration) else NotImplemented
+
+    __hash__ = TVal.__hash__

@@ -1,0 +1,45 @@
+"""Write golden.json: what real genpy says of every type in msgs/. Run it with real ROS 1's Python:
+
+/usr/bin/python3 tests/idl/make_golden.py
+"""
+
+import importlib
+import json
+from pathlib import Path
+
+HERE = Path(__file__).parent
+MSGS = HERE.parents[1] / "msgs"
+
+
+def types():
+    """kind, pkg/Name of every definition; the messages of an action are seven."""
+    for folder in sorted(MSGS.iterdir()):
+        for path in sorted(folder.glob("*/*.*")):
+            names = [path.stem]
+            kind = path.suffix[1:]
+            if kind == "action":
+                kind = "msg"
+                names = [path.stem + part for part in PARTS]
+            for name in names:
+                yield kind, folder.name + "/" + name
+
+
+PARTS = ["Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback"]
+
+
+def main():
+    golden = {"msg": {}, "srv": {}}
+    for kind, full_name in types():
+        package, name = full_name.split("/")
+        try:
+            found = getattr(importlib.import_module(package + "." + kind), name)
+        except (ImportError, AttributeError):
+            print("real ROS does not have", full_name)
+            continue
+        golden[kind][full_name] = found._md5sum
+    (HERE / "golden.json").write_text(json.dumps(golden, indent=1, sort_keys=True) + "\n")
+    print(sum(map(len, golden.values())), "types")
+
+
+if __name__ == "__main__":
+    main()
