@@ -1,0 +1,95 @@
+"""Edge detection: edges and the clock in, callbacks out, one after another on one thread.
+
+Debouncing is RPi.GPIO's: the first edge is reported, then the pin is deaf for the bounce time.
+"""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from enum import IntEnum
+
+__all__ = ["Callback", "CallbackThread", "Detector", "Slope"]
+
+Callback = Callable[[int], object]
+
+
+class Slope(IntEnum):
+    """Which edges count, with RPi.GPIO's numbers."""
+
+    RISING = 31
+    FALLING = 32
+    BOTH = 33
+
+
+class Detector:
+    """Watches one channel: decides which edges count and remembers that one did.
+
+    ``bouncetime`` is in seconds, None without debouncing.
+    """
+
+    def __init__(self, channel: int, slope: Slope, bouncetime: float | None) -> None:
+        self.channel = channel
+        self.slope = slope
+        self.callbacks: list[Callback] = []
+        self.active = True
+        self._bouncetime = bouncetime
+        self._last: float | None = None
+        self._occurred = threading.Event()
+
+    def see(self, level: int, now: float) -> bool:
+        """Whether an edge to ``level`` at ``now`` (seconds of a clock that never goes back) counts."""
+        if self.slope is not Slope.BOTH and (self.slope is Slope.RISING) != bool(level):
+            return False
+        if self._bouncetime is not None and self._last is not None and now - self._last <= self._bouncetime:
+            return False
+        self._last = now
+        self._occurred.set()
+        return True
+
+    def take(self) -> bool:
+        """Whether an edge counted since the last call."""
+        occurred = self._occurred.is_set()
+        self._occurred.clear()
+        return occurred
+
+    def wait(self, timeout: float | None) -> bool:
+        """Wait up to ``timeout`` seconds for an edge that counts."""
+        if timeout is not None or sys.platform != "win32":
+            return self._occurred.wait(timeout)
+        # Windows delivers Ctrl-C only between waits.
+        while not self._occurred.wait(0.2):
+            pass
+        return True
+
+
+class CallbackThread:
+    """Runs callbacks in the order of their edges; an exception of one is printed and the next one runs."""
+
+    def __init__(self) -> None:
+        self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="gpio-callbacks", daemon=True)
+        self._thread.start()
+
+    def schedule(self, detector: Detector) -> None:
+        """Run all callbacks of ``detector``, unless it is removed before its turn."""
+        self._due.put(detector)
+
+    def close(self) -> None:
+        """End the thread after the callback that runs now."""
+        self._due.put(None)
+        if threading.current_thread() is not self._thread:
+            self._thread.join(1.0)
+
+    def _run(self) -> None:
+        while (detector := self._due.get()) is not None:
+            for callback in list(detector.callbacks):
+                if not detector.active:
+                    break
+                try:
+                    callback(detector.channel)
+                except Exception:  # noqa: BLE001 - the user's code; RPi.GPIO prints and goes on, too
+                    traceback.print_exc()

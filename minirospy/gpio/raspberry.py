@@ -1,0 +1,30 @@
+"""Whether this computer is a Raspberry Pi, whose own pins the virtual board does not move."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+__all__ = ["model_name", "warn_of_missing_library"]
+
+_MODEL_FILE = Path("/proc/device-tree/model")
+
+
+def model_name(file: Path = _MODEL_FILE) -> str | None:
+    """The Raspberry Pi's model, or None on any other computer."""
+    try:
+        name = file.read_bytes().rstrip(b"\0").decode(errors="replace")
+    except OSError:
+        return None
+    return name if name.startswith("Raspberry Pi") else None
+
+
+def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
+    """One line on stderr when this is a Raspberry Pi: here only its virtual twin moves."""
+    name = model_name(file)
+    if name is not None:
+        print(
+            f"RPi.GPIO: this {name}'s own pins are not used, the virtual board is: "
+            "`pip install minirospy[pi]` brings the real library",
+            file=sys.stderr,
+        )

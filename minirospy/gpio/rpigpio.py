@@ -1,0 +1,545 @@
+"""What `import RPi.GPIO as GPIO` gives: the API of RPi.GPIO 0.7.1 on the virtual board.
+
+Names, defaults, error texts and warnings are RPi.GPIO's (https://sourceforge.net/p/raspberry-gpio-python/wiki/).
+The board is reached at the first call that needs it, not on import. Leaving the process leaves the pins as they
+are, as on hardware; only cleanup() resets them.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import threading
+import time
+import warnings
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+from minirospy.errors import BoardError
+from minirospy.gpio.events import Callback, CallbackThread, Detector, Slope
+from minirospy.gpio.link import Edge, Link
+from minirospy.gpio.model import PINS, Function, Pull, Setup
+from minirospy.gpio.place import Place
+
+__all__ = [
+    "BCM",
+    "BOARD",
+    "BOTH",
+    "FALLING",
+    "HARD_PWM",
+    "HIGH",
+    "I2C",
+    "IN",
+    "LOW",
+    "OUT",
+    "PUD_DOWN",
+    "PUD_OFF",
+    "PUD_UP",
+    "PWM",
+    "RISING",
+    "RPI_INFO",
+    "RPI_REVISION",
+    "SERIAL",
+    "SPI",
+    "UNKNOWN",
+    "VERSION",
+    "add_event_callback",
+    "add_event_detect",
+    "cleanup",
+    "event_detected",
+    "getmode",
+    "gpio_function",
+    "input",
+    "output",
+    "remove_event_detect",
+    "setmode",
+    "setup",
+    "setwarnings",
+    "wait_for_edge",
+]
+
+LOW, HIGH = 0, 1
+OUT, IN = int(Function.OUT), int(Function.IN)
+BOARD, BCM = 10, 11
+PUD_OFF, PUD_DOWN, PUD_UP = int(Pull.OFF), int(Pull.DOWN), int(Pull.UP)
+RISING, FALLING, BOTH = int(Slope.RISING), int(Slope.FALLING), int(Slope.BOTH)
+SERIAL, SPI, I2C, HARD_PWM, UNKNOWN = 40, 41, 42, 43, -1
+VERSION = "0.7.1"
+RPI_REVISION = 3
+RPI_INFO = {
+    "P1_REVISION": 3,
+    "REVISION": "0000",
+    "TYPE": "Virtual board",
+    "MANUFACTURER": "minirospy",
+    "PROCESSOR": "Unknown",
+    "RAM": "Unknown",
+}
+
+HEADER = {
+    3: 2,
+    5: 3,
+    7: 4,
+    8: 14,
+    10: 15,
+    11: 17,
+    12: 18,
+    13: 27,
+    15: 22,
+    16: 23,
+    18: 24,
+    19: 10,
+    21: 9,
+    22: 25,
+    23: 11,
+    24: 8,
+    26: 7,
+    29: 5,
+    31: 6,
+    32: 12,
+    33: 13,
+    35: 19,
+    36: 16,
+    37: 26,
+    38: 20,
+    40: 21,
+}
+"""Pin of the 40-pin header (BOARD numbering) -> BCM pin."""
+
+PWM_LIMIT = 50.0
+"""Hz: a faster PWM shows on the board with this frequency and its own duty cycle."""
+
+_NO_BOUNCETIME = -666
+
+
+class Gpio:
+    """One program's view of the board: its numbering mode, the pins that it set up, its events."""
+
+    def __init__(self, board: str | None = None) -> None:
+        self._board = board
+        self._lock = threading.RLock()
+        self._mode: int | None = None
+        self._warns = True
+        self._link: Link | None = None
+        self._levels: list[int] = []
+        self._directions: dict[int, int] = {}
+        # channel -> BCM pin of what is set up, for the two calls that must be fast.
+        self._readable: dict[int, int] = {}
+        self._writable: dict[int, int] = {}
+        self._detectors: dict[int, Detector] = {}
+        self._waiting: dict[int, Detector] = {}
+        self._callbacks: CallbackThread | None = None
+        self._waves: dict[int, weakref.ref[Wave]] = {}
+
+    def setmode(self, mode: int) -> None:
+        """Choose the numbering: BCM (chip) or BOARD (header)."""
+        if self._mode is not None and mode != self._mode:
+            raise ValueError("A different mode has already been set!")
+        if mode not in {BOARD, BCM}:
+            raise ValueError("An invalid mode was passed to setmode()")
+        self._mode = mode
+
+    def getmode(self) -> int | None:
+        """BCM, BOARD or None."""
+        return self._mode
+
+    def setwarnings(self, flag: bool) -> None:
+        """Whether RuntimeWarnings are given."""
+        self._warns = bool(flag)
+
+    def setup(
+        self, channel: int | Sequence[int], direction: int, pull_up_down: int = PUD_OFF, initial: int = -1
+    ) -> None:
+        """Make a channel, or several, an input or an output."""
+        if direction not in {IN, OUT}:
+            raise ValueError("An invalid direction was passed to setup()")
+        if direction == OUT and pull_up_down != PUD_OFF:
+            raise ValueError("pull_up_down parameter is not valid for outputs")
+        if direction == IN and initial != -1:
+            raise ValueError("initial parameter is not valid for inputs")
+        if pull_up_down not in {PUD_OFF, PUD_DOWN, PUD_UP}:
+            raise ValueError("Invalid value for pull_up_down - should be either PUD_OFF, PUD_UP or PUD_DOWN")
+        level = None if initial == -1 else int(bool(initial))
+        for one in _channels(channel):
+            self._set_up(one, direction, pull_up_down, level)
+
+    def output(self, channel: int | Sequence[int], value: int | bool | Sequence[int | bool]) -> None:
+        """Set output channels; one value serves them all."""
+        try:
+            # The usual case first: one channel, one value.
+            pin = self._writable[channel]  # type: ignore[index]
+            level = _level(value)
+        except (KeyError, TypeError):
+            self._output_several(channel, value)
+        else:
+            self._linked().write(((pin, level),))
+
+    def input(self, channel: int) -> int:
+        """The level of a channel that is set up, output or input: 0 or 1."""
+        try:
+            return self._levels[self._readable[channel]]
+        except (KeyError, TypeError):
+            self._pin(channel)
+            raise RuntimeError("You must setup() the GPIO channel first") from None
+
+    def gpio_function(self, channel: int) -> int:
+        """What the pin does now, whoever set it up: IN or OUT."""
+        pin = self._pin(channel)
+        return int(self._linked().states[pin].function)
+
+    def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
+        """Make what this program set up inputs again; without argument forget the numbering mode, too."""
+        with self._lock:
+            everything = channel is None
+            wanted = (
+                set(self._directions) if channel is None else {self._pin(one) for one in _channels(channel)}
+            )
+            mine = wanted & set(self._directions)
+            for pin in sorted(mine):
+                self._forget_events(pin)
+                self._linked().call(Setup(pin, IN))
+                self._directions.pop(pin, None)
+            for table in (self._readable, self._writable):
+                for one in [one for one, pin in table.items() if pin in mine]:
+                    del table[one]
+            if everything and mine:
+                self._mode = None
+        if not mine:
+            self._warn(
+                "No channels have been set up yet - nothing to clean up!  "
+                "Try cleaning up at the end of your program instead!"
+            )
+
+    def add_event_detect(
+        self,
+        gpio: int | None = None,
+        edge: int | None = None,
+        callback: Callback | None = None,
+        bouncetime: int = _NO_BOUNCETIME,
+        *,
+        channel: int | None = None,
+    ) -> None:
+        """Watch an input for edges; ``callback(channel)`` runs for each. ``bouncetime`` in ms."""
+        number = gpio if gpio is not None else channel
+        if number is None or edge is None:
+            raise TypeError("add_event_detect() needs a channel and an edge")
+        if callback is not None and not callable(callback):
+            raise TypeError("Parameter must be callable")
+        pin = self._input_pin(number)
+        detector = _detector(number, edge, bouncetime)
+        with self._lock:
+            if pin in self._detectors:
+                raise RuntimeError("Conflicting edge detection already enabled for this GPIO channel")
+            if callback is not None:
+                self._start_callbacks()
+                detector.callbacks.append(callback)
+            self._detectors[pin] = detector
+
+    def add_event_callback(self, gpio: int, callback: Callback) -> None:
+        """One more callback for a channel that add_event_detect watches."""
+        if not callable(callback):
+            raise TypeError("Parameter must be callable")
+        pin = self._input_pin(gpio)
+        with self._lock:
+            if pin not in self._detectors:
+                raise RuntimeError(
+                    "Add event detection using add_event_detect first before adding a callback"
+                )
+            self._start_callbacks()
+            self._detectors[pin].callbacks.append(callback)
+
+    def wait_for_edge(
+        self, channel: int, edge: int, bouncetime: int = _NO_BOUNCETIME, timeout: int = -1
+    ) -> int | None:
+        """Wait for an edge, up to ``timeout`` ms (-1: for ever); the channel, or None when time is up."""
+        pin = self._input_pin(channel)
+        detector = _detector(channel, edge, bouncetime)
+        if timeout <= 0 and timeout != -1:
+            raise ValueError("Timeout must be greater than 0")
+        with self._lock:
+            existing = self._detectors.get(pin)
+            if pin in self._waiting or (existing is not None and existing.callbacks):
+                raise RuntimeError("Conflicting edge detection events already exist for this GPIO channel")
+            self._waiting[pin] = detector
+        try:
+            return channel if detector.wait(None if timeout == -1 else timeout / 1000) else None
+        finally:
+            with self._lock:
+                self._waiting.pop(pin, None)
+
+    def event_detected(self, channel: int) -> bool:
+        """Whether an edge came since the last call."""
+        detector = self._detectors.get(self._pin(channel))
+        return detector is not None and detector.take()
+
+    def remove_event_detect(self, gpio: int) -> None:
+        """Stop watching a channel; callbacks that have not begun will not run."""
+        with self._lock:
+            self._forget_events(self._pin(gpio))
+
+    def close(self) -> None:
+        """Hang up; the pins stay, but for those with a running PWM, which go low."""
+        for reference in list(self._waves.values()):
+            wave = reference()
+            if wave is not None:
+                wave.stop()
+        with self._lock:
+            callbacks, self._callbacks = self._callbacks, None
+            link, self._link = self._link, None
+        if callbacks is not None:
+            callbacks.close()
+        if link is not None:
+            link.close()
+        atexit.unregister(self.close)
+
+    def output_pin(self, channel: int) -> int:
+        """The BCM pin of a channel, for a PWM; raises what PWM() raises."""
+        pin = self._pin(channel)
+        if pin in self._waves:
+            raise RuntimeError("A PWM object already exists for this GPIO channel")
+        if self._directions.get(pin) != OUT:
+            raise RuntimeError("You must setup() the GPIO channel as an output first")
+        return pin
+
+    def register_wave(self, wave: Wave) -> None:
+        """Remember who modulates a pin."""
+        self._waves[wave.pin] = weakref.ref(wave)
+
+    def unregister_wave(self, wave: Wave) -> None:
+        """The pin is free for another PWM."""
+        self._waves.pop(wave.pin, None)
+
+    def write(self, pin: int, level: int) -> None:
+        """Set the latch of a BCM pin."""
+        self._linked().write(((pin, level),))
+
+    def _linked(self) -> Link:
+        link = self._link
+        if link is not None:
+            return link
+        with self._lock:
+            if self._link is None:
+                self._link = Link(Place.find(self._board), self._on_edge)
+                self._levels = self._link.levels
+                atexit.register(self.close)
+            return self._link
+
+    def _pin(self, channel: int) -> int:
+        if self._mode is None:
+            raise RuntimeError(
+                "Please set pin numbering mode using GPIO.setmode(GPIO.BOARD) or GPIO.setmode(GPIO.BCM)"
+            )
+        if not isinstance(channel, int):
+            raise TypeError("Channel must be an integer")
+        pin = channel if self._mode == BCM else HEADER.get(channel, -1)
+        if not 0 <= pin < PINS:
+            raise ValueError("The channel sent is invalid on a Raspberry Pi")
+        return pin
+
+    def _input_pin(self, channel: int) -> int:
+        pin = self._pin(channel)
+        if self._directions.get(pin) != IN:
+            raise RuntimeError("You must setup() the GPIO channel as an input first")
+        return pin
+
+    def _set_up(self, channel: int, direction: int, pull: int, level: int | None) -> None:
+        pin = self._pin(channel)
+        link = self._linked()
+        if pin not in self._directions and link.states[pin].function is Function.OUT:
+            self._warn(
+                "This channel is already in use, continuing anyway.  "
+                "Use GPIO.setwarnings(False) to disable warnings."
+            )
+        if pin in {2, 3} and pull != PUD_OFF:
+            self._warn("A physical pull up resistor is fitted on this channel!")
+        link.call(Setup(pin, direction, pull, level))
+        with self._lock:
+            self._directions[pin] = direction
+            self._readable[channel] = pin
+            if direction == OUT:
+                self._writable[channel] = pin
+            else:
+                self._writable.pop(channel, None)
+
+    def _output_several(self, channel: Any, value: Any) -> None:
+        channels = _channels(channel)
+        values = list(value) if isinstance(value, (list, tuple)) else [value]
+        if len(values) == 1 and not isinstance(value, (list, tuple)):
+            values *= len(channels)
+        if len(channels) != len(values):
+            raise RuntimeError("Number of channels != number of values")
+        try:
+            levels = [_level(one) for one in values]
+        except TypeError:
+            raise ValueError(
+                "Value must be an integer/boolean or a list/tuple of integers/booleans"
+            ) from None
+        pins = [self._pin(one) for one in channels]
+        if any(self._directions.get(pin) != OUT for pin in pins):
+            raise RuntimeError("The GPIO channel has not been set up as an OUTPUT")
+        self._linked().write(list(zip(pins, levels, strict=True)))
+
+    def _forget_events(self, pin: int) -> None:
+        detector = self._detectors.pop(pin, None)
+        if detector is not None:
+            detector.active = False
+
+    def _start_callbacks(self) -> None:
+        if self._callbacks is None:
+            self._callbacks = CallbackThread()
+
+    def _on_edge(self, edge: Edge) -> None:
+        now = time.monotonic()
+        waiting = self._waiting.get(edge.pin)
+        if waiting is not None:
+            waiting.see(edge.level, now)
+        detector = self._detectors.get(edge.pin)
+        if detector is not None and detector.see(edge.level, now) and detector.callbacks:
+            callbacks = self._callbacks
+            if callbacks is not None:
+                callbacks.schedule(detector)
+
+    def _warn(self, text: str) -> None:
+        if self._warns:
+            # The line of the user's that called setup() or cleanup().
+            warnings.warn(text, RuntimeWarning, stacklevel=4 if text.startswith(("This", "A ")) else 3)
+
+
+class Wave:
+    """The square wave of one PWM, on a thread of its own."""
+
+    def __init__(self, gpio: Gpio, pin: int, frequency: float) -> None:
+        self.pin = pin
+        self._gpio = gpio
+        self._frequency = frequency
+        self._duty = 0.0
+        self._changed = threading.Event()
+        self._stopping = False
+        self._thread: threading.Thread | None = None
+        gpio.register_wave(self)
+
+    def set(self, *, duty: float | None = None, frequency: float | None = None) -> None:
+        """Change the duty cycle (percent) or the frequency (Hz)."""
+        if duty is not None:
+            if not 0.0 <= duty <= 100.0:
+                raise ValueError("dutycycle must have a value from 0.0 to 100.0")
+            self._duty = float(duty)
+        if frequency is not None:
+            if not frequency > 0.0:
+                raise ValueError("frequency must be greater than 0.0")
+            self._frequency = float(frequency)
+        self._changed.set()
+
+    def start(self) -> None:
+        """Begin; again after stop()."""
+        if self._thread is None:
+            self._stopping = False
+            self._gpio.register_wave(self)
+            self._thread = threading.Thread(target=self._run, name=f"gpio-pwm-{self.pin}", daemon=True)
+            self._thread.start()
+
+    def stop(self) -> None:
+        """End with the pin low; the pin is free for another PWM."""
+        thread, self._thread = self._thread, None
+        self._stopping = True
+        self._changed.set()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(1.0)
+        self._gpio.unregister_wave(self)
+
+    def _run(self) -> None:
+        # Without a board there is nothing to modulate any more.
+        with contextlib.suppress(BoardError):
+            while not self._stopping:
+                self._changed.clear()
+                period = 1.0 / min(self._frequency, PWM_LIMIT)
+                high = period * self._duty / 100.0
+                if high > 0.0:
+                    self._gpio.write(self.pin, 1)
+                    self._changed.wait(high if high < period else None)
+                if high < period and not self._stopping:
+                    self._gpio.write(self.pin, 0)
+                    self._changed.wait(period - high if high > 0.0 else None)
+            self._gpio.write(self.pin, 0)
+
+
+_gpio = Gpio()
+
+
+class PWM:
+    """Pulse width modulation of an output channel; ``frequency`` in Hz.
+
+    It ends with stop() or with the object, as RPi.GPIO's does: keep a reference.
+    """
+
+    def __init__(self, channel: int, frequency: float) -> None:
+        self._wave: Wave | None = None
+        pin = _gpio.output_pin(channel)
+        if not frequency > 0.0:
+            raise ValueError("frequency must be greater than 0.0")
+        self._wave = Wave(_gpio, pin, frequency)
+
+    def start(self, dutycycle: float) -> None:
+        """Begin with ``dutycycle`` percent."""
+        self.ChangeDutyCycle(dutycycle)
+        self._running.start()
+
+    def ChangeDutyCycle(self, dutycycle: float) -> None:  # noqa: N802 - RPi.GPIO's name
+        """0.0 to 100.0 percent."""
+        self._running.set(duty=dutycycle)
+
+    def ChangeFrequency(self, frequency: float) -> None:  # noqa: N802 - RPi.GPIO's name
+        """Hz, above 0.0."""
+        self._running.set(frequency=frequency)
+
+    def stop(self) -> None:
+        """The channel goes low."""
+        self._running.stop()
+
+    @property
+    def _running(self) -> Wave:
+        assert self._wave is not None
+        return self._wave
+
+    def __del__(self) -> None:
+        if self._wave is not None:
+            self._wave.stop()
+
+
+setmode = _gpio.setmode
+getmode = _gpio.getmode
+setwarnings = _gpio.setwarnings
+setup = _gpio.setup
+output = _gpio.output
+input = _gpio.input
+gpio_function = _gpio.gpio_function
+cleanup = _gpio.cleanup
+add_event_detect = _gpio.add_event_detect
+add_event_callback = _gpio.add_event_callback
+wait_for_edge = _gpio.wait_for_edge
+event_detected = _gpio.event_detected
+remove_event_detect = _gpio.remove_event_detect
+
+
+def _channels(channel: object) -> list[int]:
+    channels = list(channel) if isinstance(channel, (list, tuple)) else [channel]
+    if not all(isinstance(one, int) for one in channels):
+        raise ValueError("Channel must be an integer or list/tuple of integers")
+    return channels
+
+
+def _level(value: object) -> int:
+    if isinstance(value, int):
+        return 1 if value else 0
+    if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
+        raise TypeError("not a level")
+    # numpy.bool_ and its kin.
+    return 1 if value else 0
+
+
+def _detector(channel: int, edge: int, bouncetime: int) -> Detector:
+    if edge not in {RISING, FALLING, BOTH}:
+        raise ValueError("The edge must be set to RISING, FALLING or BOTH")
+    if bouncetime <= 0 and bouncetime != _NO_BOUNCETIME:
+        raise ValueError("Bouncetime must be greater than 0")
+    return Detector(channel, Slope(edge), None if bouncetime == _NO_BOUNCETIME else bouncetime / 1000)

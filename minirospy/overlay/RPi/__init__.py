@@ -1,0 +1,1 @@
+"""Raspberry Pi libraries: RPi.GPIO on the virtual board."""
