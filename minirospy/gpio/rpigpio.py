@@ -1,7 +1,7 @@
 """What `import RPi.GPIO as GPIO` gives: the API of RPi.GPIO 0.7.1 on the virtual board.
 
-Names, defaults, error texts and warnings are RPi.GPIO's (https://sourceforge.net/p/raspberry-gpio-python/wiki/).
-The board is reached at the first call that needs it, not on import. Leaving the process leaves the pins as they
+Names, defaults, error texts and warnings are RPi.GPIO's
+(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The board is reached at the first call that needs it, not on import. Leaving the process leaves the pins as they
 are, as on hardware; only cleanup() resets them.
 """
 
@@ -207,7 +207,8 @@ class Gpio:
         if not mine:
             self._warn(
                 "No channels have been set up yet - nothing to clean up!  "
-                "Try cleaning up at the end of your program instead!"
+                "Try cleaning up at the end of your program instead!",
+                depth=2,
             )
 
     def add_event_detect(
@@ -348,10 +349,11 @@ class Gpio:
         if pin not in self._directions and link.states[pin].function is Function.OUT:
             self._warn(
                 "This channel is already in use, continuing anyway.  "
-                "Use GPIO.setwarnings(False) to disable warnings."
+                "Use GPIO.setwarnings(False) to disable warnings.",
+                depth=3,
             )
         if pin in {2, 3} and pull != PUD_OFF:
-            self._warn("A physical pull up resistor is fitted on this channel!")
+            self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         link.call(Setup(pin, direction, pull, level))
         with self._lock:
             self._directions[pin] = direction
@@ -399,10 +401,10 @@ class Gpio:
             if callbacks is not None:
                 callbacks.schedule(detector)
 
-    def _warn(self, text: str) -> None:
+    def _warn(self, text: str, depth: int) -> None:
+        """Warn about the user's line, ``depth`` calls above this one."""
         if self._warns:
-            # The line of the user's that called setup() or cleanup().
-            warnings.warn(text, RuntimeWarning, stacklevel=4 if text.startswith(("This", "A ")) else 3)
+            warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
 
 
 class Wave:
@@ -522,7 +524,7 @@ remove_event_detect = _gpio.remove_event_detect
 
 
 def _channels(channel: object) -> list[int]:
-    channels = list(channel) if isinstance(channel, (list, tuple)) else [channel]
+    channels: list[Any] = list(channel) if isinstance(channel, (list, tuple)) else [channel]
     if not all(isinstance(one, int) for one in channels):
         raise ValueError("Channel must be an integer or list/tuple of integers")
     return channels

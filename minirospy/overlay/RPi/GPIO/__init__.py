@@ -1,4 +1,5 @@
 """RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
+# ruff: noqa: N999 - the name of the real package
 
 from minirospy.gpio.raspberry import warn_of_missing_library
 from minirospy.gpio.rpigpio import *  # noqa: F403
