@@ -6,13 +6,11 @@ it, by default one in the temporary folder that only this user may enter.
 
 from __future__ import annotations
 
-import getpass
 import os
 import re
 import socket
 import stat
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,7 +44,7 @@ class Place:
                 f"the board's name [{name}] may hold letters, digits, `_`, `-` and `.` (up to 60)"
             )
         given = environ.get("MINIROSPY_RUNTIME_DIR")
-        folder = Path(given) if given else Path(tempfile.gettempdir()) / f"minirospy-{_user()}"
+        folder = Path(given) if given else _usual_folder()
         return cls(name, folder.absolute())
 
     def prepare(self) -> None:
@@ -93,7 +91,13 @@ class Place:
         return self.folder / f"{self.name}.log"
 
 
-def _user() -> str:
+def _usual_folder() -> Path:
+    import tempfile
+
     if sys.platform != "win32":
-        return str(os.getuid())
-    return re.sub(r"[^A-Za-z0-9_.-]", "_", getpass.getuser())
+        user = str(os.getuid())
+    else:
+        import getpass
+
+        user = re.sub(r"[^A-Za-z0-9_.-]", "_", getpass.getuser())
+    return Path(tempfile.gettempdir()) / f"minirospy-{user}"

@@ -1,8 +1,8 @@
 """What `import RPi.GPIO as GPIO` gives: the API of RPi.GPIO 0.7.1 on the virtual board.
 
 Names, defaults, error texts and warnings are RPi.GPIO's
-(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The board is reached at the first call that needs it, not on import. Leaving the process leaves the pins as they
-are, as on hardware; only cleanup() resets them.
+(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The board is reached at the first call that needs it,
+not on import. Leaving the process leaves the pins as they are, as on hardware; only cleanup() resets them.
 """
 
 from __future__ import annotations
