@@ -37,38 +37,31 @@ class Picture:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from rich import box
+        from rich.console import Group
         from rich.panel import Panel
         from rich.table import Table
         from rich.text import Text
 
         on, off = ("(*)", "( )") if options.ascii_only else ("●", "○")
         down, up = ("[*]", "[ ]") if options.ascii_only else ("▣", "□")
-        grid = Table.grid(padding=(0, 2))
-        grid.add_row("LEDs", *(f"GPIO {pin}" for pin in LEDS))
-        lights = []
-        for pin, colour in LEDS.items():
-            lit = bool(self.state.level(pin))
-            lights.append(Text(on if lit else off, style=f"bold bright_{colour}" if lit else f"dim {colour}"))
-        grid.add_row("", *lights)
-        grid.add_row()
-        grid.add_row("Buttons", *(f"GPIO {pin}" for pin in BUTTONS))
-        buttons = []
-        for number, pin in enumerate(BUTTONS, 1):
-            pressed = bool(self.state.level(pin))
-            buttons.append(
-                Text(f"{down if pressed else up} {number}", style="bold reverse" if pressed else "")
-            )
-        grid.add_row("", *buttons)
+        lights = Table.grid(padding=(0, 2))
+        lights.add_row("LEDs   ", *(f"GPIO {pin}" for pin in LEDS))
+        lit = {pin: bool(self.state.level(pin)) for pin in LEDS}
+        styles = {pin: f"bold bright_{LEDS[pin]}" if lit[pin] else f"dim {LEDS[pin]}" for pin in LEDS}
+        lights.add_row("", *(Text(on if lit[pin] else off, style=styles[pin]) for pin in LEDS))
+        buttons = Table.grid(padding=(0, 2))
+        buttons.add_row("Buttons", *(f"GPIO {pin}" for pin in BUTTONS))
+        pressed = [bool(self.state.level(pin)) for pin in BUTTONS]
+        caps = [f"{down if is_down else up} {number}" for number, is_down in enumerate(pressed, 1)]
+        looks = ["bold reverse" if is_down else "" for is_down in pressed]
+        buttons.add_row("", *(Text(cap, style=look) for cap, look in zip(caps, looks, strict=True)))
         others = [
-            f"GPIO {number} {_function(pin)} {pin.level}"
+            f"GPIO {number}  {_function(pin)} {pin.level}"
             for number, pin in enumerate(self.state.pins)
             if number not in LEDS and number not in BUTTONS and pin != Pin()
         ]
-        if others:
-            grid.add_row()
-            grid.add_row("Others", Text("\n".join(others)))
         yield Panel(
-            grid,
+            Group(lights, "", buttons, *(["", *map(Text, others)] if others else [])),
             title=f"virtual board [{self.state.name}]".replace("[", "\\["),
             box=box.ASCII if options.ascii_only else box.ROUNDED,
             expand=False,
@@ -180,7 +173,7 @@ def _set(argv: Sequence[str]) -> None:
 
 
 def _watch(argv: Sequence[str]) -> None:
-    parser = Parser("minirospy board watch", description="Print a line `PIN LEVEL` whenever a level changes.")
+    parser = Parser("minirospy board watch", description="Print a line `PIN LEVEL` for each edge.")
     parser.add_argument("pin", nargs="*", type=int, help="BCM numbers (all pins)")
     parser.add_argument(
         "-n", dest="count", type=int, default=0, help="end after COUNT lines", metavar="COUNT"
