@@ -9,6 +9,7 @@ import _thread
 import atexit
 import contextlib
 import logging
+import os
 import signal
 import sys
 import threading
@@ -204,7 +205,7 @@ class NodeProcess:
             function()
         if not disable_rosout:
             log.start_rosout(self)
-        _log.debug("init_node, name[%s], pid[%s]", self.name, node.uri)
+        _log.debug("init_node, name[%s], pid[%s]", self.name, os.getpid())
 
     # --- ending
 

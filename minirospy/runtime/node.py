@@ -236,10 +236,13 @@ class Node:
             sock.close()
 
     async def _unregister_all(self) -> None:
-        with contextlib.suppress(MasterUnreachableError, RpcError):
-            for topic in self.publications:
-                await self.master("unregisterPublisher", topic, self.uri)
-            for topic in self.subscriptions:
-                await self.master("unregisterSubscriber", topic, self.uri)
-            for name in self.services:
-                await self.master("unregisterService", name, self.service_uri)
+        calls = [
+            *(("unregisterPublisher", topic, self.uri) for topic in self.publications),
+            *(("unregisterSubscriber", topic, self.uri) for topic in self.subscriptions),
+            *(("unregisterService", name, self.service_uri) for name in self.services),
+        ]
+        with contextlib.suppress(MasterUnreachableError):
+            for call in calls:
+                # One that the master never accepted must not keep the others registered.
+                with contextlib.suppress(RpcError):
+                    await self.master(*call)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
@@ -52,7 +52,11 @@ def start(command: list[str], uri: str, stack: str, **kwargs: object) -> subproc
 
 
 def stop(program: subprocess.Popen[str]) -> None:
-    """End a program, however it takes it."""
+    """End a program, however it takes it: the peers end with their input."""
+    if program.stdin:
+        program.stdin.close()
+        with suppress(subprocess.TimeoutExpired):
+            program.wait(3)
     for end in (program.terminate, program.kill):
         if program.poll() is not None:
             break

@@ -1,0 +1,44 @@
+"""Build hook: compiles ``msgs/`` into Python modules, and lays out what the wheel carries beside the package.
+
+An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
+checkout, where everything else lies already.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+
+class CompileDefinitions(BuildHookInterface):  # type: ignore[type-arg]
+    """Runs before each build of a wheel."""
+
+    PLUGIN_NAME = "custom"
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Write the generated modules; name what goes into the wheel."""
+        if self.target_name != "wheel":
+            return
+        root = Path(self.root)
+        sys.path.insert(0, self.root)
+        try:
+            from minirospy.idl.load import Catalogue, write_package
+        finally:
+            sys.path.remove(self.root)
+        overlay = root / "minirospy" / "overlay"
+        catalogue = Catalogue.below(root / "msgs")
+        for package in catalogue.packages:
+            write_package(catalogue, package, overlay)
+        if version == "editable":
+            return
+        for package in catalogue.packages:
+            build_data["artifacts"] += [f"minirospy/overlay/{package}/**/*.py"]
+        build_data["force_include"] |= {
+            str(root / "minirospy_overlay.pth"): "minirospy_overlay.pth",
+            str(root / "msgs"): "minirospy/share/msgs",
+            str(root / "rpi_feros"): "minirospy/share/rpi_feros",
+            str(root / "launch"): "minirospy/share/launch",
+        }
