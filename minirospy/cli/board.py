@@ -55,13 +55,13 @@ class Picture:
         caps = [f"{down if is_down else up} {number}" for number, is_down in enumerate(pressed, 1)]
         looks = ["bold reverse" if is_down else "" for is_down in pressed]
         buttons.add_row("", *(Text(cap, style=look) for cap, look in zip(caps, looks, strict=True)))
-        others = [
+        others: list[str | Text] = [
             f"GPIO {number}  {_function(pin)} {pin.level}"
             for number, pin in enumerate(self.state.pins)
             if number not in LEDS and number not in BUTTONS and pin != Pin()
         ]
         yield Panel(
-            Group(lights, "", buttons, *(["", *map(Text, others)] if others else [])),
+            Group(lights, "", buttons, *(["", *others] if others else [])),
             title=f"virtual board [{self.state.name}]".replace("[", "\\["),
             box=box.ASCII if options.ascii_only else box.ROUNDED,
             expand=False,

@@ -1,0 +1,29 @@
+#!/usr/bin/env python3
+"""Publish whether button 1 is pressed on /button_state, ten times a second."""
+
+import rospy
+from RPi import GPIO
+from std_msgs.msg import Bool
+
+BUTTON = 11  # BCM
+
+
+def main() -> None:
+    rospy.init_node("button_state_publisher", anonymous=True)
+    GPIO.setmode(GPIO.BCM)
+    GPIO.setup(BUTTON, GPIO.IN)
+    publisher = rospy.Publisher("/button_state", Bool, queue_size=10)
+    rate = rospy.Rate(10)  # Hz
+    try:
+        # In every turn, not only on a change: a subscriber that comes late learns the state, too.
+        while not rospy.is_shutdown():
+            publisher.publish(Bool(data=bool(GPIO.input(BUTTON))))
+            rate.sleep()
+    except rospy.ROSInterruptException:
+        pass  # Ctrl-C while it slept
+    finally:
+        GPIO.cleanup()
+
+
+if __name__ == "__main__":
+    main()
