@@ -10,8 +10,23 @@ from pathlib import Path
 import pytest
 
 
+@pytest.fixture(scope="session")
+def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Where the virtual boards of all tests live; in the end none is left running."""
+    folder = tmp_path_factory.mktemp("boards")
+    yield folder
+    if any(folder.iterdir()):
+        import psutil
+
+        servers = [p for p in psutil.process_iter(["cmdline"]) if str(folder) in (p.info["cmdline"] or ())]
+        _, left = psutil.wait_procs(servers, timeout=10)
+        assert not left, f"board servers without clients: {left}"
+
+
 @pytest.fixture(autouse=True)
-def _own_environment(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def _own_environment(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _board_folder: Path
+) -> Iterator[None]:
     """No ROS variable of the outside gets in; files go to a temporary folder, sockets to loopback."""
     home: Path = tmp_path_factory.mktemp("ros")
     for name in list(os.environ):
@@ -23,6 +38,7 @@ def _own_environment(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pyte
     # A port on which nothing listens: a test that forgets its own master fails at once.
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
+    monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
     yield
 
