@@ -1,0 +1,176 @@
+"""Where ROS packages lie, and what can be run in them.
+
+ROS_PACKAGE_PATH comes first, then what minirospy brings along: so a workspace's package hides ours of the same
+name. Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from minirospy.environment import Environment
+from minirospy.errors import MinirospyError, NotFoundError
+
+__all__ = ["NotExecutableError", "Packages"]
+
+_MANIFEST = "package.xml"
+_IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
+_NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
+_PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
+_OURS = Path(__file__).parents[1]
+
+
+class NotExecutableError(MinirospyError):
+    """A file of that name is there, but it is neither Python nor executable."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.path = path
+
+    def __str__(self) -> str:
+        return f"{self.path} is not executable: chmod +x {self.path}"
+
+
+class Packages:
+    """The packages that an environment sees. A package's name is that in its package.xml."""
+
+    def __init__(self, environment: Environment | None = None) -> None:
+        environment = environment or Environment.read()
+        self._roots = (*environment.package_path, *_built_in_roots())
+        self._crawls: dict[Path, list[Path]] = {}
+
+    def find(self, name: str) -> Path:
+        """The folder of a package. Raises NotFoundError with the nearest names."""
+        for root in self._roots:
+            # Where a folder is named as its package, nothing else need be read.
+            if _package_name(root / name) == name:
+                return root / name
+            for folder in self._crawled(root):
+                if _package_name(folder) == name:
+                    return folder
+        raise NotFoundError(
+            "package", name, self.folders(), "ROS_PACKAGE_PATH names the folders that are searched"
+        )
+
+    def names(self) -> list[str]:
+        """The names of all packages, sorted."""
+        return sorted(self.folders())
+
+    def folders(self) -> dict[str, Path]:
+        """Every package and its folder."""
+        found: dict[str, Path] = {}
+        for root in self._roots:
+            for folder in self._crawled(root):
+                found.setdefault(_package_name(folder) or folder.name, folder)
+        return found
+
+    def executables(self, package: str) -> list[str]:
+        """The names that `rosrun package` can run, sorted."""
+        folder = self.find(package)
+        return sorted({path.name for path in _files(folder) if _is_program(path)})
+
+    def find_executable(self, package: str, name: str) -> list[str]:
+        """The command that runs a package's program. Python runs in this interpreter, whatever ``env`` finds.
+
+        Raises NotFoundError with the nearest names, NotExecutableError.
+        """
+        folder = self.find(package)
+        candidates = [folder / name] if "/" in name else [path for path in _files(folder) if path.name == name]
+        candidates = [path for path in candidates if path.is_file()]
+        for path in candidates:
+            if _is_python(path):
+                return [sys.executable, str(path)]
+            if os.access(path, os.X_OK):
+                return [str(path)]
+        if candidates:
+            raise NotExecutableError(candidates[0])
+        raise NotFoundError(
+            "executable",
+            name,
+            self.executables(package),
+            f"package [{package}] is in {folder}",
+        )
+
+    def find_resource(self, package: str, name: str) -> Path:
+        """A file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
+        folder = self.find(package)
+        if (folder / name).is_file():
+            return folder / name
+        for path in _files(folder):
+            if path.name == name:
+                return path
+        same_kind = [path.name for path in _files(folder) if path.suffix == Path(name).suffix]
+        raise NotFoundError("file", name, same_kind, f"package [{package}] is in {folder}")
+
+    def _crawled(self, root: Path) -> list[Path]:
+        if root not in self._crawls:
+            self._crawls[root] = list(_crawl(root))
+        return self._crawls[root]
+
+
+def _built_in_roots() -> tuple[Path, ...]:
+    """What minirospy brings along: beside the package in a checkout, in its ``share`` when installed."""
+    share = _OURS / "share"
+    base = share if share.is_dir() else _OURS.parent
+    return (base / "msgs", base / "rpi_feros", base / "launch")
+
+
+def _crawl(root: Path) -> Iterator[Path]:
+    """The package folders at or below ``root``, as rospack searches: not inside a package, not in hidden folders."""
+    if (root / _MANIFEST).is_file():
+        yield root
+        return
+    try:
+        entries = sorted(os.scandir(root), key=lambda entry: entry.name)
+    except OSError:
+        return
+    if any(entry.name in _IGNORE for entry in entries):
+        return
+    for entry in entries:
+        if entry.is_dir() and not entry.name.startswith("."):
+            yield from _crawl(Path(entry.path))
+
+
+def _package_name(folder: Path) -> str | None:
+    try:
+        text = (folder / _MANIFEST).read_bytes()
+    except OSError:
+        return None
+    match = _NAME.search(text)
+    return match[1].decode("utf-8", "replace") if match else None
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """The files of a package: its own folder first, then devel/lib of its workspace, where builds put programs."""
+    for path, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith(".") and name != "__pycache__")
+        for name in sorted(names):
+            yield Path(path, name)
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
+        built = Path(prefix, "lib", _package_name(folder) or folder.name)
+        if prefix and built.is_dir():
+            yield from (path for path in sorted(built.iterdir()) if path.is_file())
+
+
+def _is_program(path: Path) -> bool:
+    if path.name in ("setup.py", "__init__.py"):
+        return False
+    return _is_python(path) if path.suffix == ".py" else os.access(path, os.X_OK) and _starts_like_program(path)
+
+
+def _is_python(path: Path) -> bool:
+    if path.suffix == ".py":
+        return True
+    with path.open("rb") as file:
+        return bool(_PYTHON_LINE.match(file.readline(200)))
+
+
+def _starts_like_program(path: Path) -> bool:
+    if sys.platform == "win32":
+        return path.suffix.lower() in (".exe", ".bat", ".cmd")
+    with path.open("rb") as file:
+        return file.read(2) in (b"#!", b"\x7fE", b"\xcf\xfa", b"\xca\xfe")
