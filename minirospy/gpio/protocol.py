@@ -123,7 +123,7 @@ class Stream:
             self._unpacker.feed(data)
             for item in self._unpacker:
                 yield _message(item)
-        except (ValueError, TypeError, IndexError, msgpack.exceptions.UnpackException) as error:
+        except (ValueError, TypeError, LookupError, msgpack.exceptions.UnpackException) as error:
             raise ProtocolError(f"not a message of a board: {error}") from error
 
 

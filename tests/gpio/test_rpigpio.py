@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import threading
 import time
 import warnings
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from minirospy.gpio import rpigpio as GPIO
+from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
 from minirospy.gpio.board import Board
 from minirospy.gpio.rpigpio import Gpio, Wave
 
@@ -42,10 +43,10 @@ def test_constants() -> None:
 
 
 def test_import_by_its_real_name() -> None:
-    from RPi import GPIO as facade
+    import RPi.GPIO
 
-    assert facade.BCM == 11
-    assert facade.setup == GPIO.setup
+    assert RPi.GPIO.BCM == 11
+    assert RPi.GPIO.setup == GPIO.setup
 
 
 MODE = "Please set pin numbering mode using GPIO.setmode(GPIO.BOARD) or GPIO.setmode(GPIO.BCM)"
@@ -213,7 +214,7 @@ def test_warning_about_a_pin_that_another_program_uses(bcm: Gpio) -> None:
 
 
 def test_warning_about_the_pull_up_of_i2c(bcm: Gpio) -> None:
-    with pytest.warns(RuntimeWarning, match="^A physical pull up resistor is fitted on this channel!$"):
+    with pytest.warns(RuntimeWarning, match=r"^A physical pull up resistor is fitted on this channel!$"):
         bcm.setup(3, GPIO.IN, pull_up_down=GPIO.PUD_UP)
 
 
@@ -262,9 +263,9 @@ def test_callback_of_a_press(bcm: Gpio, board: Board, keyword: str) -> None:
     board.press(11)
     assert second.wait(5)
     assert seen == [(11, 1)]
-    with pytest.raises(RuntimeError, match="^Conflicting edge detection already enabled for this GPIO chan"):
+    with pytest.raises(RuntimeError, match=r"^Conflicting edge detection already enabled for this GPIO chan"):
         bcm.add_event_detect(11, GPIO.RISING)
-    with pytest.raises(RuntimeError, match="^Conflicting edge detection events already exist for this GPIO"):
+    with pytest.raises(RuntimeError, match=r"^Conflicting edge detection events already exist for this GPIO"):
         bcm.wait_for_edge(11, GPIO.RISING)
     bcm.remove_event_detect(11)
     bcm.add_event_detect(11, GPIO.RISING)
@@ -314,7 +315,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     bcm.setup(7, GPIO.OUT)
     edges = board.watch([7], timeout=10)
     wave = Wave(bcm, bcm.output_pin(7), 20)
-    with pytest.raises(RuntimeError, match="^A PWM object already exists for this GPIO channel$"):
+    with pytest.raises(RuntimeError, match=r"^A PWM object already exists for this GPIO channel$"):
         bcm.output_pin(7)
     with pytest.raises(ValueError, match=r"^dutycycle must have a value from 0\.0 to 100\.0$"):
         wave.set(duty=101)
@@ -323,7 +324,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     wave.set(duty=30)
     wave.start()
     heard = [next(edges) for _ in range(11)]
-    high = [after.time - edge.time for edge, after in zip(heard, heard[1:], strict=False) if edge.level]
+    high = [after.time - edge.time for edge, after in itertools.pairwise(heard) if edge.level]
     assert sorted(high)[len(high) // 2] == pytest.approx(0.015, abs=0.008)
     wave.set(duty=100)
     deadline = time.monotonic() + 5
