@@ -92,7 +92,10 @@ class NotFoundError(MinirospyError):
         self.kind = kind
         self.name = name
         self.hint = hint
-        self.nearest: list[str] = difflib.get_close_matches(name, sorted(set(known)), n=3, cutoff=0.5)
+        names = sorted(set(known))
+        # A name without its package or namespace is what people forget most.
+        tails = [each for each in names if each.rpartition("/")[2] == name]
+        self.nearest: list[str] = tails[:3] or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
 
     def __str__(self) -> str:
         text = f"{self.kind} [{self.name}] not found"
@@ -223,7 +226,7 @@ class ValueTextError(MinirospyError):
 
     def __str__(self) -> str:
         shown = " ".join(self.text.split())
-        return f"[{shown if len(shown) <= 60 else shown[:57] + '...'}]: {self.why}"
+        return f"'{shown if len(shown) <= 60 else shown[:57] + '...'}': {self.why}"
 
 
 class ROSException(Exception):

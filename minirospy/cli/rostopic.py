@@ -483,8 +483,11 @@ def _read_text(file: str) -> str:
 
 
 def _warn_other_type(graph: Graph, topic: str, type_: str) -> None:
+    state = graph.state()
+    # The master remembers the type of a topic that everybody has left: that one is free.
+    used = topic in state.publishers or topic in state.subscribers
     other = graph.master.get_topic_types().get(topic, "*")
-    if other not in ("*", type_):
+    if used and other not in ("*", type_):
         print(f"WARNING: topic [{topic}] is of type [{other}] already, not [{type_}]", file=sys.stderr)
 
 

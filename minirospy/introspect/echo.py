@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import UsageError
@@ -68,10 +69,12 @@ class Echo:
 
     def message(self, received: Received) -> Any:
         """The message in what was received. Raises NotFoundError where it has no such field."""
+        from minirospy.idl.load import get_message_class
+
         message = self._classes.read(received)
         if type(message) is not self._checked:
             self._checked = type(message)
-            if type(message).__module__ != "minirospy.idl.load":
+            if get_message_class(message._type) is type(message):
                 field_type(type(message), self._path)
         return message
 
@@ -82,7 +85,7 @@ class Echo:
 
     def _row(self, value: Any, received: Received) -> str:
         stamped = getattr(value, "_has_header", False)
-        nanoseconds = value.header.stamp.to_nsec() if stamped else int(received.time * 1e9)
+        nanoseconds = value.header.stamp.to_nsec() if stamped else received.nanoseconds
         header = ""
         if not self._header_written:
             self._header_written = True
@@ -106,38 +109,50 @@ def fill_message(cls: type[Any], values: Sequence[Any]) -> Any:
     Raises MessageException where they do not fit, with the names of the fields that there are.
     """
     now = Time.from_sec(_now())
-    from minirospy.errors import MessageException
     from minirospy.idl.load import get_message_class
 
     keys: dict[str, Any] = {"now": now}
     header = get_message_class("std_msgs/Header")
     if header is not None:
         keys["auto"] = header(stamp=now)
-    try:
-        message = fill(cls(), values, keys)
-        serialize(message)
-    except MessageException as error:
-        text = " ".join(str(error).split())
-        raise MessageException(f"{text}; [{cls._type}] has {' '.join(cls.__slots__)}") from error
+    message = fill(cls(), values, keys)
+    serialize(message)
     return message
 
 
 def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
-    """``value`` with a note in the place of strings or arrays; inner messages are changed in place."""
+    """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays."""
     if type_.endswith("]") or isinstance(value, list | tuple):
         element = type_.partition("[")[0]
         if not arrays or (element == "string" and not strings):
             return f"<array type: {element}, length: {len(value)}>"
-        if value and hasattr(value[0], "_slot_types"):
+        if len(value) and hasattr(value[0], "_slot_types"):
             return [_elided(each, element, strings, arrays) for each in value]
         return value
     if isinstance(value, str):
         return value if strings else f"<string length: {len(value)}>"
-    for name, slot_type in zip(
-        getattr(value, "__slots__", ()), getattr(value, "_slot_types", ()), strict=False
-    ):
-        setattr(value, name, _elided(getattr(value, name), slot_type, strings, arrays))
-    return value
+    if not hasattr(value, "_slot_types"):
+        return value
+    cls = type(value)
+    fields = {
+        name: _elided(getattr(value, name), slot_type, strings, arrays)
+        for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
+    }
+    # A note is a text, whatever the field was: the printed form of a field depends on its declared type.
+    types = tuple(
+        "string" if isinstance(fields[name], str) else slot_type
+        for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
+    )
+    shown = object.__new__(_class_with_types(cls, types))
+    for name, field in fields.items():
+        setattr(shown, name, field)
+    return shown
+
+
+@lru_cache(maxsize=256)
+def _class_with_types(cls: Hashable, types: tuple[str, ...]) -> type[Any]:
+    assert isinstance(cls, type)
+    return type(cls.__name__, cls.__bases__, {"__slots__": cls.__slots__, "_slot_types": list(types)})
 
 
 def _now() -> float:

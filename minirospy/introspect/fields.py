@@ -16,6 +16,13 @@ __all__ = ["Step", "field_type", "field_value", "parse_path"]
 _STEP = re.compile(r"^(\w+)(?:\[(-?\d*)(:?)(-?\d*)\])?$")
 
 
+_TIMES = {
+    "time": {"secs": "uint32", "nsecs": "uint32"},
+    "duration": {"secs": "int32", "nsecs": "int32"},
+}
+"""The primitive types that have fields all the same."""
+
+
 class Step(NamedTuple):
     """One part of a path: a field, and where it is an array, an index or a slice into it."""
 
@@ -59,6 +66,11 @@ def field_type(message_class: type[Any], path: str) -> str:
 
     type_: str = message_class._type
     for at, (name, index) in enumerate(parse_path(path)):
+        if type_ in _TIMES:
+            if name not in _TIMES[type_]:
+                raise NotFoundError("field", name, _TIMES[type_], f"[{type_}] has {' '.join(_TIMES[type_])}")
+            type_ = _TIMES[type_][name]
+            continue
         if at:
             message_class = load_class(type_.partition("[")[0])
         if name not in message_class.__slots__:

@@ -46,11 +46,12 @@ class MessageClasses:
     def _find(type_: str, md5sum: str, definition: str) -> type[Any]:
         from minirospy.idl.load import class_from_text, get_message_class
 
-        installed = get_message_class(type_)
+        installed: type[Any] | None = get_message_class(type_)
         if installed is not None and md5sum in ("*", installed._md5sum):
             return installed
         if definition or installed is not None:
-            return class_from_text(type_, definition)
+            made: type[Any] = class_from_text(type_, definition)
+            return made
         raise NotFoundError(
             "message type", type_, hint="it is not installed, and its publisher sent no definition"
         )
@@ -64,7 +65,10 @@ def fill(message: Any, values: Sequence[Any], keys: Mapping[str, Any] | None = N
     from minirospy.idl.message import fill_message_args
 
     # No value at all is a message of default values.
-    fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
+    try:
+        fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
+    except (MessageException, ValueError, TypeError, AttributeError) as error:
+        raise _does_not_fit(message, error) from error
     return message
 
 
@@ -78,6 +82,13 @@ def serialize(message: Any) -> bytes:
     buffer = BytesIO()
     try:
         message.serialize(buffer)
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise MessageException(f"a value does not fit [{message._type}]: {error}") from error
+    except (MessageException, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise _does_not_fit(message, error) from error
     return buffer.getvalue()
+
+
+def _does_not_fit(message: Any, error: Exception) -> MessageException:
+    """What is wrong with the values, on one line, and what the fields are."""
+    fields = zip(message.__slots__, message._slot_types, strict=True)
+    shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
+    return MessageException(f"{' '.join(str(error).split())} ([{message._type}] has {shown})")

@@ -40,11 +40,16 @@ _SLICE = 0.05 if sys.platform == "win32" else 3600.0
 
 
 class Received(NamedTuple):
-    """A message as it came: its bytes, its publisher's connection header, when (seconds since the epoch)."""
+    """A message as it came: its bytes, its publisher's connection header, when (since the epoch)."""
 
     body: bytes
     header: Header
-    time: float
+    nanoseconds: int
+
+    @property
+    def time(self) -> float:
+        """When it came, in seconds since the epoch."""
+        return self.nanoseconds / 1e9
 
 
 class ToolNode:
@@ -110,7 +115,7 @@ class ToolNode:
 
         def deliver(body: memoryview, header: Header) -> None:
             try:
-                add(Received(bytes(body), header, time.time()))
+                add(Received(bytes(body), header, time.time_ns()))
             except (MinirospyError, MessageException) as error:
                 self._fault = error
                 self._end()
@@ -155,7 +160,7 @@ class Inbox:
 
     def put(self, body: memoryview, header: Header) -> None:
         """A message has come; waits while too many are unread."""
-        received = Received(bytes(body), header, time.time())
+        received = Received(bytes(body), header, time.time_ns())
         while not self._closed.is_set():
             try:
                 self._messages.put(received, timeout=0.2)
