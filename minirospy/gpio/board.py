@@ -13,6 +13,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+import weakref
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import TracebackType
@@ -46,7 +47,8 @@ class Board:
 
     def __init__(self, name: str | None = None) -> None:
         place = Place.find(name)
-        self._watchers: list[queue.SimpleQueue[Edge]] = []
+        # Weak: a watch that nobody holds any more takes no more edges.
+        self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
         self.name = place.name
         self._link = Link(place, self._spread)
@@ -95,7 +97,7 @@ class Board:
         chosen = None if pins is None else frozenset(_checked(pin) for pin in pins)
         arrived: queue.SimpleQueue[Edge] = queue.SimpleQueue()
         with self._lock:
-            self._watchers.append(arrived)
+            self._watchers.add(arrived)
         deadline = None if timeout is None else time.monotonic() + timeout
         return self._edges(arrived, chosen, deadline)
 
@@ -117,7 +119,7 @@ class Board:
                     yield edge
         finally:
             with self._lock:
-                self._watchers.remove(arrived)
+                self._watchers.discard(arrived)
 
     def _spread(self, edge: Edge) -> None:
         with self._lock:

@@ -19,7 +19,7 @@ from minirospy.launch.spec import ArgDoc, LaunchSpec, NodeSpec
 from minirospy.launch.substitution import Substitution, SubstitutionError, convert
 from minirospy.workspace.packages import Packages
 
-__all__ = ["load_files", "load_text"]
+__all__ = ["describe_args", "load_files", "load_text"]
 
 _DEEPEST_INCLUDE = 50
 
@@ -66,6 +66,19 @@ def load_text(
     _load(spec, text.encode(), "<stdin>", args, packages, environ)
     _finish(spec)
     return spec
+
+
+def describe_args(file: str) -> list[ArgDoc]:
+    """The arguments that a file declares, without loading what it includes. Raises LaunchError."""
+    try:
+        root = _parse(Path(file).read_bytes(), file)
+    except OSError as error:
+        raise LaunchError(file, 0, f"cannot be read: {error.strerror}") from error
+    return [
+        ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
+        for attributes in (element.attributes for element in root.children if element.tag == "arg")
+        if "name" in attributes and "value" not in attributes
+    ]
 
 
 def _load(

@@ -1,0 +1,7 @@
+"""`python -m minirospy`: the same as the command `minirospy`."""
+
+import sys
+
+from minirospy.cli.family import main
+
+sys.exit(main())

@@ -1,0 +1,215 @@
+"""`minirospy demo`: the workshop's button lights its LED, on the virtual board, from one command."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from minirospy.cli.command import Parser, run
+from minirospy.errors import MinirospyError
+from minirospy.gpio.board import Board
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+__all__ = ["main"]
+
+BUTTON, LED = 11, 7
+_HOLD_SECONDS = 0.8
+_REST_SECONDS = 0.7
+_FOLLOW_SECONDS = 2.0
+_START_SECONDS = 20.0
+_WAY = (
+    "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
+    "  reads GPIO 11, ten times a second                          sets GPIO 7",
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status 0 where the LED followed the button each time, else 1."""
+    parser = Parser(prog="minirospy demo", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument(
+        "--presses", type=int, metavar="N", help="end after N presses (default: 3, on a terminal at Ctrl-C)"
+    )
+
+    def body() -> int:
+        options = parser.parse_args(argv)
+        if options.presses is not None and options.presses < 1:
+            parser.error("--presses takes a number from 1")
+        presses = options.presses
+        if presses is None and not sys.stdout.isatty():
+            presses = 3
+        return _demo(presses)
+
+    return run("minirospy demo", body)
+
+
+def _demo(presses: int | None) -> int:
+    with _own_world() as folder, _launched(folder / "roslaunch.log") as launch, Board() as board:
+        _wait_until_ready(board, launch, folder / "roslaunch.log")
+        show = _Picture(board) if sys.stdout.isatty() else _Lines()
+        failures = 0
+        with contextlib.suppress(KeyboardInterrupt), show:
+            count = 0
+            while presses is None or count < presses:
+                count += 1
+                for level in (1, 0):
+                    took = _follow(board, level)
+                    failures += took is None
+                    show.tell(count, level, took)
+                    _rest(board, launch, show, _HOLD_SECONDS if level else _REST_SECONDS)
+        if failures:
+            print(f"GPIO {LED} did not follow GPIO {BUTTON} {failures} times", file=sys.stderr)
+        return 1 if failures else 0
+
+
+@contextlib.contextmanager
+def _own_world() -> Iterator[Path]:
+    """A master port and a board of the demo's own, so that it disturbs nobody; a folder for its files."""
+    with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        os.environ["ROS_HOSTNAME"] = "localhost"
+        os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+        os.environ["ROS_LOG_DIR"] = folder
+        os.environ.setdefault("MINIROSPY_BOARD", f"demo-{os.getpid()}")
+        yield Path(folder)
+
+
+@contextlib.contextmanager
+def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """roslaunch with the workshop's launch file; it is ended by Ctrl-C's signal, which ends all its nodes."""
+    command = [sys.executable, "-m", "minirospy.cli.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
+    windows = sys.platform == "win32"
+    flags = subprocess.CREATE_NEW_PROCESS_GROUP if windows else 0  # type: ignore[attr-defined,unused-ignore]
+    with log.open("wb") as output:
+        launch = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=not windows,
+            creationflags=flags,
+        )
+    try:
+        yield launch
+    finally:
+        stop = signal.CTRL_BREAK_EVENT if windows else signal.SIGINT  # type: ignore[attr-defined,unused-ignore]
+        with contextlib.suppress(OSError):
+            launch.send_signal(stop)
+        try:
+            launch.wait(10.0)
+        except subprocess.TimeoutExpired:
+            launch.kill()
+            launch.wait()
+
+
+def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
+    """Return when a press of the button lights the LED for the first time: then both nodes are connected."""
+    print("Starting the master, button_publisher.py and led_actuator.py ...", flush=True)
+    end = time.monotonic() + _START_SECONDS
+    while time.monotonic() < end:
+        if launch.poll() is not None:
+            break
+        board.press(BUTTON)
+        if _wait_for(board, 1, 0.3) is not None:
+            board.release(BUTTON)
+            _wait_for(board, 0, _FOLLOW_SECONDS)
+            return
+    said = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-8:]
+    raise MinirospyError("the nodes did not start; roslaunch said:\n  " + "\n  ".join(said))
+
+
+def _follow(board: Board, level: int) -> float | None:
+    """Press or release; the seconds until the LED has followed, None where it did not."""
+    start = time.monotonic()
+    (board.press if level else board.release)(BUTTON)
+    return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
+
+
+def _wait_for(board: Board, level: int, timeout: float) -> int | None:
+    """Wait until the LED has ``level``; None after ``timeout`` seconds."""
+    watch = board.watch([LED], timeout=timeout)
+    if board.get(LED) == level:
+        return level
+    for edge in watch:
+        if edge.level == level:
+            return level
+    return None
+
+
+def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while (rest := end - time.monotonic()) > 0:
+        if launch.poll() is not None:
+            raise MinirospyError("roslaunch has ended")
+        show.refresh()
+        time.sleep(min(rest, 0.05))
+
+
+class _Lines:
+    """The demo where nobody watches: a line for each press."""
+
+    def __enter__(self) -> None:
+        print("\n".join(_WAY), flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def tell(self, count: int, level: int, took: float | None) -> None:
+        verb = "pressed " if level else "released"
+        result = f"LED on GPIO {LED} {'on' if level else 'off'} after {1000 * took:.0f} ms" if took else "nothing"
+        print(f"{count}: button 1 {verb} -> {result}", flush=True)
+
+    def refresh(self) -> None:
+        pass
+
+
+class _Picture:
+    """The demo on a terminal: the board, and what is happening on it."""
+
+    def __init__(self, board: Board) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        self._board = board
+        self._caption = ""
+        self._live = Live(console=Console(), auto_refresh=False)
+
+    def __enter__(self) -> None:
+        self._live.__enter__()
+        self.refresh()
+
+    def __exit__(self, *details: object) -> None:
+        self._live.__exit__(None, None, None)
+        print("The master and both nodes end ...", flush=True)
+
+    def tell(self, count: int, level: int, took: float | None) -> None:
+        verb, state = ("pressed", "on") if level else ("released", "off")
+        result = f"LED 7 {state} after {1000 * took:.0f} ms" if took else "LED 7 did not follow"
+        self._caption = f"press {count}: button 1 {verb}, {result}"
+        self.refresh()
+
+    def refresh(self) -> None:
+        self._live.update(self._drawn(), refresh=True)
+
+    def _drawn(self) -> Group:
+        from rich.console import Group
+        from rich.text import Text
+
+        from minirospy.cli.board import render
+
+        words = [Text(line, style="dim") for line in _WAY]
+        return Group(
+            render(self._board.state()), *words, Text(self._caption, style="bold"), Text("Ctrl-C ends it.", style="dim")
+        )

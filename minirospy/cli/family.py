@@ -1,0 +1,62 @@
+"""`minirospy VERB`: every command under one name; a verb's module is imported when it is typed."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import minirospy
+from minirospy.cli.command import run
+from minirospy.errors import UsageError
+
+__all__ = ["main"]
+
+
+class _Verb(NamedTuple):
+    module: str
+    function: str
+    summary: str
+
+
+_VERBS = {
+    "demo": _Verb("demo", "main", "the workshop's button lights its LED, on the virtual board"),
+    "master": _Verb("master", "main", "start the master in the foreground (as roscore)"),
+    "board": _Verb("board", "main", "see the virtual board, press its buttons"),
+    "run": _Verb("rosrun", "main", "run a package's program (as rosrun)"),
+    "launch": _Verb("roslaunch", "main", "run a launch file (as roslaunch)"),
+    "topic": _Verb("rostopic", "main", "list, echo, publish topics (as rostopic)"),
+    "node": _Verb("rosnode", "main", "list, ping, stop nodes (as rosnode)"),
+    "service": _Verb("rosservice", "main", "list, call services (as rosservice)"),
+    "param": _Verb("rosparam", "main", "get, set parameters (as rosparam)"),
+    "msg": _Verb("rosmsg", "main", "show message types (as rosmsg)"),
+    "srv": _Verb("rosmsg", "main_srv", "show service types (as rossrv)"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status as in minirospy.cli.command."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    return run("minirospy", lambda: _dispatch(words))
+
+
+def _dispatch(words: list[str]) -> int:
+    if not words or words[0] in ("-h", "--help"):
+        width = max(map(len, _VERBS))
+        lines = [f"  minirospy {verb:{width}}  {entry.summary}" for verb, entry in _VERBS.items()]
+        print("\n".join([f"minirospy {minirospy.__version__}: ROS 1 for any computer with Python", "", *lines]))
+        print("\n`minirospy VERB -h` tells more of each.")
+        return 0 if words else 2
+    if words[0] in ("-V", "--version"):
+        print(f"minirospy {minirospy.__version__}")
+        return 0
+    entry = _VERBS.get(words[0])
+    if entry is None:
+        import difflib
+
+        near = difflib.get_close_matches(words[0], _VERBS, n=2)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise UsageError(f"there is no `minirospy {words[0]}`{hint} (`minirospy -h` shows what there is)")
+    function = getattr(importlib.import_module(f"minirospy.cli.{entry.module}"), entry.function)
+    return int(function(words[1:]))
