@@ -67,6 +67,9 @@ class NodeProcess:
         self._waiting_for_node: list[Callable[[], object]] = []
         self._shutdown_begun = False
         self._previous_handlers: dict[int, Any] = {}
+        self.late_signal = 0
+        """A signal that came while the main thread was sending; who has sent takes it."""
+        self._is_retry = False
 
     # --- what others ask
 
@@ -275,12 +278,19 @@ class NodeProcess:
             self._previous_handlers[number] = signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        is_retry, self._is_retry = self._is_retry, False
+        if is_retry and not self.late_signal:
+            return
         if tcp.is_sending(frame):
-            # A hook that publishes would wait for the lock that this very thread holds: come back later.
-            retry = threading.Timer(0.002, _thread.interrupt_main, [number])
+            # A hook that publishes would wait for the lock that this very thread holds. publish() takes the
+            # signal when it has sent; the timer is for the other senders. A loop that only publishes is
+            # nearly always caught in the sending: the timer alone would try for seconds.
+            self.late_signal = number
+            retry = threading.Timer(0.002, self._retry_signal, [number])
             retry.daemon = True
             retry.start()
             return
+        self.late_signal = 0
         if self._shutdown_begun:
             # The program did not end at the first: now it is interrupted as any Python program.
             raise KeyboardInterrupt
@@ -289,6 +299,16 @@ class NodeProcess:
         if callable(previous):
             with contextlib.suppress(KeyboardInterrupt):
                 previous(number, frame)
+
+    def take_late_signal(self) -> None:
+        """Act on a signal that came while the main thread was sending."""
+        if threading.current_thread() is threading.main_thread() and self.late_signal:
+            self._on_signal(self.late_signal, None)
+
+    def _retry_signal(self, number: int) -> None:
+        if self.late_signal:
+            self._is_retry = True
+            _thread.interrupt_main(number)
 
     def _wait_for_master(self) -> None:
         """Return when the master answers; says once that it waits. A shutdown ends the wait."""

@@ -302,6 +302,8 @@ class _Published:
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
         if publication.links or publication.latch:
             publication.publish(self._frame(message))
+            if process.late_signal:
+                process.take_late_signal()
 
     def _frame(self, message: Any) -> bytes:
         if self._has_header:
