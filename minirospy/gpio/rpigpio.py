@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import sys
 import threading
 import time
 import warnings
 import weakref
 from collections.abc import Sequence
+from types import FrameType
 from typing import Any
 
 from minirospy.errors import BoardError
@@ -126,6 +128,8 @@ class Gpio:
         # channel -> BCM pin of what is set up, for the two calls that must be fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
+        # The same, of an input() or output() that a signal handler's cleanup() interrupted at its first step.
+        self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
         self._callbacks: CallbackThread | None = None
@@ -179,6 +183,8 @@ class Gpio:
         try:
             return self._levels[self._readable[channel]]
         except (KeyError, TypeError):
+            if (interrupted := self._interrupted.pop(channel, None)) is not None:
+                return self._levels[interrupted]
             self._pin(channel)
             raise RuntimeError("You must setup() the GPIO channel first") from None
 
@@ -357,13 +363,27 @@ class Gpio:
         link.call(Setup(pin, direction, pull, level))
         with self._lock:
             self._directions[pin] = direction
+            self._interrupted.pop(channel, None)
             self._readable[channel] = pin
             if direction == OUT:
                 self._writable[channel] = pin
             else:
                 self._writable.pop(channel, None)
 
+    def _let_interrupted_call_end(self, frame: FrameType | None) -> None:
+        # A shutdown hook runs in a signal handler, and Python runs those at the first step of a function. A
+        # program that checked its flag and then reads its pin is not to fail for that: RPi.GPIO, being C,
+        # ends its calls first.
+        while frame is not None:
+            if frame.f_code in _QUICK_CALLS and frame.f_locals.get("self") is self:
+                channel = frame.f_locals["channel"]
+                with contextlib.suppress(KeyError, TypeError):
+                    self._interrupted[channel] = self._readable[channel]
+            frame = frame.f_back
+
     def _output_several(self, channel: Any, value: Any) -> None:
+        if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
+            return
         channels = _channels(channel)
         values = list(value) if isinstance(value, (list, tuple)) else [value]
         if len(values) == 1 and not isinstance(value, (list, tuple)):
@@ -405,6 +425,9 @@ class Gpio:
         """Warn about the user's line, ``depth`` calls above this one."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
+
+
+_QUICK_CALLS = {Gpio.input.__code__, Gpio.output.__code__}
 
 
 class Wave:

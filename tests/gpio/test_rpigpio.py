@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import gc
 import itertools
+import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from types import FrameType
 
 import pytest
 
@@ -237,6 +239,31 @@ def test_cleanup(bcm: Gpio, board: Board) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         bcm.cleanup()
+
+
+def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, board: Board) -> None:
+    bcm.setup(11, GPIO.IN)
+    bcm.setup(7, GPIO.OUT)
+    board.press(11)
+    _synchronize(bcm, board)
+    calls = {Gpio.input.__code__, Gpio.output.__code__}
+
+    def interrupt(frame: FrameType, event: str, argument: object) -> None:
+        # What a signal at the first step of the call does: its handler runs before anything else.
+        if event == "call" and frame.f_code in calls:
+            sys.setprofile(None)
+            bcm.cleanup()
+
+    sys.setprofile(interrupt)
+    assert bcm.input(11) == 1
+    with pytest.raises(RuntimeError, match=MODE[:20]):
+        bcm.input(11)
+    bcm.setmode(GPIO.BCM)
+    bcm.setup(7, GPIO.OUT)
+    sys.setprofile(interrupt)
+    bcm.output(7, 1)
+    with pytest.raises(RuntimeError, match=MODE[:20]):
+        bcm.output(7, 1)
 
 
 def test_cleanup_leaves_what_others_set_up(bcm: Gpio, board: Board) -> None:
