@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -133,7 +133,7 @@ def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
         return value if strings else f"<string length: {len(value)}>"
     if not hasattr(value, "_slot_types"):
         return value
-    cls = type(value)
+    cls: Any = type(value)
     fields = {
         name: _elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
@@ -150,8 +150,7 @@ def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
 
 
 @lru_cache(maxsize=256)
-def _class_with_types(cls: Hashable, types: tuple[str, ...]) -> type[Any]:
-    assert isinstance(cls, type)
+def _class_with_types(cls: Any, types: tuple[str, ...]) -> type[Any]:
     return type(cls.__name__, cls.__bases__, {"__slots__": cls.__slots__, "_slot_types": list(types)})
 
 

@@ -1,25 +1,27 @@
-"""Message and service types that are installed: which packages define them, their texts and md5sums.
+"""Message and service types as their packages define them: names, texts and md5sums.
 
+Read from the definitions, so that a type is found before anything is built from it.
 Source: http://wiki.ros.org/rosmsg.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import Enum
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from minirospy.errors import NotFoundError
+from minirospy.idl.digest import Lookup, message_md5, service_md5
+from minirospy.idl.load import Catalogue
+from minirospy.idl.spec import MessageSpec, ServiceSpec
 from minirospy.workspace.packages import Packages
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+__all__ = ["Interfaces", "Kind", "describe"]
 
-__all__ = ["Interfaces", "Kind"]
+_INDENT = "  "
 
 
 class Kind(Enum):
-    """What an interface file defines; the value is its folder and the ending of its name."""
+    """What a definition defines; the value is its folder and the ending of its name."""
 
     MESSAGE = "msg"
     SERVICE = "srv"
@@ -31,24 +33,29 @@ class Kind(Enum):
 
 
 class Interfaces:
-    """The interface files of one kind in all packages."""
+    """The types of one kind in all packages. A definition that does not parse raises DefinitionError."""
 
     def __init__(self, packages: Packages, kind: Kind) -> None:
         self._packages = packages
         self._kind = kind
+        self._catalogue = Catalogue(packages.folders())
 
     def packages(self) -> list[str]:
         """The sorted names of the packages that define any."""
-        return [name for name in sorted(self._packages.names()) if any(self._files(name))]
+        return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:
         """The sorted types (``pkg/Name``) that a package defines. Raises NotFoundError."""
         self._packages.find(package)
-        return sorted(f"{package}/{file.stem}" for file in self._files(package))
+        return [f"{package}/{name}" for name in self._names(package)]
 
     def all(self) -> list[str]:
-        """Every type, sorted."""
-        return [type_ for package in sorted(self._packages.names()) for type_ in self._types(package)]
+        """Every type, sorted by package, then name."""
+        return [
+            f"{package}/{name}"
+            for package in sorted(self._catalogue.packages)
+            for name in self._names(package)
+        ]
 
     def find(self, name: str) -> list[str]:
         """The types that ``name`` stands for: itself where it has a package, else those of that bare name.
@@ -56,38 +63,61 @@ class Interfaces:
         Raises NotFoundError with the nearest names where there is none.
         """
         everything = self.all()
-        if "/" in name:
-            found = [name] if name in everything else []
-        else:
-            found = [type_ for type_ in everything if type_.rpartition("/")[2] == name]
+        by_itself = "/" not in name
+        found = [type_ for type_ in everything if (type_.partition("/")[2] if by_itself else type_) == name]
         if not found:
-            known = everything if "/" in name else [type_.rpartition("/")[2] for type_ in everything]
+            known = {type_.partition("/")[2] for type_ in everything} if by_itself else everything
             raise NotFoundError(f"{self._kind.word} type", name, known)
         return found
 
     def text(self, type_: str) -> str:
-        """The definition of a type as it stands in its file."""
-        package, _, name = type_.partition("/")
-        for file in self._files(package):
-            if file.stem == name:
-                return file.read_text(encoding="utf-8", errors="replace")
-        raise NotFoundError(f"{self._kind.word} type", type_, self.all())
+        """The definition of a type, as it stands in its file. Raises NotFoundError."""
+        return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """The fields and constants of a type, inner messages unfolded and indented, without comments."""
-        from minirospy.idl import show
-
-        return show.message_text(type_) if self._kind is Kind.MESSAGE else show.service_text(type_)
+        """The constants and fields of a type, inner types unfolded, without comments. Raises NotFoundError."""
+        return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
-        """The md5sum of a type."""
-        from minirospy.idl.load import message_class, service_class
+        """The md5sum of a type. Raises NotFoundError."""
+        spec = self._spec(type_)
+        if isinstance(spec, ServiceSpec):
+            return service_md5(spec, self._catalogue.message)
+        return message_md5(spec, self._catalogue.message)
 
-        find = message_class if self._kind is Kind.MESSAGE else service_class
-        return str(find(type_)._md5sum)
+    def _spec(self, type_: str) -> MessageSpec | ServiceSpec:
+        if self._kind is Kind.MESSAGE:
+            return self._catalogue.message(type_)
+        package = type_.partition("/")[0]
+        if package in self._catalogue.packages:
+            for service in self._catalogue.services(package):
+                if service.full_name == type_:
+                    return service
+        raise NotFoundError("service type", type_, self.all())
 
-    def _types(self, package: str) -> list[str]:
-        return sorted(f"{package}/{file.stem}" for file in self._files(package))
+    def _names(self, package: str) -> list[str]:
+        """The sorted names of the types of a package, by its files; an action stands for seven messages."""
+        folder = self._catalogue.packages[package]
+        ending = self._kind.value
+        names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}
+        if self._kind is Kind.MESSAGE and any((folder / "action").glob("*.action")):
+            names |= {message.name for message in self._catalogue.messages(package)}
+        return sorted(names)
 
-    def _files(self, package: str) -> Iterator[Path]:
-        return (self._packages.find(package) / self._kind.value).glob(f"*.{self._kind.value}")
+
+def describe(spec: MessageSpec | ServiceSpec, lookup: Lookup) -> str:
+    """A type as `rosmsg show` prints it: a line for each constant and field, inner types indented below."""
+    if isinstance(spec, ServiceSpec):
+        lines = [*_lines(spec.request, lookup, ""), "---", *_lines(spec.response, lookup, "")]
+    else:
+        lines = list(_lines(spec, lookup, ""))
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _lines(spec: MessageSpec, lookup: Lookup, indent: str) -> Iterator[str]:
+    for constant in spec.constants:
+        yield f"{indent}{constant.type} {constant.name}={constant.value}"
+    for field in spec.fields:
+        yield f"{indent}{field.type} {field.name}"
+        if not field.type.is_primitive:
+            yield from _lines(lookup(field.type.base), lookup, indent + _INDENT)
