@@ -25,6 +25,7 @@ __all__ = [
     "get_service_class",
     "message_class",
     "service_class",
+    "specs_of_text",
     "write_package",
 ]
 
@@ -157,13 +158,8 @@ def service_class(name: str) -> Any:
     return found
 
 
-@lru_cache(maxsize=256)
-def class_from_text(full_name: str, text: str) -> Any:
-    """A message class from a full text, as a publisher sends it, for a type that is not installed.
-
-    Raises DefinitionError.
-    """
-    from minirospy.idl.emit import emit_message
+def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
+    """The specs in a full text: the message's own, and those of all types that it needs. Raises DefinitionError."""
     from minirospy.idl.parse import parse_message
 
     specs: dict[str, MessageSpec] = {}
@@ -174,6 +170,18 @@ def class_from_text(full_name: str, text: str) -> Any:
             name = head.removeprefix("MSG:").strip()
         package, _, short = name.partition("/")
         specs.setdefault(name, parse_message(body, package, short))
+    return specs
+
+
+@lru_cache(maxsize=256)
+def class_from_text(full_name: str, text: str) -> Any:
+    """A message class from a full text, as a publisher sends it, for a type that is not installed.
+
+    Raises DefinitionError.
+    """
+    from minirospy.idl.emit import emit_message
+
+    specs = specs_of_text(full_name, text)
 
     def lookup(name: str) -> MessageSpec:
         if name not in specs:
