@@ -201,6 +201,7 @@ class Gpio:
                 set(self._directions) if channel is None else {self._pin(one) for one in _channels(channel)}
             )
             mine = wanted & set(self._directions)
+            self._let_interrupted_call_end(sys._getframe())
             for pin in sorted(mine):
                 self._forget_events(pin)
                 self._linked().call(Setup(pin, IN))

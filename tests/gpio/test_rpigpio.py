@@ -170,7 +170,7 @@ def test_output_is_read_back_at_once_and_arrives_in_order(bcm: Gpio, board: Boar
         bcm.output(7, level)
         assert bcm.input(7) == level
     assert [next(edges).level for _ in levels] == levels
-    assert board.get(7) == 1
+    assert heard(board, 7) == 1
 
 
 def test_lists_of_channels(bcm: Gpio) -> None:
@@ -185,7 +185,7 @@ def test_lists_of_channels(bcm: Gpio) -> None:
 def test_board_numbering(gpio: Gpio, board: Board) -> None:
     gpio.setmode(GPIO.BOARD)
     gpio.setup(26, GPIO.OUT, initial=1)  # BCM 7
-    assert board.get(7) == 1
+    assert heard(board, 7) == 1
     for power in (1, 2, 6, 27, 41):
         with pytest.raises(ValueError, match=INVALID):
             gpio.setup(power, GPIO.IN)
@@ -223,10 +223,10 @@ def test_warning_about_the_pull_up_of_i2c(bcm: Gpio) -> None:
 def test_cleanup(bcm: Gpio, board: Board) -> None:
     bcm.setup([6, 7], GPIO.OUT, initial=1)
     bcm.cleanup(6)
-    assert (board.get(6), board.get(7)) == (0, 1)
+    assert (heard(board, 6), heard(board, 7)) == (0, 1)
     assert bcm.getmode() == GPIO.BCM
     bcm.cleanup()
-    assert (board.get(6), board.get(7)) == (0, 0)
+    assert (heard(board, 6), heard(board, 7)) == (0, 0)
     assert bcm.getmode() is None
     with pytest.warns(RuntimeWarning) as caught:
         bcm.cleanup()
@@ -272,10 +272,10 @@ def test_cleanup_leaves_what_others_set_up(bcm: Gpio, board: Board) -> None:
     other.setup(5, GPIO.OUT, initial=1)
     bcm.setup(6, GPIO.OUT, initial=1)
     bcm.cleanup()
-    assert (board.get(5), board.get(6)) == (1, 0)
+    assert (heard(board, 5), heard(board, 6)) == (1, 0)
     assert bcm.getmode() is None
     other.close()
-    assert board.get(5) == 1
+    assert heard(board, 5) == 1
 
 
 @pytest.mark.parametrize("keyword", ["gpio", "channel"])
@@ -355,11 +355,11 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     assert sorted(high)[len(high) // 2] == pytest.approx(0.015, abs=0.008)
     wave.set(duty=100)
     deadline = time.monotonic() + 5
-    while not board.get(7) and time.monotonic() < deadline:
+    while not heard(board, 7) and time.monotonic() < deadline:
         next(edges)
     wave.stop()
     _synchronize(bcm, board)
-    assert board.get(7) == 0
+    assert heard(board, 7) == 0
     assert bcm.output_pin(7) == 7
 
 
@@ -378,6 +378,12 @@ def test_pwm_object_ends_with_its_last_reference() -> None:
     finally:
         GPIO.cleanup()
         GPIO._gpio.close()
+
+
+def heard(board: Board, pin: int) -> int:
+    """The level once ``board`` has heard of all that the server did until now."""
+    board._link.call(None)
+    return board.get(pin)
 
 
 def _synchronize(gpio: Gpio, board: Board) -> None:
