@@ -350,8 +350,8 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
         wave.set(frequency=0)
     wave.set(duty=30)
     wave.start()
-    heard = [next(edges) for _ in range(11)]
-    high = [after.time - edge.time for edge, after in itertools.pairwise(heard) if edge.level]
+    several = [next(edges) for _ in range(11)]
+    high = [after.time - edge.time for edge, after in itertools.pairwise(several) if edge.level]
     assert sorted(high)[len(high) // 2] == pytest.approx(0.015, abs=0.008)
     wave.set(duty=100)
     deadline = time.monotonic() + 5

@@ -1,0 +1,105 @@
+"""`minirospy board`, as scripts use it."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from minirospy.cli.board import main, render
+from minirospy.gpio.board import Board
+from minirospy.gpio.raspberry import model_name, warn_of_missing_library
+
+
+def test_press_get_release(capsys: pytest.CaptureFixture[str]) -> None:
+    assert [main(["press", "11"]), main(["get", "11", "12"]), main(["release", "11"])] == [0, 0, 0]
+    assert main(["get", "11"]) == 0
+    assert capsys.readouterr().out.split() == ["1", "0", "0"]
+
+
+def test_set_and_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["set", "7", "1"]) == 0
+    assert main(["set", "17", "1"]) == 0
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "pin level function pull part"
+    assert "  7 1     in       off  red LED" in lines
+    assert " 17 1     in       off" in lines
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "complaint"),
+    [
+        (["press", "99"], 1, "there is no pin 99: BCM numbers are 0 to 53"),
+        (["press", "x"], 2, "invalid int value: 'x'"),
+        (["press"], 2, "the following arguments are required: pin"),
+        (["set", "7", "2"], 2, "invalid choice: 2"),
+        (["pres", "7"], 2, "did you mean press?"),
+    ],
+)
+def test_complaints(
+    words: list[str], status: int, complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == status
+    said = capsys.readouterr().err
+    assert said.startswith("minirospy board: ERROR: ")
+    assert complaint in said
+    assert len(said.splitlines()) == 1
+
+
+def test_watch_prints_a_line_for_each_edge() -> None:
+    code = "import sys; from minirospy.cli.board import main; sys.exit(main(sys.argv[1:]))"
+    with (
+        Board() as board,
+        subprocess.Popen(
+            [sys.executable, "-c", code, "watch", "7", "-n", "2"], stdout=subprocess.PIPE, text=True
+        ) as child,
+    ):
+        # When it listens cannot be seen from here: move the pin until it has heard enough.
+        for number in range(1, 400):
+            board.set(7, number % 2)
+            try:
+                child.wait(0.05)
+                break
+            except subprocess.TimeoutExpired:
+                pass
+        assert child.stdout is not None
+        assert sorted(child.stdout.read().splitlines()) == ["7 0", "7 1"]
+        assert child.returncode == 0
+
+
+def test_without_a_terminal_it_prints_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    assert capsys.readouterr().out.startswith("pin level function pull part")
+
+
+@pytest.mark.parametrize(("encoding", "lit", "dark"), [("utf-8", "●", "○"), ("ascii", "(*)", "( )")])
+def test_picture(encoding: str, lit: str, dark: str) -> None:
+    paper = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    with Board() as board:
+        board.press(11)
+        board.set(7, 1)
+        Console(file=paper, width=80).print(render(board.state()))
+    paper.seek(0)
+    text = paper.read()
+    assert (text.count(lit), text.count(dark)) == (1, 5)
+    assert all(f"GPIO {pin}" in text for pin in (2, 3, 4, 5, 6, 7, 11, 12))
+    paper.close()
+
+
+def test_a_real_raspberry_pi_is_told_of_the_real_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "model"
+    warn_of_missing_library(file)
+    file.write_bytes(b"Orange Pi\0")
+    warn_of_missing_library(file)
+    assert capsys.readouterr().err == ""
+    file.write_bytes(b"Raspberry Pi 4 Model B Rev 1.4\0")
+    assert model_name(file) == "Raspberry Pi 4 Model B Rev 1.4"
+    warn_of_missing_library(file)
+    assert "`pip install minirospy[pi]`" in capsys.readouterr().err
