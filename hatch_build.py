@@ -13,7 +13,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class CompileDefinitions(BuildHookInterface):  # type: ignore[type-arg]
+class CompileDefinitions(BuildHookInterface):
     """Runs before each build of a wheel."""
 
     PLUGIN_NAME = "custom"

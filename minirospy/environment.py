@@ -91,7 +91,9 @@ def _checked_uri(uri: str) -> str:
     except ValueError:
         usable = False
     if not usable:
-        raise UsageError(f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311")
+        raise UsageError(
+            f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311"
+        )
     return uri
 
 

@@ -30,7 +30,7 @@ def _own_environment(
     """No ROS variable of the outside gets in; files go to a temporary folder, sockets to loopback."""
     home: Path = tmp_path_factory.mktemp("ros")
     for name in list(os.environ):
-        if name.startswith("ROS_") or name.startswith("MINIROSPY_"):
+        if name.startswith(("ROS_", "MINIROSPY_")):
             monkeypatch.delenv(name)
     monkeypatch.setenv("ROS_HOME", str(home))
     monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
@@ -40,7 +40,6 @@ def _own_environment(
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
-    yield
 
 
 @pytest.fixture

@@ -57,7 +57,9 @@ def test_overrides_win() -> None:
     assert (environment.master_uri, environment.host) == ("http://b:2", "c")
 
 
-@pytest.mark.parametrize("uri", ["localhost:11311", "http://", "http://a", "http://a:b", "ftp://a:1", "http://[:1"])
+@pytest.mark.parametrize(
+    "uri", ["localhost:11311", "http://", "http://a", "http://a:b", "ftp://a:1", "http://[:1"]
+)
 def test_a_bad_master_uri_is_refused_in_words(uri: str) -> None:
     with pytest.raises(UsageError, match="is not of the form http://host:port"):
         Environment.read({"ROS_MASTER_URI": uri})

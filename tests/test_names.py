@@ -58,7 +58,8 @@ def test_legal_base_names(name: str, legal: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "namespace"), [("/a/b/c", "/a/b/"), ("/a", "/"), ("/", "/"), ("", "/"), ("/a/b/", "/a/"), ("a", "/")]
+    ("name", "namespace"),
+    [("/a/b/c", "/a/b/"), ("/a", "/"), ("/", "/"), ("", "/"), ("/a/b/", "/a/"), ("a", "/")],
 )
 def test_namespace_of(name: str, namespace: str) -> None:
     assert names.namespace_of(name) == namespace

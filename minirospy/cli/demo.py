@@ -168,7 +168,9 @@ class _Lines:
 
     def tell(self, count: int, level: int, took: float | None) -> None:
         verb = "pressed " if level else "released"
-        result = f"LED on GPIO {LED} {'on' if level else 'off'} after {1000 * took:.0f} ms" if took else "nothing"
+        result = (
+            f"LED on GPIO {LED} {'on' if level else 'off'} after {1000 * took:.0f} ms" if took else "nothing"
+        )
         print(f"{count}: button 1 {verb} -> {result}", flush=True)
 
     def refresh(self) -> None:
@@ -211,5 +213,8 @@ class _Picture:
 
         words = [Text(line, style="dim") for line in _WAY]
         return Group(
-            render(self._board.state()), *words, Text(self._caption, style="bold"), Text("Ctrl-C ends it.", style="dim")
+            render(self._board.state()),
+            *words,
+            Text(self._caption, style="bold"),
+            Text("Ctrl-C ends it.", style="dim"),
         )

@@ -45,7 +45,9 @@ def _dispatch(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         width = max(map(len, _VERBS))
         lines = [f"  minirospy {verb:{width}}  {entry.summary}" for verb, entry in _VERBS.items()]
-        print("\n".join([f"minirospy {minirospy.__version__}: ROS 1 for any computer with Python", "", *lines]))
+        print(
+            "\n".join([f"minirospy {minirospy.__version__}: ROS 1 for any computer with Python", "", *lines])
+        )
         print("\n`minirospy VERB -h` tells more of each.")
         return 0 if words else 2
     if words[0] in ("-V", "--version"):

@@ -47,14 +47,22 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _command(name: str, argv: Sequence[str] | None) -> int:
-    parser = Parser(prog=name, description="Starts the ROS master, the parameter server and the /rosout node.")
-    parser.add_argument("-p", "--port", type=int, help=f"port (default: of ROS_MASTER_URI, else {DEFAULT_MASTER_PORT})")
+    parser = Parser(
+        prog=name, description="Starts the ROS master, the parameter server and the /rosout node."
+    )
+    parser.add_argument(
+        "-p", "--port", type=int, help=f"port (default: of ROS_MASTER_URI, else {DEFAULT_MASTER_PORT})"
+    )
     parser.add_argument("-v", "--verbose", action="store_true", help="print each registration")
     parser.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
     # Options of ROS's roscore that ask for nothing here: one loop serves every client.
     parser.add_argument("--core", action="store_true", help="accepted for compatibility, without effect")
-    parser.add_argument("-w", "--numworkers", type=int, metavar="N", help="accepted for compatibility, without effect")
-    parser.add_argument("-t", "--timeout", type=float, metavar="S", help="accepted for compatibility, without effect")
+    parser.add_argument(
+        "-w", "--numworkers", type=int, metavar="N", help="accepted for compatibility, without effect"
+    )
+    parser.add_argument(
+        "-t", "--timeout", type=float, metavar="S", help="accepted for compatibility, without effect"
+    )
 
     def body() -> int:
         arguments = [a for a in (sys.argv[1:] if argv is None else argv) if ":=" not in a]

@@ -10,8 +10,9 @@ import logging
 import os
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from minirospy.client.process import process
 
@@ -77,6 +78,7 @@ _COLOUR = {
 }
 _DEFAULT_FORMAT = "[${severity}] [${time}]: ${message}"
 _rosout = logging.getLogger("rosout")
+_F = TypeVar("_F", bound=Callable[..., None])
 
 
 class LogFunction(Protocol):
@@ -117,11 +119,12 @@ def configure(node: NodeProcess, log_level: int | None, log_file: str | None) ->
 
 def start_rosout(node: NodeProcess) -> None:
     """Publish log lines to /rosout, and offer the services that list and set logger levels."""
+    from roscpp.msg import Logger
+    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
+    from rosgraph_msgs.msg import Log
+
     from minirospy.client.services import Service
     from minirospy.client.topics import Publisher
-    from rosgraph_msgs.msg import Log
-    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
-    from roscpp.msg import Logger
 
     publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
     _rosout.addHandler(RosoutHandler(node, publisher))
@@ -129,7 +132,10 @@ def start_rosout(node: NodeProcess) -> None:
     def get_loggers(request: object) -> Any:
         found = [_rosout, *(logging.getLogger(n) for n in logging.root.manager.loggerDict)]
         return GetLoggersResponse(
-            [Logger(logger.name, _LEVEL_NAME.get(logger.getEffectiveLevel(), "INFO").lower()) for logger in found]
+            [
+                Logger(logger.name, _LEVEL_NAME.get(logger.getEffectiveLevel(), "INFO").lower())
+                for logger in found
+            ]
         )
 
     def set_level(request: Any) -> Any:
@@ -210,7 +216,7 @@ class TerminalHandler(logging.Handler):
 class RosoutHandler(logging.Handler):
     """Log records to /rosout."""
 
-    def __init__(self, node: NodeProcess, publisher: Publisher) -> None:
+    def __init__(self, node: NodeProcess, publisher: Publisher[Any]) -> None:
         super().__init__()
         self._node = node
         self._publisher = publisher
@@ -273,9 +279,7 @@ def _once_function(level: int, name: str) -> LogFunction:
 def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLogFunction:
     last: dict[tuple[str, int], tuple[int, object]] = {}
 
-    def log(
-        period: float, msg: object, *args: object, logger_name: str | None = None, **kwargs: Any
-    ) -> None:
+    def log(period: float, msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
         place, now = _caller(), process.clock.now()
         before = last.get(place)
         due = (
@@ -290,12 +294,10 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
             _logger(logger_name).log(level, msg, *args, stacklevel=2, **kwargs)
 
     what = "the same text " if identical else ""
-    return _named(
-        log, name, f"Log at level {_LEVEL_NAME[level]}, {what}at most once in ``period`` seconds."
-    )
+    return _named(log, name, f"Log at level {_LEVEL_NAME[level]}, {what}at most once in ``period`` seconds.")
 
 
-def _named(function: Any, name: str, doc: str) -> Any:
+def _named(function: _F, name: str, doc: str) -> _F:
     function.__name__ = function.__qualname__ = name
     function.__doc__ = doc
     return function

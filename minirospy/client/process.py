@@ -215,9 +215,7 @@ class NodeProcess:
     def on_shutdown(self, hook: Callable[[], object]) -> None:
         """Call ``hook`` when the node shuts down, before it leaves the graph. Raises TypeError."""
         if not callable(hook):
-            raise TypeError(
-                f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}"
-            )
+            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
         with self.lock:
             if not self._shutdown_begun:
                 self._hooks.append(hook)
@@ -308,7 +306,7 @@ class NodeProcess:
     def _retry_signal(self, number: int) -> None:
         if self.late_signal:
             self._is_retry = True
-            _thread.interrupt_main(number)
+            _thread.interrupt_main(signal.Signals(number))
 
     def _wait_for_master(self) -> None:
         """Return when the master answers; says once that it waits. A shutdown ends the wait."""

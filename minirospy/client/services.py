@@ -27,6 +27,7 @@ from minirospy.errors import (
 )
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.runtime.services import ServiceClient, ServiceServer
+from minirospy.times import Duration
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
@@ -247,13 +248,13 @@ class ServiceProxy(Generic[_S]):
         return response
 
 
-def wait_for_service(service: str, timeout: float | None = None) -> None:
+def wait_for_service(service: str, timeout: float | Duration | None = None) -> None:
     """Wait until a service is registered and answers.
 
     Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down.
     """
     name = process.resolve(service)
-    seconds = timeout.to_sec() if hasattr(timeout, "to_sec") else timeout
+    seconds = timeout.to_sec() if isinstance(timeout, Duration) else timeout
     if seconds == 0:
         raise ValueError("timeout must be non-zero")
     end = None if seconds is None else time.monotonic() + seconds

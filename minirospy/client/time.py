@@ -122,9 +122,9 @@ class TimerEvent:
 
     def __init__(
         self,
-        last_expected: Time | None,
+        last_expected: times.Time | None,
         last_real: Time | None,
-        current_expected: Time,
+        current_expected: times.Time,
         current_real: Time,
         last_duration: float | None,
     ) -> None:
@@ -160,8 +160,8 @@ class Timer(threading.Thread):
     def run(self) -> None:
         """The timer's thread."""
         rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
-        expected = rate.last_time + self._period
-        last_expected: Time | None = None
+        expected: times.Time = rate.last_time + self._period
+        last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
         while not process.is_shutdown() and not self._stop_requested.is_set():
@@ -183,8 +183,9 @@ class Timer(threading.Thread):
 
 def follow_clock_topic(clock: SimulatedClock) -> None:
     """Set ``clock`` from /clock (rosgraph_msgs/Clock)."""
-    from minirospy.client.topics import Subscriber
     from rosgraph_msgs.msg import Clock
+
+    from minirospy.client.topics import Subscriber
 
     def on_clock(message: Any) -> None:
         clock.set(message.clock.to_nsec())

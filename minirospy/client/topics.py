@@ -108,8 +108,8 @@ class Topic(Generic[_M]):
             )
         self.name = self.resolved_name
         self.data_class = data_class
-        self.type: str = data_class._type
-        self.md5sum: str = data_class._md5sum
+        self.type: str = data_class._type  # type: ignore[attr-defined]
+        self.md5sum: str = data_class._md5sum  # type: ignore[attr-defined]
         self.reg_type = reg_type
 
 
@@ -336,9 +336,7 @@ class _Published:
             if is_up:
                 process.node.workers.start(listener.peer_subscribe, topic, publish_to_all, publish_to_peer)
             else:
-                process.node.workers.start(
-                    listener.peer_unsubscribe, topic, len(self.publication.links)
-                )
+                process.node.workers.start(listener.peer_unsubscribe, topic, len(self.publication.links))
 
 
 class _Callback(NamedTuple):

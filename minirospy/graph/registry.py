@@ -148,7 +148,9 @@ class Registry:
         """(topic, type) of each published topic below the namespace ``subgraph``."""
         prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
         return [
-            (topic, self._types[topic]) for topic in self._publishers if topic.startswith(prefix) and topic in self._types
+            (topic, self._types[topic])
+            for topic in self._publishers
+            if topic.startswith(prefix) and topic in self._types
         ]
 
     def publishers(self) -> dict[str, list[str]]:

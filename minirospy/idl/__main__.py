@@ -21,10 +21,12 @@ _PACKAGE = Path(__file__).parents[1]
 def main(argv: Sequence[str] | None = None) -> int:
     """The command; exit status as in minirospy.cli.command."""
     parser = Parser(prog="python -m minirospy.idl", description="Compile definitions into Python modules.")
-    parser.add_argument("source", nargs="?", type=Path, help="a folder of packages with msg, srv, action folders")
+    parser.add_argument(
+        "source", nargs="?", type=Path, help="a folder of packages with msg, srv, action folders"
+    )
     parser.add_argument("target", nargs="?", type=Path, help="the folder that gets the Python packages")
 
-    def body() -> None:
+    def body() -> int:
         options = parser.parse_args(argv)
         own = next(p for p in (_PACKAGE.parent / "msgs", _PACKAGE / "share" / "msgs") if p.is_dir())
         catalogue = Catalogue.below(*([options.source] if options.source else []), own)
@@ -37,8 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             for path in write_package(catalogue, package, options.target or _PACKAGE / "overlay")
         ]
         print(f"{len(chosen)} packages, {len(written)} modules written")
+        return 0
 
-    return run("minirospy.idl", lambda: body())
+    return run("minirospy.idl", body)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,15 @@ from collections.abc import Callable
 
 from minirospy.idl.spec import MessageSpec, ServiceSpec
 
-__all__ = ["Lookup", "dependencies", "full_text", "md5_text", "message_md5", "service_full_text", "service_md5"]
+__all__ = [
+    "Lookup",
+    "dependencies",
+    "full_text",
+    "md5_text",
+    "message_md5",
+    "service_full_text",
+    "service_md5",
+]
 
 Lookup = Callable[[str], MessageSpec]
 """``pkg/Name`` -> its spec; raises NotFoundError."""

@@ -8,6 +8,7 @@ included, share one compiled ``struct``; every length is checked against the byt
 from __future__ import annotations
 
 import keyword
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -122,9 +123,7 @@ class _Module:
             if full_name not in own:
                 head.append(f"from {package}.msg._{name} import {name} as {alias}")
         head.append("")
-        head += [
-            f'{alias} = struct.Struct("{letters}")' for letters, alias in sorted(self._structs.items())
-        ]
+        head += [f'{alias} = struct.Struct("{letters}")' for letters, alias in sorted(self._structs.items())]
         return "\n".join([*head, *self._lines, ""])
 
     # --- lines
@@ -419,11 +418,10 @@ class _Module:
         type_ = leaf.type
         letters = PRIMITIVES.get(type_.base, "")
         element = FieldType(type_.base)
+        count = f"{type_.length}"
         if type_.length is None:
             # Elements without bytes: a count beyond the message's size is nonsense all the same.
             count = self._read_length(max(1, self._least_size(element)))
-        else:
-            count = f"{type_.length}"
         if type_.is_bytes:
             if type_.length is not None:
                 with self._block(f"if {count} > size - end:"):
@@ -470,6 +468,6 @@ def _targets(leaf: _Leaf) -> list[str]:
 
 
 def _constant(value: object) -> str:
-    if value != value or value in (float("inf"), float("-inf")):
+    if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
     return repr(value)

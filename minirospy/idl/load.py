@@ -243,4 +243,3 @@ def _known(kind: str) -> Iterable[str]:
         for module in folder.glob(f"*/{kind}/_*.py"):
             if module.stem != "__init__":
                 yield f"{module.parent.parent.name}/{module.stem[1:]}"
-

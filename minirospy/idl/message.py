@@ -60,9 +60,7 @@ class Message:
         names = self.__slots__
         if args:
             if len(args) != len(names):
-                raise TypeError(
-                    f"Invalid number of arguments, args should be {list(names)!s} args are{args}"
-                )
+                raise TypeError(f"Invalid number of arguments, args should be {list(names)!s} args are{args}")
             for name, value in zip(names, args, strict=True):
                 setattr(self, name, value)
             return
@@ -116,7 +114,9 @@ def check_type(field_name: str, field_type: str, field_val: Any) -> None:
     elif field_type in _CHECKS:
         _CHECKS[field_type](field_name, field_type, field_val)
     elif not hasattr(field_val, "_type") or not hasattr(field_val, "_check_types"):
-        raise SerializationError(f"field {field_name} must be a [{field_type}] instance instead of a {type(field_val)}")
+        raise SerializationError(
+            f"field {field_name} must be a [{field_type}] instance instead of a {type(field_val)}"
+        )
     else:
         if field_val._type != field_type:
             raise SerializationError(f"field {field_name} must be of type [{field_type}]")
@@ -339,10 +339,12 @@ def _check_array(name: str, base: str, value: Any) -> None:
     if isinstance(value, bytes | bytearray | memoryview) and base in ("uint8", "char"):
         return
     if isinstance(value, str | bytes):
-        raise SerializationError(
-            f"field {name} must be a list or tuple type. Only uint8[] can be a string"
-        )
-    if not isinstance(value, list | tuple) and not hasattr(value, "__array__") and not hasattr(value, "tolist"):
+        raise SerializationError(f"field {name} must be a list or tuple type. Only uint8[] can be a string")
+    if (
+        not isinstance(value, list | tuple)
+        and not hasattr(value, "__array__")
+        and not hasattr(value, "tolist")
+    ):
         raise SerializationError(f"field {name} must be a list or tuple type")
     for item in value:
         check_type(f"{name}[]", base, item)

@@ -82,7 +82,9 @@ def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]
             current.append(line)
     parts.append(("\n".join(current), first))
     if len(parts) != count:
-        raise DefinitionError(where, 1, f"{len(parts) - 1} lines of '---' instead of {count - 1}: write {form}")
+        raise DefinitionError(
+            where, 1, f"{len(parts) - 1} lines of '---' instead of {count - 1}: write {form}"
+        )
     return parts
 
 

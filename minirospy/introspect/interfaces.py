@@ -75,7 +75,7 @@ class Interfaces:
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """The constants and fields of a type, inner types unfolded, without comments. Raises NotFoundError."""
+        """The constants and fields of a type, inner types unfolded. Raises NotFoundError."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:

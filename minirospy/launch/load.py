@@ -132,7 +132,9 @@ def _parse(text: bytes, file: str) -> _Element:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise LaunchError(file, error.lineno, f"Invalid roslaunch XML syntax: {expat.ErrorString(error.code)}") from None
+        raise LaunchError(
+            file, error.lineno, f"Invalid roslaunch XML syntax: {expat.ErrorString(error.code)}"
+        ) from None
     if roots[0].tag != "launch":
         raise LaunchError(file, roots[0].line, f"the outermost tag is <{roots[0].tag}>, it must be <launch>")
     return roots[0]
@@ -171,7 +173,9 @@ class _File:
         unused = set(self._given) - self._declared
         if unused and self._depth:
             raise LaunchError(
-                self._file, root.line, f"unused args [{', '.join(sorted(unused))}] for include of [{self._file}]"
+                self._file,
+                root.line,
+                f"unused args [{', '.join(sorted(unused))}] for include of [{self._file}]",
             )
 
     def _read(self, element: _Element, scope: _Scope) -> _Scope:
@@ -221,7 +225,9 @@ class _File:
     def _param_value(self, element: _Element) -> Any:
         ways = [way for way in ("value", "textfile", "binfile", "command") if way in element.attributes]
         if len(ways) != 1:
-            raise self._error(element, "<param> tag must have one and only one of value, textfile, binfile, command")
+            raise self._error(
+                element, "<param> tag must have one and only one of value, textfile, binfile, command"
+            )
         text = self._required(element, ways[0], may_be_empty=True)
         type_ = self._optional(element, "type") or "auto"
         try:
@@ -252,10 +258,12 @@ class _File:
             self._spec.clear.append(names.canonicalize(names.join(namespace, param or "")))
             return scope
         if command == "dump":
-            raise self._error(element, "<rosparam command=\"dump\"> is not supported: use `rosparam dump FILE`")
+            raise self._error(element, '<rosparam command="dump"> is not supported: use `rosparam dump FILE`')
         if command != "load":
             raise self._error(element, f"<rosparam> has no command [{command}]: there are load and delete")
-        for key, value in self._yaml(element).items() if param is None else [(param, self._yaml(element, param))]:
+        for key, value in (
+            self._yaml(element).items() if param is None else [(param, self._yaml(element, param))]
+        ):
             if names.is_private(param or ""):
                 scope = replace(scope, private=(*scope.private, (key[1:], value)))
             else:
@@ -286,7 +294,9 @@ class _File:
     def _node(self, element: _Element, scope: _Scope) -> _Scope:
         name = self._required(element, "name")
         if not names.is_legal_base_name(name):
-            raise self._error(element, f"<node> name [{name}] is not legal: letters, digits and _, no namespace")
+            raise self._error(
+                element, f"<node> name [{name}] is not legal: letters, digits and _, no namespace"
+            )
         if self._optional(element, "machine") not in (None, "", "localhost"):
             raise self._error(element, "nodes on other machines are not supported yet: leave machine out")
         namespace = names.join(scope.namespace, self._optional(element, "ns") or "")
@@ -353,7 +363,9 @@ class _File:
     def _include(self, element: _Element, scope: _Scope) -> _Scope:
         file = self._required(element, "file")
         if self._depth >= _DEEPEST_INCLUDE:
-            raise self._error(element, f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?")
+            raise self._error(
+                element, f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
+            )
         inner = self._below(element, scope)
         pass_all = self._flag(element, "pass_all_args")
         given = dict(self._substitution.args) if pass_all else {}
@@ -369,7 +381,7 @@ class _File:
             value = self._optional(child, "value")
             value = self._optional(child, "default") if value is None else value
             if value is None:
-                raise self._error(child, f"<arg name=\"{name}\"> of an <include> needs a value")
+                raise self._error(child, f'<arg name="{name}"> of an <include> needs a value')
             given[name] = value
         try:
             text = Path(file).read_bytes()

@@ -165,15 +165,26 @@ class Launcher:
         _say(f"process[{name}]: started with pid [{process.popen.pid}]")
 
     def _spawn(
-        self, name: str, command: list[str], environment: dict[str, str], output: IO[bytes] | None, cwd: Path | None
+        self,
+        name: str,
+        command: list[str],
+        environment: dict[str, str],
+        output: IO[bytes] | None,
+        cwd: Path | None,
     ) -> _Process:
         # A group of its own: Ctrl-C in the terminal reaches roslaunch alone, which ends the nodes in order.
-        group: dict[str, Any] = (
-            {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if _WINDOWS else {"start_new_session": True}  # type: ignore[attr-defined,unused-ignore]
-        )
+        group: dict[str, Any] = {"start_new_session": True}
+        if sys.platform == "win32":
+            group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
         try:
             popen = subprocess.Popen(
-                command, env=environment, cwd=cwd, stdin=subprocess.DEVNULL, stdout=output, stderr=output and subprocess.STDOUT, **group
+                command,
+                env=environment,
+                cwd=cwd,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output and subprocess.STDOUT,
+                **group,
             )
         except OSError as error:
             raise LaunchError(self._spec.files[0], 0, f"[{name}] cannot be started: {error}") from error
@@ -227,8 +238,9 @@ class Launcher:
             _say("the master has ended: shutting down", sys.stderr)
             return 1
         if node.required:
-            line = f"REQUIRED process [{process.name}] has died!"
-            _say(f"{'=' * 80}{line}\nprocess has finished{'' if code == 0 else f' with exit code {code}'}\nInitiating shutdown!\n{'=' * 80}")
+            bar = "=" * 80
+            how = "has finished" if code == 0 else f"has died with exit code {code}"
+            _say(f"{bar}\nREQUIRED process [{process.name}] {how}\nInitiating shutdown!\n{bar}")
             return 0 if code == 0 else 1
         if node.respawn:
             if node.respawn_delay:

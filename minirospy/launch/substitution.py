@@ -64,7 +64,9 @@ class Substitution:
             "dirname": lambda words: self._dirname(),
         }
         if verb not in rules:
-            raise SubstitutionError(f"unknown substitution [$({text})]; there are {', '.join(rules)} and eval")
+            raise SubstitutionError(
+                f"unknown substitution [$({text})]; there are {', '.join(rules)} and eval"
+            )
         try:
             return rules[verb](words)
         except (TypeError, IndexError):
@@ -112,7 +114,9 @@ class Substitution:
         except (SyntaxError, ValueError) as error:
             raise SubstitutionError(f"[{expression}] is not an expression: {error}") from None
         for node in ast.walk(tree):
-            if not isinstance(node, _ALLOWED) or (isinstance(node, ast.Call) and not isinstance(node.func, ast.Name)):
+            if not isinstance(node, _ALLOWED) or (
+                isinstance(node, ast.Call) and not isinstance(node.func, ast.Name)
+            ):
                 raise SubstitutionError(f"[{expression}] holds what $(eval ...) does not allow")
             if isinstance(node, ast.Pow):
                 raise SubstitutionError(f"[{expression}]: use pow(), not **")

@@ -88,8 +88,9 @@ class Node:
             return_exceptions=True,
         )
         await self._listener.close()
-        for part in (*self.publications.values(), *self.subscriptions.values(), *self.services.values()):
-            part.close()
+        for table in (self.publications, self.subscriptions, self.services):
+            for part in table.values():
+                part.close()
         if self._server:
             await self._server.close()
         await self._rpc.close()

@@ -125,7 +125,7 @@ class _Connection(asyncio.Protocol):
             body = serialize_value(value)
         except RpcFault as fault:
             body = serialize_fault(fault.code, fault.text)
-        except Exception as error:  # a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
             _log.exception("fault in %s", call.method)
             body = serialize_fault(1, f"{type(error).__name__}: {error}")
         self._send(body, message.keep_alive)
@@ -135,7 +135,7 @@ class _Connection(asyncio.Protocol):
             body = serialize_value(await value)
         except RpcFault as fault:
             body = serialize_fault(fault.code, fault.text)
-        except Exception as error:  # a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
             _log.exception("fault in a method")
             body = serialize_fault(1, f"{type(error).__name__}: {error}")
         self._task = None

@@ -84,9 +84,7 @@ class Publication:
         why = check_subscriber(fields, self.topic, self.type)
         if why:
             return why
-        answer = publisher_header(
-            self.topic, self.type, caller_id, latch=self.latch, extra=self.headers
-        )
+        answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         await tcp.send_header(sock, answer)
         tcp.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
         link = tcp.OutLink(

@@ -33,7 +33,9 @@ class Workers:
                 self._idle -= 1
                 self._work.put((function, args))
                 return
-        threading.Thread(target=self._run, args=(function, args), name="minirospy-worker", daemon=True).start()
+        threading.Thread(
+            target=self._run, args=(function, args), name="minirospy-worker", daemon=True
+        ).start()
 
     def _run(self, function: Callable[..., object], args: tuple[object, ...]) -> None:
         while True:

@@ -10,14 +10,26 @@ from typing import NamedTuple
 
 from minirospy.errors import RpcProtocolError
 
-__all__ = ["MAX_BODY", "HttpMessage", "HttpReader", "serialize_error", "serialize_request", "serialize_response"]
+__all__ = [
+    "MAX_BODY",
+    "HttpMessage",
+    "HttpReader",
+    "serialize_error",
+    "serialize_request",
+    "serialize_response",
+]
 
 MAX_BODY = 64 * 1024 * 1024
 """Bytes that a body may have: a parameter may hold a robot's whole description."""
 
 _MAX_HEAD = 64 * 1024
 _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
-_REASONS = {400: "Bad Request", 405: "Method Not Allowed", 413: "Content Too Large", 500: "Internal Server Error"}
+_REASONS = {
+    400: "Bad Request",
+    405: "Method Not Allowed",
+    413: "Content Too Large",
+    500: "Internal Server Error",
+}
 
 
 class HttpMessage(NamedTuple):
@@ -74,7 +86,7 @@ class HttpReader:
             self._buffer += data
         else:
             self._ended = True
-        messages = []
+        messages: list[HttpMessage] = []
         while True:
             message = self._parser.send(None)
             if message is None:

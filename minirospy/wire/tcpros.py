@@ -37,7 +37,9 @@ class InterfaceType(NamedTuple):
     definition: str = ""
 
 
-def subscriber_header(topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False) -> Header:
+def subscriber_header(
+    topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False
+) -> Header:
     """What a subscriber opens with."""
     return {
         "callerid": caller_id,

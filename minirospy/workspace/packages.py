@@ -79,7 +79,9 @@ class Packages:
         Raises NotFoundError with the nearest names, NotExecutableError.
         """
         folder = self.find(package)
-        candidates = [folder / name] if "/" in name else [path for path in _files(folder) if path.name == name]
+        candidates = (
+            [folder / name] if "/" in name else [path for path in _files(folder) if path.name == name]
+        )
         candidates = [path for path in candidates if path.is_file()]
         for path in candidates:
             if _is_python(path):
@@ -159,7 +161,9 @@ def _files(folder: Path) -> Iterator[Path]:
 def _is_program(path: Path) -> bool:
     if path.name in ("setup.py", "__init__.py"):
         return False
-    return _is_python(path) if path.suffix == ".py" else os.access(path, os.X_OK) and _starts_like_program(path)
+    return (
+        _is_python(path) if path.suffix == ".py" else os.access(path, os.X_OK) and _starts_like_program(path)
+    )
 
 
 def _is_python(path: Path) -> bool:

@@ -71,7 +71,9 @@ def listen():
 
 
 def serve():
-    rospy.Service("/set_flag", SetBool, lambda request: SetBoolResponse(request.data, "flag: %s" % request.data))
+    rospy.Service(
+        "/set_flag", SetBool, lambda request: SetBoolResponse(request.data, "flag: " + str(request.data))
+    )
     say("ready")
     sys.stdin.read()
 

@@ -35,7 +35,9 @@ def test_messages_arrive_byte_by_byte(any_master: str, peer: Peer, talker: str, 
 
 
 @pytest.mark.parametrize(("talker", "listener"), PAIRS)
-def test_messages_arrive_where_the_subscriber_was_first(any_master: str, peer: Peer, talker: str, listener: str) -> None:
+def test_messages_arrive_where_the_subscriber_was_first(
+    any_master: str, peer: Peer, talker: str, listener: str
+) -> None:
     hearing = peer(listener, "listen", any_master)
     said = lines_until_ready(peer(talker, "talk", any_master))
     output, errors = hearing.communicate(timeout=40)

@@ -6,4 +6,6 @@ from typing import Any
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
-    raise NotImplementedError(f"actionlib.{name}: this version of minirospy has no actions yet, only actionlib.msg")
+    raise NotImplementedError(
+        f"actionlib.{name}: this version of minirospy has no actions yet, only actionlib.msg"
+    )

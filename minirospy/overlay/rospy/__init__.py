@@ -1,5 +1,6 @@
 """rospy, filled in by minirospy."""
 
-from minirospy.client import *
-from minirospy.client import __all__ as __all__
 from std_msgs.msg import Header as Header
+
+from minirospy.client import *  # noqa: F403
+from minirospy.client import __all__ as __all__
