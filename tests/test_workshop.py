@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import subprocess
@@ -18,7 +19,8 @@ TESTS = Path(__file__).parent
 LISTINGS = TESTS / "workshop"
 OURS = TESTS.parent / "rpi_feros" / "scripts"
 BUTTON = 11
-SECONDS_TO_END = 1.0
+SECONDS_TO_END = 2.0
+"""0.2 on a quiet machine; a busy one needs its time."""
 
 Start = Callable[[Path], subprocess.Popen[str]]
 
@@ -79,6 +81,10 @@ def test_each_press_toggles_the_led_by_service(folder: Path, start: Start, board
     board.press(BUTTON)
     wait_for(board, 2, 0)
     board.release(BUTTON)
+    # The LED is off before the answer is back: a Ctrl-C in between would interrupt the call.
+    assert client.stdout is not None
+    answers = (line for line in client.stdout if "Successfully changed LED state." in line)
+    assert len(list(itertools.islice(answers, 2))) == 2
     interrupt(client)
     interrupt(server)
 
@@ -110,7 +116,7 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 20.0) -> None:
 
 
 def interrupt(process: subprocess.Popen[str]) -> str:
-    """Ctrl-C: the process ends by itself, within a second, with status 0 and without a traceback."""
+    """Ctrl-C: the process ends by itself, soon, with status 0 and without a traceback."""
     began = time.monotonic()
     os.kill(process.pid, signal.SIGINT if os.name == "posix" else signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined]
     output, _ = process.communicate(timeout=20)

@@ -22,6 +22,8 @@ class Toggle:
         except rospy.ServiceException as error:
             rospy.logwarn("button %d: %s", channel, error)
             return
+        except rospy.ROSInterruptException:
+            return  # Ctrl-C during the call
         self._is_on = not self._is_on
         rospy.loginfo(response.message)
 
