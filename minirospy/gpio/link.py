@@ -7,7 +7,6 @@ dies, the next one is, and what was not yet acknowledged is sent again: the call
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
 import sys
 import threading
@@ -50,6 +49,14 @@ CLOSE_PATIENCE = 0.5
 
 MAX_UNACKNOWLEDGED = 10_000
 """Requests under way; beyond, an output waits for the server."""
+
+_SERVE = """\
+import sys
+sys.path.append(sys.argv[1])
+from minirospy.gpio.server import main
+sys.exit(main(sys.argv[2:]))
+"""
+"""`python -m minirospy.gpio.server`, which also finds a package that is imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -306,18 +313,16 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
     if not sys.executable:
         raise BoardError("the virtual board cannot be started: sys.executable is not set")
     root = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
     flags = 0
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
     with place.log_path.open("ab") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "minirospy.gpio.server", str(place.folder), place.name],
+            [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=log,
             cwd=place.folder,
-            env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,
             creationflags=flags,
         )
