@@ -40,6 +40,7 @@ __all__ = ["NodeProcess", "process"]
 
 _T = TypeVar("_T")
 _UNNAMED = "/unnamed"
+_LEAVE_SECONDS = 3.0
 _log = logging.getLogger(__name__)
 
 
@@ -66,6 +67,7 @@ class NodeProcess:
         self._interrupts: list[Callable[[], object]] = []
         self._waiting_for_node: list[Callable[[], object]] = []
         self._shutdown_begun = False
+        self._gone = threading.Event()
         self._previous_handlers: dict[int, Any] = {}
         self.late_signal = 0
         """A signal that came while the main thread was sending; who has sent takes it."""
@@ -196,7 +198,7 @@ class NodeProcess:
             self._loop.run(node.start(xmlrpc_port, tcpros_port))
         except OSError as error:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
-        atexit.register(self.signal_shutdown, "atexit")
+        atexit.register(self._at_exit)
         self._wait_for_master()
         self._set_private_parameters(arguments)
         if not disable_rostime:
@@ -241,12 +243,13 @@ class NodeProcess:
                 interrupt()
         if self.node and self._loop:
             try:
-                self._loop.run(self.node.close(), 3.0)
+                self._loop.run(self.node.close(), _LEAVE_SECONDS)
             except (TimeoutError, RuntimeError) as error:
                 _log.debug("closing the node: %s", error)
             self._loop.close()
         if self._master:
             self._master.close()
+        self._gone.set()
 
     def is_shutdown(self) -> bool:
         """Whether the node has shut down."""
@@ -262,6 +265,11 @@ class NodeProcess:
             self.signal_shutdown("keyboard interrupt")
 
     # --- helpers
+
+    def _at_exit(self) -> None:
+        """The program has ended. Where another thread shuts down, let it take the node out of the graph first."""
+        self.signal_shutdown("atexit")
+        self._gone.wait(_LEAVE_SECONDS)
 
     def _parsed_arguments(self) -> names.Arguments:
         if self._arguments is None:
