@@ -45,27 +45,27 @@ def _ping(argv: Sequence[str]) -> int:
         "-c", dest="count", type=int, default=0, metavar="COUNT", help="number of pings to send"
     )
     options = parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    if options.all:
-        return _ping_all(graph)
-    if not options.node:
-        nodes = list_nodes(graph)
-        raise UsageError(f"please enter a node to ping: {' '.join(nodes) or 'there are none'}")
-    node = find_node(graph, graph.resolve(options.node))
-    print(f"rosnode: node is [{node.name}]")
-    print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
-    times: list[float] = []
-    try:
-        while True:
-            times.append(_ping_once(graph, node))
-            if len(times) == options.count:
-                break
-            time.sleep(1.0)
-    except KeyboardInterrupt:
-        pass
-    if times:
-        print(f"ping average: {sum(times) / len(times):f}ms")
-    return 0
+    with Graph.open("rosnode") as graph:
+        if options.all:
+            return _ping_all(graph)
+        if not options.node:
+            nodes = list_nodes(graph)
+            raise UsageError(f"please enter a node to ping: {' '.join(nodes) or 'there are none'}")
+        node = find_node(graph, graph.resolve(options.node))
+        print(f"rosnode: node is [{node.name}]")
+        print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
+        times: list[float] = []
+        try:
+            while True:
+                _ping_once(graph, node, times)
+                if len(times) == options.count:
+                    break
+                time.sleep(1.0)
+        except KeyboardInterrupt:
+            pass
+        if times:
+            print(f"ping average: {sum(times) / len(times):f}ms")
+        return 0
 
 
 def _ping_all(graph: Graph) -> int:
@@ -75,17 +75,17 @@ def _ping_all(graph: Graph) -> int:
     for node in nodes:
         print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
         try:
-            _ping_once(graph, node)
+            _ping_once(graph, node, [])
         except NodeUnreachableError as error:
             print(f"ERROR: {error}", file=sys.stderr)
             silent += 1
     return 1 if silent else 0
 
 
-def _ping_once(graph: Graph, node: NodeAddress) -> float:
-    milliseconds = ping_node(graph, node, _PING_SECONDS) * 1000.0
-    print(f"xmlrpc reply from {node.uri}\ttime={milliseconds:f}ms", flush=True)
-    return milliseconds
+def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
+    """Ping and print; the milliseconds are in ``times`` before the line is seen, whoever then types Ctrl-C."""
+    times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
+    print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
 
 def _list(argv: Sequence[str]) -> None:
@@ -94,15 +94,15 @@ def _list(argv: Sequence[str]) -> None:
     parser.add_argument("-u", dest="uris", action="store_true", help="list XML-RPC URIs")
     parser.add_argument("-a", "--all", action="store_true", help="list names and URIs")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    nodes = list_nodes(graph, graph.resolve(options.namespace) if options.namespace else "/")
-    if options.all:
-        lines = [f"{node.uri or 'unknown address'} \t{node.name}" for node in graph.addresses(nodes)]
-    elif options.uris:
-        lines = [node.uri or "unknown address" for node in graph.addresses(nodes)]
-    else:
-        lines = nodes
-    print("\n".join(lines))
+    with Graph.open("rosnode") as graph:
+        nodes = list_nodes(graph, graph.resolve(options.namespace) if options.namespace else "/")
+        if options.all:
+            lines = [f"{node.uri or 'unknown address'} \t{node.name}" for node in graph.addresses(nodes)]
+        elif options.uris:
+            lines = [node.uri or "unknown address" for node in graph.addresses(nodes)]
+        else:
+            lines = nodes
+        print("\n".join(lines))
 
 
 def _info(argv: Sequence[str]) -> int:
@@ -112,15 +112,15 @@ def _info(argv: Sequence[str]) -> int:
     parser.add_argument("nodes", nargs="+", metavar="node", help="names of nodes")
     parser.add_argument("-q", "--quiet", action="store_true", help="only what the master knows; ask no node")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    failed = 0
-    for name in options.nodes:
-        detail = node_detail(graph, graph.resolve(name))
-        print(f"{_RULE}\nNode [{detail.name}]")
-        print(_described(detail))
-        if not options.quiet:
-            failed += not _print_connections(graph, detail)
-    return 1 if failed else 0
+    with Graph.open("rosnode") as graph:
+        failed = 0
+        for name in options.nodes:
+            detail = node_detail(graph, graph.resolve(name))
+            print(f"{_RULE}\nNode [{detail.name}]")
+            print(_described(detail))
+            if not options.quiet:
+                failed += not _print_connections(graph, detail)
+        return 1 if failed else 0
 
 
 def _described(detail: NodeDetail) -> str:
@@ -178,16 +178,16 @@ def _machine(argv: Sequence[str]) -> None:
     )
     parser.add_argument("machine", nargs="?", help="a machine's name or address")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    hosts = {node: node_host(graph.node_uri(node)) for node in list_nodes(graph)}
-    known = sorted({host for host in hosts.values() if host})
-    if options.machine is None:
-        print("\n".join(known))
-        return
-    nodes = [node for node, host in hosts.items() if host and _same_host(host, options.machine)]
-    if not nodes:
-        raise NotFoundError("machine", options.machine, known, "no node runs on it")
-    print("\n".join(nodes))
+    with Graph.open("rosnode") as graph:
+        hosts = {node: node_host(graph.node_uri(node)) for node in list_nodes(graph)}
+        known = sorted({host for host in hosts.values() if host})
+        if options.machine is None:
+            print("\n".join(known))
+            return
+        nodes = [node for node, host in hosts.items() if host and _same_host(host, options.machine)]
+        if not nodes:
+            raise NotFoundError("machine", options.machine, known, "no node runs on it")
+        print("\n".join(nodes))
 
 
 def _same_host(one: str, other: str) -> bool:
@@ -206,24 +206,24 @@ def _kill(argv: Sequence[str]) -> int:
     parser.add_argument("nodes", nargs="*", metavar="node", help="names of nodes")
     parser.add_argument("-a", "--all", action="store_true", help="kill all nodes")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    if options.all:
-        nodes = graph.addresses(list_nodes(graph))
-    elif options.nodes:
-        nodes = [find_node(graph, graph.resolve(name)) for name in options.nodes]
-    else:
-        nodes = [find_node(graph, _chosen(list_nodes(graph)))]
-    if not nodes:
-        raise NotFoundError("node", "any", hint="there is none to kill")
-    if len(nodes) == 1:
-        print(f"killing {nodes[0].name}")
-    else:
-        print("killing:\n" + "\n".join(f" * {node.name}" for node in nodes))
-    sys.stdout.flush()
-    for node in nodes:
-        kill_node(graph, node)
-    print("killed")
-    return 0
+    with Graph.open("rosnode") as graph:
+        if options.all:
+            nodes = graph.addresses(list_nodes(graph))
+        elif options.nodes:
+            nodes = [find_node(graph, graph.resolve(name)) for name in options.nodes]
+        else:
+            nodes = [find_node(graph, _chosen(list_nodes(graph)))]
+        if not nodes:
+            raise NotFoundError("node", "any", hint="there is none to kill")
+        if len(nodes) == 1:
+            print(f"killing {nodes[0].name}")
+        else:
+            print("killing:\n" + "\n".join(f" * {node.name}" for node in nodes))
+        sys.stdout.flush()
+        for node in nodes:
+            kill_node(graph, node)
+        print("killed")
+        return 0
 
 
 def _chosen(nodes: list[str]) -> str:
@@ -246,26 +246,26 @@ def _cleanup(argv: Sequence[str]) -> int:
         "rosnode cleanup", description="Take nodes that do not answer out of the master, after a question."
     )
     parser.parse_args(argv)
-    graph = Graph.open("rosnode")
-    silent = unreachable_nodes(graph)
-    if not silent:
+    with Graph.open("rosnode") as graph:
+        silent = unreachable_nodes(graph)
+        if not silent:
+            return 0
+        print("Unable to contact the following nodes:\n" + "\n".join(f" * {node.name}" for node in silent))
+        print("Warning: these might include alive and functioning nodes, e.g. in unstable networks.")
+        print("Cleanup will purge all information about these nodes from the master.")
+        while True:
+            print("Please type y or n to continue:", flush=True)
+            answer = sys.stdin.readline().strip()
+            if answer in ("", "n"):
+                print("aborting")
+                return 1
+            if answer == "y":
+                break
+        for node in silent:
+            print(f"Unregistering {node.name}")
+            forget_node(graph, node)
+        print("done")
         return 0
-    print("Unable to contact the following nodes:\n" + "\n".join(f" * {node.name}" for node in silent))
-    print("Warning: these might include alive and functioning nodes, e.g. in unstable networks.")
-    print("Cleanup will purge all information about these nodes from the master.")
-    while True:
-        print("Please type y or n to continue:", flush=True)
-        answer = sys.stdin.readline().strip()
-        if answer in ("", "n"):
-            print("aborting")
-            return 1
-        if answer == "y":
-            break
-    for node in silent:
-        print(f"Unregistering {node.name}")
-        forget_node(graph, node)
-    print("done")
-    return 0
 
 
 _FAMILY = Family(

@@ -43,11 +43,12 @@ def _set(argv: Sequence[str]) -> None:
     elif options.binfile is not None:
         value = _read_bytes(options.binfile)
     else:
-        value = parse_value(options.value)
-    graph = Graph.open("rosparam")
-    for name, single in parameters.set_parameter(graph, graph.resolve(options.parameter), value):
-        if options.verbose:
-            print(f"set parameter [{name}] to [{single}]")
+        # No text is the empty text to the shell's user; to YAML it would be null.
+        value = parse_value(options.value) if options.value else ""
+    with Graph.open("rosparam") as graph:
+        for name, single in parameters.set_parameter(graph, graph.resolve(options.parameter), value):
+            if options.verbose:
+                print(f"set parameter [{name}] to [{single}]")
 
 
 def _get(argv: Sequence[str]) -> None:
@@ -56,12 +57,12 @@ def _get(argv: Sequence[str]) -> None:
     parser.add_argument("-p", dest="pretty", action="store_true", help="print it for people, not as YAML")
     _add_verbose(parser)
     options = parser.parse_args(argv)
-    graph = Graph.open("rosparam")
-    name = graph.resolve(options.parameter)
-    if options.verbose:
-        print(f"getting parameter [{name}]")
-    value = parameters.get_parameter(graph, name)
-    print(format_pretty(value) if options.pretty else format_value(value))
+    with Graph.open("rosparam") as graph:
+        name = graph.resolve(options.parameter)
+        if options.verbose:
+            print(f"getting parameter [{name}]")
+        value = parameters.get_parameter(graph, name)
+        print(format_pretty(value) if options.pretty else format_value(value))
 
 
 def _load(argv: Sequence[str]) -> None:
@@ -70,18 +71,18 @@ def _load(argv: Sequence[str]) -> None:
     parser.add_argument("namespace", nargs="?", default="", help="where they go")
     _add_verbose(parser)
     options = parser.parse_args(argv)
-    graph = Graph.open("rosparam")
-    from_stdin = options.file == "-"
-    where = "standard input" if from_stdin else options.file
-    if options.verbose:
-        print(f"reading parameters from {'stdin' if from_stdin else f'[{options.file}]'}", flush=True)
-    text = sys.stdin.read() if from_stdin else _read(options.file)
-    for file in parameters.parse_parameters(text, where, graph.resolve(options.namespace)):
-        if options.verbose and file.own_namespace:
-            print(f"reading parameters into namespace [{file.namespace}]")
-        for name, value in parameters.set_parameter(graph, file.namespace, file.values):
-            if options.verbose:
-                print(f"{name}={value}")
+    with Graph.open("rosparam") as graph:
+        from_stdin = options.file == "-"
+        where = "standard input" if from_stdin else options.file
+        if options.verbose:
+            print(f"reading parameters from {'stdin' if from_stdin else f'[{options.file}]'}", flush=True)
+        text = sys.stdin.read() if from_stdin else _read(options.file)
+        for file in parameters.parse_parameters(text, where, graph.resolve(options.namespace)):
+            if options.verbose and file.own_namespace:
+                print(f"reading parameters into namespace [{file.namespace}]")
+            for name, value in parameters.set_parameter(graph, file.namespace, file.values):
+                if options.verbose:
+                    print(f"{name}={value}")
 
 
 def _dump(argv: Sequence[str]) -> None:
@@ -90,19 +91,19 @@ def _dump(argv: Sequence[str]) -> None:
     parser.add_argument("namespace", nargs="?", default="/", help="only those below this name")
     _add_verbose(parser)
     options = parser.parse_args(argv)
-    graph = Graph.open("rosparam")
-    namespace = graph.resolve(options.namespace)
-    values = parameters.get_parameter(graph, namespace)
-    if options.file == "-":
-        sys.stdout.write(parameters.dump_parameters(values))
-        return
-    if options.verbose:
-        print(f"dumping namespace [{namespace}] to file [{options.file}]")
-        print("\n".join(f"{name}={value}" for name, value in parameters.flatten(namespace, values)))
-    try:
-        Path(options.file).write_text(parameters.dump_parameters(values), encoding="utf-8")
-    except OSError as error:
-        raise ValueTextError(options.file, f"cannot be written: {error.strerror}") from error
+    with Graph.open("rosparam") as graph:
+        namespace = graph.resolve(options.namespace)
+        values = parameters.get_parameter(graph, namespace)
+        if options.file == "-":
+            sys.stdout.write(parameters.dump_parameters(values))
+            return
+        if options.verbose:
+            print(f"dumping namespace [{namespace}] to file [{options.file}]")
+            print("\n".join(f"{name}={value}" for name, value in parameters.flatten(namespace, values)))
+        try:
+            Path(options.file).write_text(parameters.dump_parameters(values), encoding="utf-8")
+        except OSError as error:
+            raise ValueTextError(options.file, f"cannot be written: {error.strerror}") from error
 
 
 def _delete(argv: Sequence[str]) -> None:
@@ -110,11 +111,11 @@ def _delete(argv: Sequence[str]) -> None:
     parser.add_argument("parameter", help="the parameter's name")
     _add_verbose(parser)
     options = parser.parse_args(argv)
-    graph = Graph.open("rosparam")
-    name = graph.resolve(options.parameter)
-    parameters.delete_parameter(graph, name)
-    if options.verbose:
-        print(f"deleted parameter [{name}]")
+    with Graph.open("rosparam") as graph:
+        name = graph.resolve(options.parameter)
+        parameters.delete_parameter(graph, name)
+        if options.verbose:
+            print(f"deleted parameter [{name}]")
 
 
 def _list(argv: Sequence[str]) -> None:
@@ -123,8 +124,8 @@ def _list(argv: Sequence[str]) -> None:
     )
     parser.add_argument("namespace", nargs="?", default="/", help="only those below this name")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosparam")
-    print("\n".join(parameters.list_parameters(graph, graph.resolve(options.namespace))))
+    with Graph.open("rosparam") as graph:
+        print("\n".join(parameters.list_parameters(graph, graph.resolve(options.namespace))))
 
 
 def _add_verbose(parser: Parser) -> None:

@@ -24,31 +24,36 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _args(argv: Sequence[str]) -> None:
-    graph, service = _one_service("args", "Print the names of the fields of a service's request.", argv)
-    print(" ".join(services.service_arguments(services.service_type(graph, service))))
+    name = _one_service("args", "Print the names of the fields of a service's request.", argv)
+    with Graph.open("rosservice") as graph:
+        print(" ".join(services.service_arguments(services.service_type(graph, graph.resolve(name)))))
 
 
 def _info(argv: Sequence[str]) -> None:
-    graph, service = _one_service("info", "Print a service's node, URI, type and arguments.", argv)
-    detail = services.service_detail(graph, service)
+    name = _one_service("info", "Print a service's node, URI, type and arguments.", argv)
+    with Graph.open("rosservice") as graph:
+        detail = services.service_detail(graph, graph.resolve(name))
     print(f"Node: {detail.node}\nURI: {detail.uri}\nType: {detail.type}\nArgs: {' '.join(detail.arguments)}")
 
 
 def _type(argv: Sequence[str]) -> None:
-    graph, service = _one_service("type", "Print a service's type.", argv)
-    print(services.service_type(graph, service))
+    name = _one_service("type", "Print a service's type.", argv)
+    with Graph.open("rosservice") as graph:
+        print(services.service_type(graph, graph.resolve(name)))
 
 
 def _uri(argv: Sequence[str]) -> None:
-    graph, service = _one_service("uri", "Print where a service is called.", argv)
-    print(services.service_uri(graph, service))
+    name = _one_service("uri", "Print where a service is called.", argv)
+    with Graph.open("rosservice") as graph:
+        print(services.service_uri(graph, graph.resolve(name)))
 
 
 def _find(argv: Sequence[str]) -> None:
     parser = Parser("rosservice find", description="Print the services of a type.")
     parser.add_argument("type", help="a service type, as std_srvs/SetBool")
     options = parser.parse_args(argv)
-    print("\n".join(services.find_services_of_type(Graph.open("rosservice"), options.type)))
+    with Graph.open("rosservice") as graph:
+        print("\n".join(services.find_services_of_type(graph, options.type)))
 
 
 def _list(argv: Sequence[str]) -> None:
@@ -56,11 +61,11 @@ def _list(argv: Sequence[str]) -> None:
     parser.add_argument("namespace", nargs="?", help="only services at or below this name")
     parser.add_argument("-n", "--nodes", action="store_true", help="print the nodes that provide them, too")
     options = parser.parse_args(argv)
-    graph = Graph.open("rosservice")
-    for service in services.list_services(
-        graph, graph.resolve(options.namespace) if options.namespace else "/"
-    ):
-        print(f"{service.name} {','.join(service.nodes)}" if options.nodes else service.name)
+    with Graph.open("rosservice") as graph:
+        for service in services.list_services(
+            graph, graph.resolve(options.namespace) if options.namespace else "/"
+        ):
+            print(f"{service.name} {','.join(service.nodes)}" if options.nodes else service.name)
 
 
 def _call(argv: Sequence[str]) -> None:
@@ -74,16 +79,16 @@ def _call(argv: Sequence[str]) -> None:
     parser.add_argument("-v", dest="verbose", action="store_true", help="print the request, too")
     parser.add_argument("--wait", action="store_true", help="wait until the service is there")
     options = parser.parse_intermixed_args(argv)
-    graph = Graph.open("rosservice")
-    service = graph.resolve(options.service)
-    if options.wait:
-        services.wait_for_service(graph, service)
-    type_ = services.service_type(graph, service)
-    for values in _requests(type_, options.args):
-        request = services.fill_request(type_, values)
-        if options.verbose:
-            print(f"{request}\n---", flush=True)
-        print(services.call_service(graph, service, type_, request), flush=True)
+    with Graph.open("rosservice") as graph:
+        service = graph.resolve(options.service)
+        if options.wait:
+            services.wait_for_service(graph, service)
+        type_ = services.service_type(graph, service)
+        for values in _requests(type_, options.args):
+            request = services.fill_request(type_, values)
+            if options.verbose:
+                print(f"{request}\n---", flush=True)
+            print(services.call_service(graph, service, type_, request), flush=True)
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[list[Any]]:
@@ -105,13 +110,11 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[list[Any]]:
             yield document if isinstance(document, list) else [document]
 
 
-def _one_service(verb: str, description: str, argv: Sequence[str]) -> tuple[Graph, str]:
-    """The graph and the global name of the one service that a verb is about."""
+def _one_service(verb: str, description: str, argv: Sequence[str]) -> str:
+    """The name, as typed, of the one service that a verb is about."""
     parser = Parser(f"rosservice {verb}", description=description)
     parser.add_argument("service", help="the service's name")
-    options = parser.parse_args(argv)
-    graph = Graph.open("rosservice")
-    return graph, graph.resolve(options.service)
+    return str(parser.parse_args(argv).service)
 
 
 _FAMILY = Family(

@@ -19,6 +19,7 @@ from minirospy.introspect.graph import Graph
 if TYPE_CHECKING:
     import argparse
 
+    from minirospy.introspect.graph import NodeAddress
     from minirospy.introspect.rates import Spread
     from minirospy.introspect.streams import Received, ToolNode, TopicPublisher
 
@@ -49,18 +50,18 @@ def _list(argv: Sequence[str]) -> None:
     side.add_argument("-s", dest="subscribers", action="store_true", help="list only subscribers")
     parser.add_argument("--host", action="store_true", help="group by host name")
     options = parser.parse_args(argv)
-    graph = Graph.open("rostopic")
-    namespace = graph.resolve(options.namespace) if options.namespace else "/"
-    if not options.verbose and not options.host:
-        print("\n".join(_names(graph, namespace, options)))
-        return
-    found = topics.list_topics(graph, namespace)
-    if not options.host:
-        _print_topics(found, options, indent="")
-        return
-    for host, on_host in topics.by_host(graph, found).items():
-        print(f"Host [{host}]:")
-        _print_topics(on_host, options, indent="  ")
+    with Graph.open("rostopic") as graph:
+        namespace = graph.resolve(options.namespace) if options.namespace else "/"
+        if not options.verbose and not options.host:
+            print("\n".join(_names(graph, namespace, options)))
+            return
+        found = topics.list_topics(graph, namespace)
+        if not options.host:
+            _print_topics(found, options, indent="")
+            return
+        for host, on_host in topics.by_host(graph, found).items():
+            print(f"Host [{host}]:")
+            _print_topics(on_host, options, indent="  ")
 
 
 def _names(graph: Graph, namespace: str, options: argparse.Namespace) -> list[str]:
@@ -94,10 +95,11 @@ def _print_rows(rows: list[topics.TopicNodes], word: str, indent: str) -> None:
 
 
 def _info(argv: Sequence[str]) -> None:
-    graph, topic = _one_topic("info", "Print a topic's type, publishers and subscribers.", argv)
-    detail = topics.topic_detail(graph, topic)
+    name = _one_topic("info", "Print a topic's type, publishers and subscribers.", argv)
+    with Graph.open("rostopic") as graph:
+        detail = topics.topic_detail(graph, graph.resolve(name))
 
-    def side(title: str, nodes: list[Any]) -> str:
+    def side(title: str, nodes: list[NodeAddress]) -> str:
         if not nodes:
             return f"{title}: None"
         rows = (f" * {node.name} ({node.uri or f'unknown address {node.name}'})" for node in nodes)
@@ -109,8 +111,9 @@ def _info(argv: Sequence[str]) -> None:
 
 
 def _type(argv: Sequence[str]) -> None:
-    graph, name = _one_topic("type", "Print the type of a topic, or of a field of its messages.", argv)
-    field = topics.require_topic(graph, name)
+    name = _one_topic("type", "Print the type of a topic, or of a field of its messages.", argv)
+    with Graph.open("rostopic") as graph:
+        field = topics.require_topic(graph, graph.resolve(name))
     print(f"{field.type} {field.path} {topics.topic_field_type(field)}" if field.path else field.type)
 
 
@@ -118,16 +121,15 @@ def _find(argv: Sequence[str]) -> None:
     parser = Parser("rostopic find", description="List the topics of a type.")
     parser.add_argument("type", help="a message type, as std_msgs/Bool")
     options = parser.parse_args(argv)
-    print("\n".join(topics.find_topics_of_type(Graph.open("rostopic"), options.type)))
+    with Graph.open("rostopic") as graph:
+        print("\n".join(topics.find_topics_of_type(graph, options.type)))
 
 
-def _one_topic(verb: str, description: str, argv: Sequence[str]) -> tuple[Graph, str]:
-    """The graph and the global name of the one topic that a verb is about."""
+def _one_topic(verb: str, description: str, argv: Sequence[str]) -> str:
+    """The name, as typed, of the one topic that a verb is about."""
     parser = Parser(f"rostopic {verb}", description=description)
     parser.add_argument("topic", help="the topic's name")
-    options = parser.parse_args(argv)
-    graph = Graph.open("rostopic")
-    return graph, graph.resolve(options.topic)
+    return str(parser.parse_args(argv).topic)
 
 
 # --- what goes over a topic
@@ -161,10 +163,9 @@ def _echo(argv: Sequence[str]) -> None:
     from minirospy.introspect.streams import wait_for_topic
 
     keep = Filter(options.filter) if options.filter else None
-    graph = Graph.open("rostopic")
-    field = wait_for_topic(
-        graph, graph.resolve(options.topic), lambda: _warn_unpublished(graph, options.topic)
-    )
+    with Graph.open("rostopic") as graph:
+        topic = graph.resolve(options.topic)
+        field = wait_for_topic(graph, topic, lambda: _warn_unpublished(topic))
     echo = Echo(
         field,
         plot=options.plot,
@@ -329,19 +330,20 @@ def _add_window(parser: Parser, default: int) -> None:
     )
 
 
-def _published_topics(names: Sequence[str]) -> Iterator[str]:
+def _published_topics(names: Sequence[str]) -> list[str]:
     """The global names of topics; one that nobody publishes yet is warned of."""
-    graph = Graph.open("rostopic")
-    for name in names:
-        topic = graph.resolve(name)
-        if topic not in graph.state().publishers:
-            _warn_unpublished(graph, name)
-        yield topic
+    with Graph.open("rostopic") as graph:
+        found = [graph.resolve(name) for name in names]
+        published = graph.state().publishers
+    for topic in found:
+        if topic not in published:
+            _warn_unpublished(topic)
+    return found
 
 
-def _warn_unpublished(graph: Graph, name: str) -> None:
+def _warn_unpublished(topic: str) -> None:
     sys.stdout.flush()
-    print(f"WARNING: topic [{graph.resolve(name)}] does not appear to be published yet", file=sys.stderr)
+    print(f"WARNING: topic [{topic}] does not appear to be published yet", file=sys.stderr)
 
 
 # --- publishing
@@ -381,20 +383,20 @@ def _pub(argv: Sequence[str]) -> None:
     from minirospy.names import is_legal_name
 
     cls = message_class(options.type)
-    graph = Graph.open("rostopic")
-    topic = graph.resolve(options.topic)
-    if not is_legal_name(topic):
-        raise UsageError(f"[{options.topic}] is not a legal name of a topic: letters, digits, _ and /")
-    all_values = _messages_to_publish(cls, options)
-    values = next(all_values)
-    # Before the node is there, so that a typing error shows at once.
-    message = fill_message(cls, values)
-    _warn_other_type(graph, topic, cls._type)
+    with Graph.open("rostopic") as graph:
+        topic = graph.resolve(options.topic)
+        if not is_legal_name(topic):
+            raise UsageError(f"[{options.topic}] is not a legal name of a topic: letters, digits, _ and /")
+        all_values = _messages_to_publish(cls, options)
+        values = next(all_values)
+        # Before the node is there, so that a typing error shows at once.
+        message = fill_message(cls, values)
+        _warn_other_type(graph, topic, cls._type)
     # One message stays for late subscribers; a stream of them does not, unless asked to.
-    streaming = options.rate is not None or ((options.file is not None or not options.args) and cls.__slots__)
-    latch = options.once or options.latch or not streaming
+    from_documents = bool(not options.args and (cls.__slots__ or options.file))
+    streaming = options.rate is not None or from_documents
     with _tool_node() as node:
-        publisher = node.publisher(topic, cls, latch=latch)
+        publisher = node.publisher(topic, cls, latch=options.once or options.latch or not streaming)
         shown = f"[{message}]" if options.verbose else "message"
         if options.once:
             print(f"publishing and latching {shown} for {_LATCH_SECONDS} seconds", flush=True)
@@ -405,11 +407,11 @@ def _pub(argv: Sequence[str]) -> None:
             publisher.publish(message)
             while not node.wait(3600.0):
                 pass
-        elif options.args:
-            refill = (lambda: fill_message(cls, values)) if options.substitute_keywords else (lambda: message)
-            _publish_at_rate(node, publisher, refill, options)
-        else:
+        elif from_documents:
             _publish_all(node, publisher, message, (fill_message(cls, each) for each in all_values), options)
+        else:
+            anew = options.substitute_keywords
+            _publish_at_rate(node, publisher, lambda: fill_message(cls, values) if anew else message, options)
 
 
 def _publish_at_rate(

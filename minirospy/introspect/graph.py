@@ -25,7 +25,7 @@ class NodeAddress(NamedTuple):
 
 
 class Graph:
-    """A master, asked in the name of ``tool``; names are resolved in ``namespace``.
+    """A master, asked in the name of ``tool``; names are resolved in ``namespace``. A context manager.
 
     Every call raises MasterUnreachableError where no master answers.
     """
@@ -44,6 +44,16 @@ class Graph:
         # A tool that only asks is reached by nobody: no look-up of this machine's own name.
         environment = Environment.read(environ, host="localhost")
         return cls(MasterProxy(environment.master_uri, "/" + tool), tool, environment.namespace)
+
+    def __enter__(self) -> Graph:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection to the master. Idempotent."""
+        self.master.close()
 
     def resolve(self, name: str) -> str:
         """The global name of ``name``."""

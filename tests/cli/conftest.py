@@ -1,0 +1,147 @@
+"""A small graph for the commands: one node that publishes, listens and serves."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from geometry_msgs.msg import Point32, PolygonStamped
+from std_msgs.msg import Bool, String
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
+
+from minirospy.environment import Environment
+from minirospy.errors import ServiceException
+from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.node import Node
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+BIN = Path(sys.executable).parent
+
+
+class Robot(NamedTuple):
+    """The node, its loop, what it has heard on /listen, and the reasons it was asked to stop for."""
+
+    node: Node
+    loop: LoopThread
+    heard: list[bytes]
+    stopped: list[str]
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Publish; late subscribers get it too."""
+        buffer = BytesIO()
+        message.serialize(buffer)
+        body = buffer.getvalue()
+        self.node.publications[topic].publish(len(body).to_bytes(4, "little") + body)
+
+
+@pytest.fixture
+def robot(master: str) -> Iterator[Robot]:
+    """/robot: publishes /button_state, /ns/chatter, /poly (latched), hears /listen, serves /set_led_state, /fail."""
+    loop = LoopThread("robot")
+    stopped: list[str] = []
+    heard: list[bytes] = []
+    node = Node("/robot", Environment.read(), on_shutdown=stopped.append)
+    loop.run(node.start())
+    try:
+        for topic, cls in (("/button_state", Bool), ("/ns/chatter", String), ("/poly", PolygonStamped)):
+            type_ = InterfaceType(cls._type, cls._md5sum, cls._full_text)
+            loop.run(node.advertise(Publication(topic, type_, latch=True)))
+        listen = InterfaceType(Bool._type, Bool._md5sum, Bool._full_text)
+        subscription = node.make_subscription("/listen", listen, lambda body, _: heard.append(bytes(body)))
+        loop.run(node.subscribe(subscription))
+        anything = node.make_subscription("/any", InterfaceType(ANY, ANY), lambda *_: None)
+        loop.run(node.subscribe(anything))
+        for name, srv, handler in (
+            ("/set_led_state", SetBool, _set_led_state),
+            ("/fail", Trigger, _fail),
+        ):
+            server = node.make_service(
+                name,
+                InterfaceType(srv._type, srv._md5sum),
+                handler,
+                request_type=srv._request_class._type,
+                response_type=srv._response_class._type,
+            )
+            loop.run(node.serve(server))
+        robot = Robot(node, loop, heard, stopped)
+        robot.publish("/button_state", Bool(True))
+        robot.publish("/ns/chatter", String("hello"))
+        polygon = PolygonStamped()
+        polygon.polygon.points = [Point32(1.0, 2.0, 3.0), Point32(4.0, 5.0, 6.0)]
+        robot.publish("/poly", polygon)
+        yield robot
+    finally:
+        loop.run(node.close())
+        loop.close()
+
+
+def _set_led_state(body: memoryview, _: object) -> bytes:
+    request = SetBoolRequest()
+    request.deserialize(bytes(body))
+    buffer = BytesIO()
+    SetBoolResponse(request.data, "Successfully changed LED state.").serialize(buffer)
+    return buffer.getvalue()
+
+
+def _fail(_: object, __: object) -> bytes:
+    raise ServiceException("error processing request: bad thing")
+
+
+class Result(NamedTuple):
+    """How a command ended, and what it printed."""
+
+    status: int
+    out: str
+    err: str
+
+
+Command = Callable[..., Result]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run a command in this process: ``command("rostopic", "list", "-v")``."""
+
+    def run(name: str, *argv: str) -> Result:
+        module = import_module("minirospy.cli." + ("rosmsg" if name == "rossrv" else name))
+        capsys.readouterr()
+        main = module.main_srv if name == "rossrv" else module.main
+        try:
+            status = main(list(argv))
+        except SystemExit as ended:  # argparse ends `-h` so
+            status = ended.code
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return Result(status, out, err)
+
+    return run
+
+
+@pytest.fixture
+def program() -> Iterator[Callable[[Sequence[str]], subprocess.Popen[str]]]:
+    """Start a command's console script as a process of its own; it is ended when the test ends."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(words: Sequence[str]) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [str(BIN / words[0]), *words[1:]],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

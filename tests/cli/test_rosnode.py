@@ -1,0 +1,158 @@
+"""rosnode: its lines as real ROS prints them, and its exit statuses."""
+
+from __future__ import annotations
+
+import io
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+
+from minirospy.runtime.master_proxy import MasterProxy
+
+Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def ghost(master: str) -> str:
+    """The URI of /ghost, which is registered and does not answer."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        uri = f"http://localhost:{probe.getsockname()[1]}/"
+    proxy = MasterProxy(master, "/ghost")
+    proxy.register_publisher("/boo", "std_msgs/Bool", uri)
+    proxy.register_subscriber("/listen", "std_msgs/Bool", uri)
+    proxy.register_service("/haunt", "rosrpc://localhost:1", uri)
+    proxy.close()
+    return uri
+
+
+def test_list(robot: Any, ghost: str, command: Any) -> None:
+    uri = robot.node.uri
+    assert command("rosnode", "list") == (0, "/ghost\n/robot\n", "")
+    assert command("rosnode", "list", "/robot").out == "/robot\n"
+    assert command("rosnode", "list", "/nope").out == "\n"
+    assert command("rosnode", "list", "-u").out == f"{ghost}\n{uri}\n"
+    assert command("rosnode", "list", "-a").out == f"{ghost} \t/ghost\n{uri} \t/robot\n"
+
+
+def test_info(robot: Any, command: Any) -> None:
+    expected = (
+        "-" * 80 + "\nNode [/robot]\nPublications: \n * /button_state [std_msgs/Bool]\n"
+        " * /ns/chatter [std_msgs/String]\n * /poly [geometry_msgs/PolygonStamped]\n\n"
+        "Subscriptions: \n * /any [unknown type]\n * /listen [unknown type]\n\n"
+        "Services: \n * /fail\n * /set_led_state\n\n"
+    )  # fmt: skip
+    assert command("rosnode", "info", "-q", "robot") == (0, expected, "")
+    status, out, err = command("rosnode", "info", "/robot")
+    assert (status, err) == (0, "")
+    assert re.fullmatch(
+        re.escape(f"{expected}\ncontacting node {robot.node.uri} ...\n") + r"Pid: \d+\n\n", out
+    )
+
+
+def test_info_shows_connections(robot: Any, program: Start, command: Any) -> None:
+    echo = program(["rostopic", "echo", "/button_state"])
+    assert echo.stdout is not None
+    assert echo.stdout.readline() == "data: True\n"
+    (name,) = [each for each in command("rosnode", "list").out.split() if each != "/robot"]
+    there = command("rosnode", "info", "/robot").out
+    assert f"Connections:\n * topic: /button_state\n    * to: {name}\n    * direction: outbound" in there
+    assert "    * transport: TCPROS\n" in there
+    here = command("rosnode", "info", name).out
+    assert f" * topic: /button_state\n    * to: /robot ({robot.node.uri})\n    * direction: inbound" in here
+
+
+def test_a_node_that_does_not_answer(robot: Any, ghost: str, command: Any) -> None:
+    status, out, err = command("rosnode", "info", "/ghost")
+    assert status == 1
+    assert out.endswith(f"contacting node {ghost} ...\n")
+    assert err.startswith(f"ERROR: node [/ghost] does not answer at {ghost}")
+    assert command("rosnode", "ping", "/ghost").status == 1
+    status, out, err = command("rosnode", "ping", "-a")
+    assert status == 1
+    assert out.startswith(
+        "Will ping the following nodes: \n * /ghost\n * /robot\n\npinging /ghost with a timeout"
+    )
+    assert f"xmlrpc reply from {robot.node.uri}\ttime=" in out
+    assert err.count("\n") == 1
+
+
+def test_ping(robot: Any, command: Any, program: Start) -> None:
+    uri = re.escape(robot.node.uri)
+    status, out, err = command("rosnode", "ping", "-c", "1", "robot")
+    assert (status, err) == (0, "")
+    assert re.fullmatch(
+        r"rosnode: node is \[/robot\]\npinging /robot with a timeout of 3\.0s\n"
+        rf"xmlrpc reply from {uri}\ttime=\d+\.\d{{6}}ms\nping average: \d+\.\d{{6}}ms\n",
+        out,
+    )
+    ping = program(["rosnode", "ping", "/robot"])
+    assert ping.stdout is not None
+    while not ping.stdout.readline().startswith("xmlrpc reply"):
+        pass
+    ping.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+    out, err = ping.communicate(timeout=10)
+    assert (ping.returncode, err) == (0, "")
+    assert "ping average: " in out
+
+
+def test_kill(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert command("rosnode", "kill", "/robot") == (0, "killing /robot\nkilled\n", "")
+    deadline = time.monotonic() + 5
+    while not robot.stopped and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert "user request" in robot.stopped[0]
+    monkeypatch.setattr(sys, "stdin", io.StringIO("x\n7\n1\n"))
+    out = command("rosnode", "kill").out
+    assert out.startswith(
+        "1. /robot\n\nPlease enter the number of the node you wish to kill.\n> ERROR: please"
+    )
+    assert out.endswith("> killing /robot\nkilled\n")
+    assert command("rosnode", "kill", "-a").out == "killing /robot\nkilled\n"
+
+
+def test_cleanup(robot: Any, ghost: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO("n\n"))
+    assert command("rosnode", "cleanup").status == 1
+    monkeypatch.setattr(sys, "stdin", io.StringIO("what\ny\n"))
+    status, out, _ = command("rosnode", "cleanup")
+    assert status == 0
+    assert out.startswith("Unable to contact the following nodes:\n * /ghost\nWarning: ")
+    assert out.endswith("Unregistering /ghost\ndone\n")
+    assert command("rosnode", "list").out == "/robot\n"
+    assert command("rosservice", "list").out == "/fail\n/set_led_state\n"
+    assert command("rosnode", "cleanup") == (0, "", "")
+
+
+def test_machines(robot: Any, command: Any) -> None:
+    assert command("rosnode", "machine").out == "localhost\n"
+    assert command("rosnode", "machine", "localhost").out == "/robot\n"
+    assert command("rosnode", "machine", "127.0.0.1").out == "/robot\n"
+    assert command("rosnode", "machine", "nowhere.invalid").status == 1
+
+
+@pytest.mark.parametrize("verb", ["info", "ping", "kill"])
+def test_unknown_nodes(robot: Any, command: Any, verb: str) -> None:
+    status, _, err = command("rosnode", verb, "/robt")
+    assert (status, err) == (1, "rosnode: ERROR: node [/robt] not found; did you mean /robot?\n")
+
+
+def test_help_and_no_master(command: Any) -> None:
+    for verb in ("ping", "list", "info", "machine", "kill", "cleanup"):
+        assert f"\trosnode {verb}\t" in command("rosnode", "-h").out
+        assert command("rosnode", verb, "-h").status == 0
+    for argv in (["list"], ["info", "/a"], ["ping", "/a"], ["kill", "/a"], ["machine"], ["cleanup"]):
+        status, out, err = command("rosnode", *argv)
+        assert (status, out) == (1, "")
+        assert "no ROS master answers at http://localhost:1" in err
+
+
+def test_the_program(robot: Any, program: Start) -> None:
+    assert program(["rosnode", "list"]).communicate(timeout=20) == ("/robot\n", "")

@@ -1,0 +1,125 @@
+"""rosservice: its lines as real ROS prints them, and its exit statuses."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+
+from minirospy.runtime.master_proxy import MasterProxy
+
+Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
+
+
+def test_list(robot: Any, command: Any) -> None:
+    assert command("rosservice", "list") == (0, "/fail\n/set_led_state\n", "")
+    assert command("rosservice", "list", "-n").out == "/fail /robot\n/set_led_state /robot\n"
+    assert command("rosservice", "list", "/fail").out == "/fail\n"
+    assert command("rosservice", "list", "/nope") == (0, "", "")
+
+
+def test_what_a_service_is(robot: Any, command: Any) -> None:
+    uri = robot.node.service_uri
+    assert command("rosservice", "type", "/set_led_state").out == "std_srvs/SetBool\n"
+    assert command("rosservice", "uri", "set_led_state").out == f"{uri}\n"
+    assert command("rosservice", "args", "/set_led_state").out == "data\n"
+    assert command("rosservice", "args", "/fail").out == "\n"
+    assert command("rosservice", "info", "/set_led_state").out == (
+        f"Node: /robot\nURI: {uri}\nType: std_srvs/SetBool\nArgs: data\n"
+    )
+    assert command("rosservice", "find", "std_srvs/Trigger").out == "/fail\n"
+    assert command("rosservice", "find", "std_srvs/Nope").out == "\n"
+
+
+@pytest.mark.parametrize(
+    "arguments", [["data: True"], ["{data: True}"], ["True"], ["1"], ["true"], ["data: True", "--wait"]]
+)
+def test_call_the_workshops_way(robot: Any, command: Any, arguments: list[str]) -> None:
+    assert command("rosservice", "call", "/set_led_state", *arguments) == (
+        0,
+        'success: True\nmessage: "Successfully changed LED state."\n',
+        "",
+    )
+
+
+def test_call_verbosely_and_from_standard_input(
+    robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = 'success: False\nmessage: "Successfully changed LED state."\n'
+    assert (
+        command("rosservice", "call", "-v", "set_led_state", "data: False").out
+        == f"data: False\n---\n{answer}"
+    )
+    monkeypatch.setattr(sys, "stdin", io.StringIO("data: False\n---\ndata: False\n"))
+    assert command("rosservice", "call", "set_led_state").out == answer * 2
+    assert command("rosservice", "call", "set_led_state", "{}").out == answer
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "why"),
+    [
+        (["/fail"], 1, "service [/fail] responded with an error: error processing request: bad thing\n"),
+        (["/set_led_stat", "True"], 1, "service [/set_led_stat] not found; did you mean /set_led_state?\n"),
+        (["/set_led_state", "datum: True"], 1, "No field name [datum] ("),
+        (["/set_led_state", "data: 3.5"], 1, "field data is not a bool ("),
+        (["/set_led_state", "True", "False"], 1, "Too many arguments"),
+        (["/set_led_state", "data: [True"], 1, "'data: [True': "),
+        ([], 2, "arguments are required: service"),
+    ],
+)
+def test_calls_that_cannot_be(robot: Any, command: Any, arguments: list[str], status: int, why: str) -> None:
+    result = command("rosservice", "call", *arguments)
+    assert (result.status, result.out) == (status, "")
+    assert why in result.err
+    assert result.err.count("\n") == 1
+
+
+def test_missing_arguments_are_named(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(""))
+    result = command("rosservice", "call", "/set_led_state")
+    assert (result.status, result.err) == (2, "rosservice: ERROR: please specify service arguments: data\n")
+
+
+def test_unknown_and_silent_services(robot: Any, master: str, command: Any) -> None:
+    for verb in ("type", "uri", "args", "info"):
+        status, out, err = command("rosservice", verb, "/fial")
+        assert (status, out) == (1, "")
+        assert err == "rosservice: ERROR: service [/fial] not found; did you mean /fail?\n"
+    proxy = MasterProxy(master, "/ghost")
+    proxy.register_service("/haunt", "rosrpc://localhost:1", "http://localhost:1/")
+    proxy.close()
+    status, out, err = command("rosservice", "type", "/haunt")
+    assert (status, out) == (1, "")
+    assert "does not answer at rosrpc://localhost:1" in err
+    assert command("rosservice", "find", "std_srvs/Trigger").out == "/fail\n"
+
+
+def test_waiting_for_a_service(master: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wait polls until the service is registered; here it is, after the first look."""
+    looked = threading.Event()
+    monkeypatch.setattr("minirospy.introspect.services.time.sleep", lambda _: looked.set())
+    probes = iter([None, None, "std_srvs/SetBool"])
+    monkeypatch.setattr("minirospy.introspect.services._probed_type", lambda *_: next(probes))
+    assert command("rosservice", "call", "--wait", "/late", "True").status == 1
+    assert looked.is_set()
+    assert next(probes, "all asked for") == "all asked for"
+
+
+def test_help_and_no_master(command: Any) -> None:
+    for verb in ("args", "call", "find", "info", "list", "type", "uri"):
+        assert f"\trosservice {verb}\t" in command("rosservice", "-h").out
+        assert command("rosservice", verb, "-h").status == 0
+    for argv in (["list"], ["info", "/a"], ["call", "/a"], ["find", "std_srvs/Empty"]):
+        status, out, err = command("rosservice", *argv)
+        assert (status, out) == (1, "")
+        assert "no ROS master answers at http://localhost:1" in err
+
+
+def test_the_program(robot: Any, program: Start) -> None:
+    out, err = program(["rosservice", "call", "/set_led_state", "data: True"]).communicate(timeout=20)
+    assert (out, err) == ('success: True\nmessage: "Successfully changed LED state."\n', "")

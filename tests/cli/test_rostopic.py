@@ -1,0 +1,285 @@
+"""rostopic: its lines as real ROS prints them, its exit statuses, and streams that end quietly."""
+
+from __future__ import annotations
+
+import io
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+from std_msgs.msg import Bool, String
+
+Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
+
+
+def test_list(robot: Any, command: Any) -> None:
+    assert command("rostopic", "list") == (0, "/any\n/button_state\n/listen\n/ns/chatter\n/poly\n", "")
+    assert command("rostopic", "list", "-p").out == "/button_state\n/ns/chatter\n/poly\n"
+    assert command("rostopic", "list", "-s").out == "/any\n/listen\n"
+    assert command("rostopic", "list", "/ns").out == "/ns/chatter\n"
+    assert command("rostopic", "list", "ns").out == "/ns/chatter\n"
+    assert command("rostopic", "list", "/nope").out == "\n"
+    assert command("rostopic", "list", "-v").out == (
+        "\nPublished topics:\n * /button_state [std_msgs/Bool] 1 publisher\n"
+        " * /ns/chatter [std_msgs/String] 1 publisher\n * /poly [geometry_msgs/PolygonStamped] 1 publisher\n"
+        "\nSubscribed topics:\n * /listen [std_msgs/Bool] 1 subscriber\n * /any [unknown type] 1 subscriber\n\n"
+    )
+    assert command("rostopic", "list", "-v", "-p", "ns").out == (
+        "\nPublished topics:\n * /ns/chatter [std_msgs/String] 1 publisher\n\n"
+    )
+    assert command("rostopic", "list", "-v", "-s", "/listen").out == (
+        "\nSubscribed topics:\n * /listen [std_msgs/Bool] 1 subscriber\n\n"
+    )
+    assert command("rostopic", "list", "--host", "/ns").out == "Host [localhost]:\n  /ns/chatter\n"
+    assert command("rostopic", "list", "-p", "-s").status == 2
+
+
+def test_info_and_type(robot: Any, command: Any) -> None:
+    uri = robot.node.uri
+    assert command("rostopic", "info", "button_state") == (
+        0,
+        f"Type: std_msgs/Bool\n\nPublishers: \n * /robot ({uri})\n\nSubscribers: None\n\n\n",
+        "",
+    )
+    assert (
+        f"Publishers: None\n\nSubscribers: \n * /robot ({uri})\n\n\n"
+        in command("rostopic", "info", "/any").out
+    )
+    assert command("rostopic", "type", "/button_state").out == "std_msgs/Bool\n"
+    field = command("rostopic", "type", "/poly/header/stamp")
+    assert field.out == "geometry_msgs/PolygonStamped header/stamp time\n"
+    assert command("rostopic", "find", "std_msgs/Bool").out == "/button_state\n/listen\n"
+    assert command("rostopic", "find", "std_msgs/Nope") == (0, "\n", "")
+
+
+def test_names_that_are_not_there(robot: Any, command: Any) -> None:
+    for verb in ("info", "type"):
+        status, out, err = command("rostopic", verb, "/button_stat")
+        assert (status, out) == (1, "")
+        assert err == "rostopic: ERROR: topic [/button_stat] not found; did you mean /button_state?\n"
+    assert command("rostopic", "type", "/poly/heder").err.startswith(
+        "rostopic: ERROR: field [heder] not found; did you mean header?"
+    )
+    assert "type of topic [/any] not found" in command("rostopic", "type", "/any").err
+
+
+def test_help_and_wrong_words(command: Any) -> None:
+    status, out, _ = command("rostopic", "-h")
+    assert status == 0
+    assert "\trostopic echo\tprint messages to screen\n" in out
+    assert command("rostopic") == (2, out, "")
+    for verb in ("bw", "delay", "echo", "find", "hz", "info", "list", "pub", "type"):
+        status, out, _ = command("rostopic", verb, "-h")
+        assert status == 0
+        assert out.startswith(f"usage: rostopic {verb}")
+        assert f"\trostopic {verb}\t" in command("rostopic", "-h").out
+    status, _, err = command("rostopic", "lst")
+    assert status == 2
+    assert (
+        err
+        == "rostopic: ERROR: there is no `rostopic lst`; did you mean list? (`rostopic -h` shows what there is)\n"
+    )
+    assert command("rostopic", "list", "--bad").status == 2
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["list"], ["list", "-v"], ["info", "/a"], ["type", "/a"], ["find", "std_msgs/Bool"], ["echo", "/a"],
+        ["hz", "/a"], ["bw", "/a"], ["delay", "/a"], ["pub", "-1", "/a", "std_msgs/Bool", "True"],
+    ],
+)  # fmt: skip
+def test_without_a_master_it_says_so(command: Any, argv: list[str]) -> None:
+    status, out, err = command("rostopic", *argv)
+    assert (status, out) == (1, "")
+    assert err == (
+        "rostopic: ERROR: no ROS master answers at http://localhost:1: start one with `roscore`, "
+        "or set ROS_MASTER_URI to the machine where it runs\n"
+    )
+
+
+def test_echo(robot: Any, command: Any) -> None:
+    assert command("rostopic", "echo", "-n1", "/button_state") == (0, "data: True\n---\n", "")
+    assert command("rostopic", "echo", "/ns/chatter", "-n", "1").out == 'data: "hello"\n---\n'
+    assert command("rostopic", "echo", "-n1", "/ns/chatter/data").out == '"hello"\n---\n'
+    assert command("rostopic", "echo", "-n1", "/poly/polygon/points[0]/x").out == "1.0\n---\n"
+    assert command("rostopic", "echo", "-n1", "/poly/polygon/points[:]/y").out == "[2.0, 5.0]\n---\n"
+    assert command("rostopic", "echo", "-c", "-n1", "/button_state").out == "\033[2J\033[;Hdata: True\n---\n"
+    assert command("rostopic", "echo", "-p", "-n1", "/poly/polygon").out.startswith("%time,field.points0.x,")
+    assert command("rostopic", "echo", "--nostr", "-n1", "/ns/chatter").out == (
+        'data: "<string length: 5>"\n---\n'
+    )
+    assert command("rostopic", "echo", "--filter", "m.data", "-n1", "/button_state").status == 0
+
+
+def test_echo_that_cannot_be(robot: Any, command: Any) -> None:
+    status, out, err = command("rostopic", "echo", "/button_state/dta")
+    assert (status, out) == (1, "")
+    assert "did you mean data?" in err
+    assert command("rostopic", "echo", "--filter", "m.(", "/button_state").status == 2
+    assert "AttributeError" in command("rostopic", "echo", "--filter", "m.x", "/button_state").err
+    assert command("rostopic", "echo", "-n", "x", "/button_state").status == 2
+    assert command("rostopic", "delay", "/button_state").err.startswith("rostopic: ERROR: header")
+
+
+def test_echo_waits_for_a_publisher_and_follows_it(robot: Any, program: Start) -> None:
+    echo = program(["rostopic", "echo", "-n2", "/late"])
+    assert echo.stderr is not None
+    assert echo.stderr.readline() == "WARNING: topic [/late] does not appear to be published yet\n"
+    pub = program(["rostopic", "pub", "-r", "10", "/late", "std_msgs/Bool", "data: True"])
+    out, _ = echo.communicate(timeout=20)
+    assert (echo.returncode, out) == (0, "data: True\n---\ndata: True\n---\n")
+    _interrupt(pub)
+    assert pub.communicate(timeout=10) == ("", "")
+    assert pub.returncode == 0
+
+
+def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
+    """`rostopic pub /t type "data: True"` latches until Ctrl-C."""
+    pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "data: True"])
+    assert pub.stdout is not None
+    assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
+    _until(lambda: robot.heard == [b"\x01"])
+    _interrupt(pub)
+    assert pub.communicate(timeout=10) == ("", "")
+    assert pub.returncode == 0
+
+
+def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.cli.rostopic._LATCH_SECONDS", 0.5)
+    words = ("std_msgs/Bool", "data: True")
+    assert command("rostopic", "pub", "-1", "/listen", *words).out == (
+        "publishing and latching message for 0.5 seconds\n"
+    )
+    assert robot.heard == [b"\x01"]
+    verbose = command("rostopic", "pub", "/listen", "-v", "std_msgs/Bool", "False", "--once")
+    assert verbose.out == "publishing and latching [data: False] for 0.5 seconds\n"
+    assert robot.heard == [b"\x01", b"\x00"]
+    for words in (
+        ("geometry_msgs/Point", "1", "-2.5", "-3"),
+        ("std_msgs/Float32", "-0.5"),
+        ("std_msgs/Empty",),
+    ):
+        assert command("rostopic", "pub", "-1", "/other", *words).status == 0
+
+
+def test_pub_from_standard_input_and_file(
+    robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
+    file = tmp_path / "messages.yaml"
+    file.write_text("data: True\n---\ndata: False\n---\n")
+    pub = ("pub", "-r", "50", "/listen", "std_msgs/Bool")
+    assert command("rostopic", *pub, "-f", str(file)).status == 0
+    monkeypatch.setattr(sys, "stdin", io.StringIO("data: True\n"))
+    assert command("rostopic", *pub).status == 0
+    _until(lambda: robot.heard == [b"\x01", b"\x00", b"\x01"])
+    monkeypatch.setattr(sys, "stdin", io.StringIO(""))
+    assert "please specify message values: data" in command("rostopic", *pub).err
+    assert "file [nope.yaml] not found" in command("rostopic", *pub, "-f", "nope.yaml").err
+
+
+@pytest.mark.parametrize(
+    ("argv", "status", "why"),
+    [
+        (["/t", "std_msgs/Bol", "True"], 1, "did you mean std_msgs/Bool"),
+        (["/t", "Bool", "True"], 1, "did you mean std_msgs/Bool"),
+        (["/t", "std_msgs/Bool", "datum: True"], 1, "No field name [datum] ([std_msgs/Bool] has bool data)"),
+        (["/t", "std_msgs/Bool", "data: [1"], 1, "'data: [1': "),
+        (["/t", "std_msgs/Int32", "hi"], 1, "([std_msgs/Int32] has int32 data)"),
+        (["/b-ad", "std_msgs/Bool", "True"], 2, "not a legal name"),
+        (["/t"], 2, "arguments are required"),
+        (["-r", "0", "/t", "std_msgs/Bool", "True"], 2, "greater than zero"),
+        (["-r", "fast", "/t", "std_msgs/Bool", "True"], 2, "must be a number"),
+    ],
+)
+def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: int, why: str) -> None:
+    result = command("rostopic", "pub", *argv)
+    assert (result.status, result.out) == (status, "")
+    assert why in result.err
+    assert result.err.count("\n") == 1
+
+
+def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.cli.rostopic._LATCH_SECONDS", 0.1)
+    result = command("rostopic", "pub", "-1", "/listen", "std_msgs/String", "x")
+    assert (
+        "WARNING: topic [/listen] is of type [std_msgs/Bool] already, not [std_msgs/String]\n" in result.err
+    )
+
+
+def test_hz_and_bw(robot: Any, program: Start) -> None:
+    rate = program(["rostopic", "hz", "/ns/chatter"])
+    width = program(["rostopic", "bw", "/ns/chatter"])
+    for stream in (rate, width):
+        assert stream.stdout is not None
+        assert stream.stdout.readline() == "subscribed to [/ns/chatter]\n"
+    for _ in range(30):
+        robot.publish("/ns/chatter", String("hello"))
+        time.sleep(0.05)
+    assert rate.stdout is not None
+    assert width.stdout is not None
+    line = rate.stdout.readline()
+    while not line.startswith("average rate: "):
+        assert line == "no new messages\n"
+        line = rate.stdout.readline()
+    assert 5.0 < float(line.split()[-1]) < 40.0
+    assert rate.stdout.readline().startswith("\tmin: 0.")
+    assert width.stdout.readline().startswith("average: ")
+    assert width.stdout.readline().startswith("\tmean: 9.00B min: 9.00B max: 9.00B window: ")
+    for stream in (rate, width):
+        _interrupt(stream)
+        assert stream.communicate(timeout=10)[1] == ""
+        assert stream.returncode == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
+def test_a_closed_pipe_is_quiet(robot: Any, program: Start) -> None:
+    """`rostopic echo | head -1`."""
+    echo = program(["rostopic", "echo", "/button_state"])
+    assert echo.stdout is not None
+    assert echo.stderr is not None
+    assert echo.stdout.readline() == "data: True\n"
+    echo.stdout.close()
+    deadline = time.monotonic() + 20
+    while echo.poll() is None and time.monotonic() < deadline:
+        robot.publish("/button_state", Bool(True))
+        time.sleep(0.02)
+    assert echo.returncode == 0
+    assert echo.stderr.read() == ""
+    echo.stdout = None
+
+
+def test_rosnode_kill_ends_a_stream(robot: Any, program: Start, command: Any) -> None:
+    echo = program(["rostopic", "echo", "/button_state"])
+    assert echo.stdout is not None
+    assert echo.stdout.readline() == "data: True\n"
+    (name,) = [each for each in command("rosnode", "list").out.split() if each.startswith("/rostopic_")]
+    assert command("rosnode", "kill", name).status == 0
+    assert echo.wait(10) == 0
+
+
+def test_list_imports_little(robot: Any) -> None:
+    code = (
+        "import sys; from minirospy.cli.rostopic import main; assert main(['list']) == 0; "
+        "print(*sorted({'asyncio', 'yaml', 'numpy', 'logging', 'std_msgs', 'genpy', 'xmlrpc'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    assert done.stdout.splitlines()[-1] == ""
+
+
+def _interrupt(process: subprocess.Popen[str]) -> None:
+    """Ctrl-C."""
+    process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+
+
+def _until(is_so: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 15
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)

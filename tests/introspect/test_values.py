@@ -1,0 +1,102 @@
+"""YAML as people type it: the quick way agrees with the YAML library, and bad text is refused in one line."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from minirospy.errors import ValueTextError
+from minirospy.introspect.values import (
+    check_parameter,
+    format_pretty,
+    format_value,
+    parse_documents,
+    parse_value,
+)
+
+WORDS = [
+    "", "1", "-5", "0", "007", "010", "0x10", "1_000", "1:30", "1.5", "-1.5", ".5", "1.", "1e3", "1.0e3", "1.0e+3",
+    "true", "True", "TRUE", "yes", "no", "on", "off", "null", "~", "y", "n", "hello", "hello world", "a/b", "/a/b",
+    "a-b", "a: 1", "{x: 1, y: [2, three]}", "[1, 2.5, x]", "'1'", '"a"', ".inf", ".nan", "inf", "a#b", "a #b", "e5",
+    "12345678901", "-0", "+5", "_x", "x_", "ünï", " 5 ", "5 6",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", WORDS)
+def test_words_mean_what_yaml_says(text: str) -> None:
+    ours, theirs = parse_value(text), yaml.safe_load(text)
+    assert type(ours) is type(theirs)
+    assert ours == theirs or (isinstance(ours, float) and math.isnan(ours) and math.isnan(theirs))
+
+
+@given(st.text(alphabet="0123456789.-+eE_truefalsnoy/:ax ", max_size=8))
+def test_any_word_means_what_yaml_says(text: str) -> None:
+    try:
+        theirs = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):
+        with pytest.raises((ValueTextError, ValueError)):
+            parse_value(text)
+        return
+    ours = parse_value(text)
+    assert repr(ours) == repr(theirs)
+
+
+@given(st.one_of(st.booleans(), st.integers(-(2**31), 2**31 - 1), st.floats(), st.text(max_size=20)))
+def test_any_value_is_written_as_yaml_writes_it(value: object) -> None:
+    assert format_value(value) == yaml.safe_dump(value).removesuffix("\n...\n")
+
+
+def test_angles() -> None:
+    assert parse_value("deg(90)") == math.pi / 2
+    assert parse_value("rad(pi/2)") == math.pi / 2
+    assert parse_value("deg(-45.0)") == -math.pi / 4
+    assert parse_value("!degrees 180") == math.pi
+    assert parse_value("{a: rad(2*pi), b: degree}") == {"a": 2 * math.pi, "b": "degree"}
+    with pytest.raises(ValueTextError, match="not an angle"):
+        parse_value("rad(__import__('os'))")
+
+
+def test_bad_text_is_one_line_with_the_place() -> None:
+    with pytest.raises(ValueTextError) as caught:
+        parse_value("data: [True")
+    assert str(caught.value).startswith("'data: [True': ")
+    assert "line " in str(caught.value)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ValueTextError, match=r"'params\.yaml': "):
+        list(parse_documents("a: 1\n---\nb: [", "params.yaml"))
+
+
+def test_documents() -> None:
+    assert list(parse_documents("a: 1\n---\n- 2\n", "f")) == [{"a": 1}, [2]]
+
+
+def test_pretty() -> None:
+    value = {
+        "b": False, "d": {"el": [], "q": {"r": 1.5}}, "e": "", "l": [1, "a: b", [2, 3]], "ml": "abc\ndef", "n": "5",
+        "s": "l1\nl2\n", "u": "ünï", "y": "yes",
+    }  # fmt: skip
+    # As real `rosparam get -p` printed it.
+    assert format_pretty(value) == (
+        "b: false\nd:\n  el: []\n  q:\n    r: 1.5\ne: \nl: - 1\n- 'a: b'\n- - 2\n  - 3\n"
+        "ml: |\n  abc\n  def\nn: 5\ns: |\n  l1\n  l2\n  \nu: ünï\ny: yes"
+    )
+    assert format_pretty("5") == "5"
+    assert format_pretty([1]) == "- 1\n"
+
+
+def test_what_a_parameter_cannot_hold() -> None:
+    check_parameter({"a": [1, "x", 2.5, True, b"\0"]}, "/p")
+    for value, why in (
+        (None, "null"),
+        ({"a": None}, "null"),
+        (2**31, "32 bits"),
+        ([2**31], "32 bits"),
+        ({1: 2}, "quotes"),
+        (yaml.safe_load("2020-01-01"), "date"),
+    ):
+        with pytest.raises(ValueTextError, match=why):
+            check_parameter(value, "/p")
