@@ -184,7 +184,7 @@ def spin() -> None:
 
 def is_shutdown() -> bool:
     """Whether the node has shut down."""
-    return process.is_shutdown()
+    return process.tell_shutdown()
 
 
 def on_shutdown(h: Callable[[], object]) -> None:

@@ -16,7 +16,7 @@ import threading
 import traceback
 import warnings
 from collections.abc import Callable, Coroutine, Iterator, Sequence
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy import names
@@ -26,10 +26,11 @@ from minirospy.errors import (
     MasterUnreachableError,
     ROSException,
     ROSInitException,
+    ROSInterruptException,
     RpcError,
 )
 from minirospy.runtime import tcp
-from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.loop import LoopClosedError, LoopThread
 from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.node import Node
 
@@ -68,6 +69,7 @@ class NodeProcess:
         self._waiting_for_node: list[Callable[[], object]] = []
         self._shutdown_begun = False
         self._gone = threading.Event()
+        self._thread = threading.local()
         self._previous_handlers: dict[int, Any] = {}
         self.late_signal = 0
         """A signal that came while the main thread was sending; who has sent takes it."""
@@ -102,9 +104,13 @@ class NodeProcess:
         return names.resolve(name, self.name, self.remappings)
 
     def run(self, coroutine: Coroutine[Any, Any, _T]) -> _T:
-        """Run ``coroutine`` on the node's loop and wait for it."""
+        """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
         assert self._loop is not None
-        return self._loop.run(coroutine)
+        try:
+            return self._loop.run(coroutine)
+        except LoopClosedError as error:
+            self.tell_shutdown()
+            raise ROSInterruptException("rospy shutdown") from error
 
     def post(self, function: Callable[..., object], *args: object) -> None:
         """Call ``function`` on the node's loop soon."""
@@ -199,6 +205,7 @@ class NodeProcess:
         except OSError as error:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
         atexit.register(self._at_exit)
+        sys.excepthook = _EndOfInterrupted(sys.excepthook)
         self._wait_for_master()
         self._set_private_parameters(arguments)
         if not disable_rostime:
@@ -255,6 +262,31 @@ class NodeProcess:
         """Whether the node has shut down."""
         return self.shutting_down.is_set()
 
+    def tell_shutdown(self) -> bool:
+        """The same, for user code: the calling thread counts as one that asks, and then as one that was told."""
+        if not self.shutting_down.is_set():
+            self._thread.asks = True
+            return False
+        self._thread.knows = True
+        return True
+
+    def knows_of_shutdown(self) -> bool:
+        """Whether the calling thread was told of the shutdown: what it does now is its clean-up."""
+        return getattr(self._thread, "knows", False)
+
+    def check_interrupted_sleep(self) -> None:
+        """Tell the calling thread, whose sleep a shutdown has cut short. Raises ROSInterruptException.
+
+        A loop that asks is_shutdown() just gets its sleep back early, as with rospy: it will ask, and what
+        stands behind the loop still runs. The exception is for a thread that never asks, or that sleeps again
+        without having asked.
+        """
+        if getattr(self._thread, "asks", False):
+            self._thread.asks = False
+            return
+        self._thread.knows = True
+        raise ROSInterruptException("ROS shutdown request")
+
     def spin(self) -> None:
         """Wait until the node shuts down. Raises ROSInitException before init_node."""
         if not self.initialized and not self.is_shutdown():
@@ -263,6 +295,7 @@ class NodeProcess:
             wait_for_event(self.shutting_down, None)
         except KeyboardInterrupt:
             self.signal_shutdown("keyboard interrupt")
+        self.tell_shutdown()
 
     # --- helpers
 
@@ -355,6 +388,18 @@ class NodeProcess:
             from minirospy.client.time import follow_clock_topic
 
             self.when_ready(lambda: follow_clock_topic(clock))
+
+
+class _EndOfInterrupted:
+    """Lets a program end in peace that did not catch the ROSInterruptException of its own shutdown."""
+
+    def __init__(self, before: Callable[..., Any]) -> None:
+        self._before = before
+
+    def __call__(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if issubclass(kind, ROSInterruptException) and process.is_shutdown():
+            raise SystemExit(0)
+        self._before(kind, error, trace)
 
 
 process = NodeProcess()

@@ -65,7 +65,8 @@ def get_time() -> float:
 def sleep(duration: float | times.Duration) -> None:
     """Sleep for ``duration`` seconds; not at all where that is negative.
 
-    Raises ROSInterruptException where the node shuts down meanwhile, ROSTimeMovedBackwardsException where
+    Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that asks
+    is_shutdown(), by returning. Raises ROSTimeMovedBackwardsException where
     simulated time jumps back.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
@@ -194,7 +195,6 @@ def follow_clock_topic(clock: SimulatedClock) -> None:
 
 
 def _sleep(nanoseconds: int) -> None:
-    # A node that is down already sleeps as any program does: what runs then is its clean-up.
-    stop = threading.Event() if process.is_shutdown() else process.shutting_down
+    stop = threading.Event() if process.knows_of_shutdown() else process.shutting_down
     if nanoseconds > 0 and not process.clock.sleep(nanoseconds, stop):
-        raise ROSInterruptException("ROS shutdown request")
+        process.check_interrupted_sleep()

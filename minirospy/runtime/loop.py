@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-__all__ = ["LoopThread", "new_event_loop"]
+__all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
 
@@ -17,6 +17,10 @@ _T = TypeVar("_T")
 def new_event_loop() -> asyncio.AbstractEventLoop:
     """A loop that can watch plain sockets, on every OS (Windows' default loop cannot)."""
     return asyncio.SelectorEventLoop()
+
+
+class LoopClosedError(RuntimeError):
+    """The event loop has ended."""
 
 
 class LoopThread:
@@ -30,15 +34,21 @@ class LoopThread:
     def run(self, coroutine: Coroutine[Any, Any, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.
 
-        Raises TimeoutError after ``timeout`` seconds, and RuntimeError on the loop's own thread, where
-        waiting would never end.
+        Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
+        and RuntimeError on the loop's own thread, where waiting would never end.
         """
         if threading.current_thread() is self._thread:
             coroutine.close()
             raise RuntimeError("a blocking call on the event loop's thread would wait for itself")
-        future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
+        try:
+            future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
+        except RuntimeError as error:
+            coroutine.close()
+            raise LoopClosedError("the event loop is closed") from error
         try:
             return future.result(timeout)
+        except concurrent.futures.CancelledError as error:
+            raise LoopClosedError("the event loop was closed meanwhile") from error
         except concurrent.futures.TimeoutError:
             future.cancel()
             raise TimeoutError from None

@@ -77,3 +77,35 @@ def test_a_script_that_just_ends(master: str) -> None:
     )
     assert (done.stdout, done.stderr) == ("done\n", "")
     assert not is_known(master)
+
+
+LOOPS = {
+    "a sleep": "rospy.sleep(60)",
+    "a loop that asks": """
+rate = rospy.Rate(20)
+while not rospy.is_shutdown():
+    rate.sleep()
+rospy.sleep(0.05)
+print("cleaned up", flush=True)""",
+    "a loop that never asks": """
+while True:
+    sum(range(10000))
+    rospy.sleep(0.001)""",
+    "a wait for a service": "rospy.wait_for_service('/nobody')",
+    "a wait for a message": "rospy.wait_for_message('/nobody', rospy.AnyMsg)",
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
+@pytest.mark.parametrize("what", LOOPS)
+def test_ctrl_c_ends(master: str, what: str) -> None:
+    script = f'import rospy\nrospy.init_node("leaver")\nprint("ready", flush=True)\n{LOOPS[what]}\n'
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=5)
+    assert (process.returncode, errors) == (0, "")
+    assert ("cleaned up" in output) == (what == "a loop that asks")
