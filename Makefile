@@ -28,6 +28,9 @@ interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pytest tests/interop
 
+bench: $(STAMP)
+	@$(BIN)/python benchmarks/run.py
+
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m ruff format --check .

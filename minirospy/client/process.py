@@ -15,7 +15,7 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -69,6 +69,7 @@ class NodeProcess:
         self._waiting_for_node: list[Callable[[], object]] = []
         self._shutdown_begun = False
         self._gone = threading.Event()
+        self._signals = 0
         self._thread = threading.local()
         self._previous_handlers: dict[int, Any] = {}
         self.late_signal = 0
@@ -125,16 +126,9 @@ class NodeProcess:
                 return
         function()
 
-    @contextlib.contextmanager
-    def interrupting(self, interrupt: Callable[[], object]) -> Iterator[None]:
-        """While the block runs, a shutdown calls ``interrupt`` to end what blocks in it."""
-        self._interrupts.append(interrupt)
-        try:
-            if self.shutting_down.is_set():
-                interrupt()
-            yield
-        finally:
-            self._interrupts.remove(interrupt)
+    def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
+        """``with process.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it."""
+        return _Interrupting(self._interrupts, interrupt, self.shutting_down)
 
     # --- beginning
 
@@ -330,9 +324,12 @@ class NodeProcess:
             retry.start()
             return
         self.late_signal = 0
+        self._signals += 1
         if self._shutdown_begun:
-            # The program did not end at the first: now it is interrupted as any Python program.
-            raise KeyboardInterrupt
+            if self._signals > 1:
+                # The program did not end at the first: now it is interrupted as any Python program.
+                raise KeyboardInterrupt
+            return
         self.signal_shutdown(f"signal-{number}")
         previous = self._previous_handlers.get(number)
         if callable(previous):
@@ -388,6 +385,25 @@ class NodeProcess:
             from minirospy.client.time import follow_clock_topic
 
             self.when_ready(lambda: follow_clock_topic(clock))
+
+
+class _Interrupting:
+    """The block of :meth:`NodeProcess.interrupting`; a class, since each service call passes through it."""
+
+    def __init__(
+        self, interrupts: list[Callable[[], object]], interrupt: Callable[[], object], down: threading.Event
+    ) -> None:
+        self._interrupts = interrupts
+        self._interrupt = interrupt
+        self._down = down
+
+    def __enter__(self) -> None:
+        self._interrupts.append(self._interrupt)
+        if self._down.is_set():
+            self._interrupt()
+
+    def __exit__(self, *_: object) -> None:
+        self._interrupts.remove(self._interrupt)
 
 
 class _EndOfInterrupted:

@@ -31,6 +31,8 @@ __all__ = ["Handler", "ServiceClient", "ServiceServer", "parse_service_uri"]
 _log = logging.getLogger(__name__)
 _ANSWER = struct.Struct("<BI")
 _LENGTH = struct.Struct("<I")
+_RECEIVE = 16 * 1024
+_MOST = 1024 * 1024
 
 Handler = Callable[[memoryview, Header], bytes]
 """Request bytes and the client's header in, response bytes out; raises ServiceException with the text to send."""
@@ -83,11 +85,12 @@ class ServiceServer:
         persistent = fields.get("persistent", "").lower() in ("1", "true")
         try:
             sock.setblocking(True)
+            reader = _Reader(sock)
             while True:
-                length = _receive_exactly(sock, 4, at_end_ok=True)
+                length = reader.take(4, at_end_ok=True)
                 if not length:
                     return
-                request = _receive_exactly(sock, _checked(_LENGTH.unpack(length)[0]))
+                request = reader.take(_checked(_LENGTH.unpack(length)[0]))
                 sock.sendall(self._respond(memoryview(request), fields))
                 if not persistent:
                     return
@@ -137,10 +140,11 @@ class ServiceClient:
         try:
             tcp.tune(self._sock)
             self._sock.sendall(serialize_header(fields))
-            (length,) = _LENGTH.unpack(_receive_exactly(self._sock, 4))
+            self._reader = _Reader(self._sock)
+            (length,) = _LENGTH.unpack(self._reader.take(4))
             if length > MAX_HEADER:
                 raise WireError(f"{uri} does not speak TCPROS")
-            self.header = parse_header(_receive_exactly(self._sock, length))
+            self.header = parse_header(self._reader.take(length))
             check_service(self.header)
             self._sock.settimeout(None)
         except BaseException:
@@ -150,8 +154,8 @@ class ServiceClient:
     def call(self, request: bytes) -> bytes:
         """The response to ``request``. Raises HandshakeRefused with the handler's text, OSError, WireError."""
         self._sock.sendall(_LENGTH.pack(len(request)) + request)
-        ok, length = _ANSWER.unpack(_receive_exactly(self._sock, _ANSWER.size))
-        body = _receive_exactly(self._sock, _checked(length))
+        ok, length = _ANSWER.unpack(self._reader.take(_ANSWER.size))
+        body = self._reader.take(_checked(length))
         if not ok:
             raise HandshakeRefused(body.decode("utf-8", "replace"))
         return body
@@ -184,19 +188,40 @@ def _checked(length: int) -> int:
     return length
 
 
-def _receive_exactly(sock: socket.socket, count: int, *, at_end_ok: bool = False) -> bytes:
-    """``count`` bytes; b"" where the peer ended before the first and that is in order."""
-    data = sock.recv(min(count, 1 << 20)) if count else b""
-    if len(data) == count:
-        return data
-    if not data and at_end_ok:
-        return b""
-    parts = [data]
-    rest = count - len(data)
-    while rest:
-        data = sock.recv(min(rest, 1 << 20)) if parts[-1] else b""
-        if not data:
-            raise WireError("the peer closed the connection in the middle")
-        parts.append(data)
-        rest -= len(data)
-    return b"".join(parts)
+class _Reader:
+    """Exact reads from a blocking socket; what came beyond them is kept for the next.
+
+    A small request or answer arrives whole: so one receive takes length and body together.
+    """
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._receive = sock.recv
+        self._rest = b""
+
+    def take(self, count: int, *, at_end_ok: bool = False) -> bytes:
+        """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
+        data = self._rest
+        while len(data) < count:
+            more = self._receive(min(max(count - len(data), _RECEIVE), _MOST))
+            if not more:
+                if at_end_ok and not data:
+                    return b""
+                raise WireError("the peer closed the connection in the middle")
+            data = data + more if data else more
+            if count > _MOST:
+                return self._take_large(data, count)
+        self._rest = data[count:]
+        return data[:count]
+
+    def _take_large(self, data: bytes, count: int) -> bytes:
+        parts = [data]
+        missing = count - len(data)
+        while missing > 0:
+            more = self._receive(min(missing, _MOST))
+            if not more:
+                raise WireError("the peer closed the connection in the middle")
+            parts.append(more)
+            missing -= len(more)
+        whole = b"".join(parts)
+        self._rest = whole[count:]
+        return whole[:count]
