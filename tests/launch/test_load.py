@@ -1,0 +1,195 @@
+"""launch/load: what files say, and every error with its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import LaunchError
+from minirospy.launch.load import describe_args, load_files, load_text
+from minirospy.launch.spec import LaunchSpec
+from minirospy.workspace.packages import Packages
+
+
+@pytest.fixture
+def packages() -> Packages:
+    return Packages(Environment.read({}))
+
+
+def load(packages: Packages, body: str, **args: str) -> LaunchSpec:
+    return load_text(f"<launch>\n{body}\n</launch>", args, packages, {"HOME": "/home/me"})
+
+
+def test_the_workshops_file(packages: Packages) -> None:
+    spec = load_files([str(packages.find_resource("rpi_feros_bringup", "rpi_led.launch"))], {}, packages)
+    assert [(n.name, n.package, n.type, n.output) for n in spec.nodes] == [
+        ("/btn_pub", "rpi_feros", "button_publisher.py", "screen"),
+        ("/led_act", "rpi_feros", "led_actuator.py", "screen"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("attributes", "value"),
+    [
+        ('value="5"', 5),
+        ('value="1.5"', 1.5),
+        ('value="True"', True),
+        ('value="text"', "text"),
+        ('value="1" type="str"', "1"),
+        ('value="1" type="double"', 1.0),
+        ('value="1" type="bool"', True),
+        ('value="[1, a]" type="yaml"', [1, "a"]),
+        ('command="echo hi"', "hi\n"),
+        ('value="$(env HOME)/x"', "/home/me/x"),
+        ('value="$(optenv NOPE a b)"', "a b"),
+        ('value="$(eval 1 + 2 * 3)"', 7),
+    ],
+)
+def test_param_values(packages: Packages, attributes: str, value: object) -> None:
+    assert load(packages, f'<param name="p" {attributes}/>').params == {"/p": value}
+
+
+def test_args_defaults_and_overrides(packages: Packages) -> None:
+    body = '<arg name="a" default="1"/><arg name="b" value="$(arg a)2"/><param name="p" value="$(arg b)"/>'
+    assert load(packages, body).params == {"/p": 12}
+    assert load(packages, body, a="3").params == {"/p": 32}
+
+
+def test_groups_bound_what_they_say(packages: Packages) -> None:
+    spec = load(
+        packages,
+        """
+        <remap from="a" to="b"/>
+        <group ns="g"><env name="E" value="1"/><remap from="c" to="d"/>
+          <node name="in" pkg="p" type="t" ns="deep"><param name="q" value="1"/><remap from="e" to="f"/></node>
+          <param name="r" value="2"/>
+        </group>
+        <node name="out" pkg="p" type="t"/>
+        """,
+    )
+    inner, outer = spec.nodes
+    assert (inner.name, inner.remaps) == ("/g/deep/in", (("a", "b"), ("c", "d"), ("e", "f")))
+    assert inner.env == (("E", "1"),)
+    assert (outer.name, outer.remaps, outer.env) == ("/out", (("a", "b"),), ())
+    assert spec.params == {"/g/deep/in/q": 1, "/g/r": 2}
+
+
+def test_private_params_go_to_the_nodes_that_follow(packages: Packages) -> None:
+    spec = load(
+        packages,
+        '<node name="before" pkg="p" type="t"/><param name="~x" value="1"/><node name="after" pkg="p" type="t"/>',
+    )
+    assert spec.params == {"/after/x": 1}
+
+
+def test_rosparam_sets_leaves_and_leaves_siblings_alone(packages: Packages) -> None:
+    spec = load(
+        packages,
+        '<param name="a/x" value="0"/><rosparam>\na: {y: [1, 2]}\n</rosparam>'
+        '<rosparam param="s" subst_value="true">$(eval 2 * 2)</rosparam><rosparam command="delete" param="gone"/>',
+    )
+    assert spec.params == {"/a/x": 0, "/a/y": [1, 2], "/s": 4}
+    assert spec.clear == ["/gone"]
+
+
+def test_if_and_unless(packages: Packages) -> None:
+    body = '<arg name="on"/><param name="a" value="1" if="$(arg on)"/><param name="b" value="1" unless="$(arg on)"/>'
+    assert set(load(packages, body, on="true").params) == {"/a"}
+    assert set(load(packages, body, on="0").params) == {"/b"}
+
+
+def test_includes_have_args_and_namespaces_of_their_own(packages: Packages, tmp_path: Path) -> None:
+    inner = tmp_path / "inner.launch"
+    inner.write_text('<launch><arg name="k" default="d"/><param name="p" value="$(arg k)"/></launch>')
+    outer = tmp_path / "outer.launch"
+    outer.write_text(
+        '<launch><arg name="k" default="o"/>'
+        '<include file="$(dirname)/inner.launch" ns="one"><arg name="k" value="v"/></include>'
+        '<include file="$(dirname)/inner.launch" ns="two" pass_all_args="true"/>'
+        '<include file="$(dirname)/inner.launch"/></launch>'
+    )
+    spec = load_files([str(outer)], {}, packages)
+    assert spec.params == {"/one/p": "v", "/two/p": "o", "/p": "d"}
+    assert spec.files == [str(outer), str(inner), str(inner), str(inner)]
+
+
+def test_anon_is_the_same_name_in_all_places(packages: Packages) -> None:
+    spec = load(packages, '<node name="$(anon n)" pkg="p" type="t"/><param name="x" value="$(anon n)"/>')
+    assert spec.nodes[0].base_name == spec.params["/x"]
+
+
+def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch"
+    file.write_text('<launch><arg name="a"/><arg name="b" default="1" doc="a number"/><arg name="c" value="2"/></launch>')
+    assert [(arg.name, arg.default, arg.doc) for arg in describe_args(str(file))] == [
+        ("a", None, None),
+        ("b", "1", "a number"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("<nod/>", "unknown tag <nod>.* did you mean node?"),
+        ('<node name="x"/>', "missing required attribute: 'pkg'"),
+        ('<node name="a/b" pkg="p" type="t"/>', r"name \[a/b\] is not legal"),
+        ('<node name="x" pkg="p" type="t" machine="m"/>', "other machines are not supported yet"),
+        ('<node name="x" pkg="p" type="t" output="file"/>', "'log' or 'screen'"),
+        ('<node name="x" pkg="p" type="t" respawn="yes"/>', "respawn is 'true' or 'false'"),
+        ('<node name="x" pkg="p" type="t" respawn="1" required="1"/>', "cannot both be set"),
+        ('<node name="x" pkg="p" type="t"/>\n\n<node name="x" pkg="p" type="t"/>', "multiple nodes named"),
+        ('<param name="p"/>', "one and only one of value"),
+        ('<param name="p" value="x" type="int"/>', "invalid literal"),
+        ('<param name="p" value="x" type="what"/>', "unknown type 'what'"),
+        ('<param name="p" textfile="/no/such"/>', "cannot read"),
+        ('<param name="p" command="exit 3"/>', "ended with status 3"),
+        ('<param name="p" value="$(arg no)"/>', "arg 'no' is not defined"),
+        ('<param name="p" value="$(env NO_SUCH)"/>', "'NO_SUCH' is not set"),
+        ('<param name="p" value="$(find no_such)"/>', r"package \[no_such\] not found"),
+        ('<param name="p" value="$(what x)"/>', "unknown substitution"),
+        ('<param name="p" value="$(eval 1 +)"/>', "is not an expression"),
+        ('<param name="p" value="$(eval ().__class__)"/>', "does not allow"),
+        ('<param name="p" value="$(eval open(1))"/>', "cannot be evaluated"),
+        ('<param name="p" value="$(eval 9 ** 9)"/>', "use pow"),
+        ('<arg name="a"/>', "required arg 'a' is not set: add a:=VALUE"),
+        ('<arg name="a" default="1" value="2"/>', "one and only one of value/default"),
+        ('<arg name="a" value="1"/><arg name="a" value="2"/>', "already been declared"),
+        ('<rosparam>[1</rosparam>', "not YAML"),
+        ("<rosparam>[1]</rosparam>", "must hold a YAML dictionary"),
+        ('<rosparam command="what"/>', r"no command \[what\]"),
+        ('<include file="/no/such.launch"/>', r"cannot include \[/no/such.launch\]"),
+        ('<group if="1" unless="1"/>', "both 'if' and 'unless'"),
+        ('<machine name="m" address="elsewhere"/>', "other machines are not supported yet"),
+    ],
+)
+def test_errors_name_the_line(packages: Packages, body: str, says: str) -> None:
+    with pytest.raises(LaunchError, match=says) as raised:
+        load(packages, body)
+    assert raised.value.file == "<stdin>"
+    assert raised.value.line == (4 if "multiple" in says else 2)
+
+
+def test_unused_args_of_an_include_are_refused(packages: Packages, tmp_path: Path) -> None:
+    inner = tmp_path / "inner.launch"
+    inner.write_text("<launch/>")
+    with pytest.raises(LaunchError, match=r"unused args \[k\]"):
+        load(packages, f'<include file="{inner}"><arg name="k" value="1"/></include>')
+
+
+def test_a_file_that_includes_itself_ends(packages: Packages, tmp_path: Path) -> None:
+    file = tmp_path / "self.launch"
+    file.write_text('<launch><include file="$(dirname)/self.launch"/></launch>')
+    with pytest.raises(LaunchError, match="does a file include itself"):
+        load_files([str(file)], {}, packages)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("<launch>\n<node", "Invalid roslaunch XML syntax"), ("<lunch/>", "it must be <launch>"), ("", "no element found"),
+     ('<!DOCTYPE x [<!ENTITY a "b">]><launch/>', "no document type")],
+)  # fmt: skip
+def test_what_is_not_a_launch_file(packages: Packages, text: str, says: str) -> None:
+    with pytest.raises(LaunchError, match=says):
+        load_text(text, {}, packages)
