@@ -1,0 +1,312 @@
+"""roscore, rosrun, roslaunch and the demo as real processes: what they print, start and leave behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from minirospy.cli import family, roslaunch, rosrun
+from minirospy.errors import MasterUnreachableError
+from minirospy.runtime.master_proxy import MasterProxy
+
+BIN = Path(sys.executable).parent
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> int:
+    """A free port, which ROS_MASTER_URI names."""
+    number = free_port()
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{number}")
+    return number
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package of plain scripts."""
+    folder = tmp_path / "pkg"
+    folder.mkdir()
+    (folder / "package.xml").write_text("<package><name>pkg</name></package>")
+    (folder / "wait.py").write_text(
+        "import sys, time\nprint('waiting', *sys.argv[1:], flush=True)\n"
+        "try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
+    )
+    (folder / "stop.py").write_text("import sys\nprint('stopping')\nsys.exit(int(sys.argv[1]))\n")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    return folder
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[str]]]:
+    running: list[subprocess.Popen[str]] = []
+    yield running
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def start(running: list[subprocess.Popen[str]], *command: str) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [str(BIN / command[0]), *command[1:]], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    running.append(process)
+    return process
+
+
+def read_until(process: subprocess.Popen[str], word: str) -> str:
+    """What is printed up to the line that has ``word``."""
+    assert process.stdout
+    said = ""
+    for line in process.stdout:
+        said += line
+        if word in line:
+            return said
+    raise AssertionError(f"no {word!r} in:\n{said}")
+
+
+# --- roscore
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_roscore_says_where_it_is_and_ends(
+    port: int, started: list[subprocess.Popen[str]], number: int
+) -> None:
+    core = start(started, "roscore", "-p", str(port))
+    said = read_until(core, "Ctrl-C")
+    assert f"ROS_MASTER_URI=http://localhost:{port}/\n" in said
+    assert f"pid {core.pid}" in said
+    assert "log file " in said
+    proxy = MasterProxy(f"http://localhost:{port}", "/test")
+    assert proxy.get_pid() == core.pid
+    assert proxy.get_param("/rosdistro") == "noetic\n"
+    assert set(proxy.get_param_names()) == {"/run_id", "/rosdistro", "/rosversion"}
+    assert proxy.get_system_state().publishers == {"/rosout_agg": ["/rosout"]}
+    proxy.close()
+    core.send_signal(number)
+    output, _ = core.communicate(timeout=2)
+    assert (core.returncode, output) == (0, "master stopped\n")
+
+
+def test_a_second_roscore_says_that_one_is_running(master: str) -> None:
+    done = subprocess.run(
+        [str(BIN / "roscore"), "-p", master.rsplit(":", 1)[1]],
+        capture_output=True,
+        text=True,
+        timeout=10,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(
+        "roscore: ERROR: roscore cannot run as another roscore/master is already running"
+    )
+    assert done.stderr.count("\n") == 1
+
+
+def test_roscore_on_a_port_of_somebody_else() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        number = str(other.getsockname()[1])
+        done = subprocess.run(
+            [str(BIN / "roscore"), "-p", number], capture_output=True, text=True, timeout=10, check=False
+        )
+    assert (done.returncode, done.stderr) == (
+        1,
+        f"roscore: ERROR: port {number} is taken by another program: choose one with `roscore -p PORT`\n",
+    )
+
+
+@pytest.mark.parametrize("words", [["--nonsense"], ["-p", "x"], ["-p", "70000"]])
+def test_roscore_typed_wrong(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    from minirospy.cli.master import roscore
+
+    assert roscore(words) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+# --- rosrun
+
+
+def test_rosrun_passes_words_and_status_on(package: Path) -> None:
+    done = subprocess.run(
+        [str(BIN / "rosrun"), "pkg", "stop.py", "7", "-v"],
+        capture_output=True,
+        text=True,
+        timeout=10,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (7, "stopping\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "says"),
+    [
+        (["rpi_fero", "x"], 1, "did you mean rpi_feros"),
+        (["rpi_feros", "led_actuato.py"], 1, "did you mean led_actuator.py"),
+        (["rpi_feros"], 2, "type rosrun PACKAGE PROGRAM"),
+        (["--what", "a", "b"], 2, "--what is unknown"),
+    ],
+)
+def test_rosrun_typed_wrong(
+    words: list[str], status: int, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rosrun.main(words) == status
+    errors = capsys.readouterr().err
+    assert says in errors
+    assert errors.count("\n") == 1
+
+
+# --- roslaunch
+
+
+@posix
+def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
+    port: int, package: Path, started: list[subprocess.Popen[str]]
+) -> None:
+    file = package / "two.launch"
+    file.write_text(
+        '<launch><arg name="n" default="1"/><param name="p" value="$(arg n)"/>'
+        '<node name="one" pkg="pkg" type="wait.py" args="-x" output="screen"><remap from="a" to="b"/></node>'
+        '<node name="two" pkg="pkg" type="wait.py" ns="deep"/></launch>'
+    )
+    launch = start(started, "roslaunch", "pkg", "two.launch", "n:=5")
+    said = read_until(launch, "waiting -x")
+    assert "auto-starting new master\nprocess[master]: started with pid [" in said
+    assert "PARAMETERS\n * /p: 5\n" in said
+    assert "  /deep/\n    two (pkg/wait.py)\n" in said
+    assert "waiting -x a:=b __name:=one __log:=" in said
+    if "process[deep/two-2]" not in said:
+        read_until(launch, "process[deep/two-2]: started with pid [")
+    proxy = MasterProxy(f"http://localhost:{port}", "/test")
+    assert proxy.get_param("/p") == 5
+    proxy.close()
+    children = psutil.Process(launch.pid).children(recursive=True)
+    assert len(children) == 3
+    launch.send_signal(signal.SIGINT)
+    output, _ = launch.communicate(timeout=5)
+    assert launch.returncode == 0
+    assert "[deep/two-2] killing on exit\n[one-1] killing on exit\n" in output
+    assert output.splitlines()[-4:] == [
+        "[master] killing on exit",
+        "shutting down processing monitor...",
+        "... shutting down processing monitor complete",
+        "done",
+    ]
+    assert not [child for child in children if child.is_running()]
+    logs = list(Path(os.environ["ROS_LOG_DIR"]).glob("*/deep-two-2-stdout.log"))
+    assert logs[0].read_text().startswith("waiting __name:=two")
+
+
+@pytest.mark.parametrize(("code", "status"), [(0, 0), (3, 1)])
+def test_a_required_node_ends_all(master: str, package: Path, code: int, status: int) -> None:
+    file = package / "required.launch"
+    file.write_text(
+        f'<launch><node name="r" pkg="pkg" type="stop.py" args="{code}" required="true" output="screen"/>'
+        '<node name="w" pkg="pkg" type="wait.py"/></launch>'
+    )
+    done = subprocess.run(
+        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=20, check=False
+    )
+    assert done.returncode == status
+    assert "REQUIRED process [r-1] has" in done.stdout
+    assert "[w-2] killing on exit" in done.stdout
+    assert "auto-starting" not in done.stdout
+
+
+def test_a_node_that_dies_is_reported(master: str, package: Path) -> None:
+    file = package / "dies.launch"
+    file.write_text('<launch><node name="d" pkg="pkg" type="stop.py" args="3"/></launch>')
+    done = subprocess.run(
+        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=20, check=False
+    )
+    assert done.returncode == 0
+    assert "[d-1] process has died [pid " in done.stderr
+    assert "exit code 3, cmd " in done.stderr
+    assert "log file: " in done.stderr
+    assert "all processes on machine have died" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "says"),
+    [
+        ([], 2, "say what to launch"),
+        (["rpi_feros_bringu", "x.launch"], 1, "did you mean rpi_feros_bringup"),
+        (["rpi_feros_bringup", "rpi_let.launch"], 1, "did you mean rpi_led.launch"),
+        (["/no/such.launch"], 1, "is not a launch file name"),
+        (["rpi_feros_bringup", "rpi_led.launch", "x:=1"], 2, "arg [x] not found"),
+        (["--nonsense"], 2, "unrecognized arguments: --nonsense"),
+    ],
+)
+def test_roslaunch_typed_wrong(
+    words: list[str], status: int, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert roslaunch.main(words) == status
+    errors = capsys.readouterr().err
+    assert says in errors
+    assert errors.count("\n") == 1
+
+
+def test_roslaunch_without_running(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = package / "a.launch"
+    file.write_text(
+        '<launch><arg name="who" doc="a name"/><param name="p" value="1"/>'
+        '<node name="$(arg who)" pkg="pkg" type="wait.py"/></launch>'
+    )
+    assert roslaunch.main(["--nodes", str(file), "who:=me"]) == 0
+    assert roslaunch.main(["--dump-params", str(file), "who:=me"]) == 0
+    assert roslaunch.main(["--ros-args", str(file)]) == 0
+    assert roslaunch.main(["--files", str(file), "who:=me"]) == 0
+    assert roslaunch.main(["--args", "me", str(file), "who:=me"]) == 0
+    command = f"{sys.executable} {package / 'wait.py'} __name:=me"
+    assert capsys.readouterr().out == (
+        f"/me\n{{/p: 1}}\n\nRequired Arguments:\n  who: a name\n{file}\n{command}\n"
+    )
+
+
+def test_roslaunch_does_not_start_a_master_elsewhere(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from minirospy.environment import Environment
+    from minirospy.launch.runner import Launcher
+    from minirospy.launch.spec import LaunchSpec
+    from minirospy.workspace.packages import Packages
+
+    environment = Environment.read(
+        {"ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}", "ROS_HOSTNAME": "localhost"}
+    )
+    monkeypatch.setattr(Environment, "master_is_local", property(lambda self: False))
+    with pytest.raises(MasterUnreachableError):
+        Launcher(LaunchSpec(), environment, Packages(environment)).run()
+
+
+# --- the family and the demo
+
+
+def test_the_family_tells_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert family.main([]) == 2
+    assert "minirospy demo " in capsys.readouterr().out
+    assert family.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("minirospy 0.")
+    assert family.main(["tpic"]) == 2
+    assert "did you mean topic?" in capsys.readouterr().err
+
+
+def test_the_demo_shows_the_led_following(started: list[subprocess.Popen[str]]) -> None:
+    demo = start(started, "minirospy", "demo", "--presses", "1")
+    output, _ = demo.communicate(timeout=30)
+    assert "1: button 1 pressed  -> LED on GPIO 7 on after " in output
+    assert "1: button 1 released -> LED on GPIO 7 off after " in output
+    assert demo.returncode == 0
