@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -80,15 +80,16 @@ def answers(uri: str) -> bool:
     return True
 
 
-@pytest.fixture(params=["our master", "real master"])
-def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
-    """The URI of a fresh master, ours and the real one in turn."""
+@contextmanager
+def running_master(stack: str) -> Iterator[str]:
+    """The URI of a fresh master of ``stack``."""
     port = free_port()
     uri = f"http://localhost:{port}"
-    if request.param == "our master":
-        program = start([str(OUR_BIN / "roscore"), "-p", str(port)], uri, "ours")
-    else:
-        program = start([str(REAL_BIN / "rosmaster"), "--core", "-p", str(port)], uri, "rospy")
+    commands = {
+        "ours": [str(OUR_BIN / "roscore"), "-p", str(port)],
+        "rospy": [str(REAL_BIN / "rosmaster"), "--core", "-p", str(port)],
+    }
+    program = start(commands[stack], uri, stack)
     try:
         end = time.monotonic() + 15
         while not answers(uri):
@@ -98,6 +99,20 @@ def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
         yield uri
     finally:
         stop(program)
+
+
+@pytest.fixture(params=["ours", "rospy"], ids=["our master", "real master"])
+def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
+    """The URI of a fresh master, ours and the real one in turn."""
+    with running_master(request.param) as uri:
+        yield uri
+
+
+@pytest.fixture
+def real_master() -> Iterator[str]:
+    """The URI of a fresh rosmaster."""
+    with running_master("rospy") as uri:
+        yield uri
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,178 @@
+"""runtime/master over real sockets: the answers of real rosmaster (master_answers.json), and what it tells nodes."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import queue
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xmlrpc.client import Fault, ServerProxy
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+
+HERE = Path(__file__).parent
+
+
+def calls() -> list[tuple[Any, ...]]:
+    spec = importlib.util.spec_from_file_location("master_calls", HERE / "master_calls.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return list(module.CALLS)
+
+
+def answers(uri: str) -> list[Any]:
+    """The answer to each call; of a fault only that it was one, and what differs by process is blanked."""
+    found: list[Any] = []
+    with ServerProxy(uri) as proxy:
+        for method, *args in calls():
+            try:
+                answer: Any = getattr(proxy, method)(*args)
+            except Fault:
+                answer = "fault"
+            if method in ("getPid", "getUri") and answer[0] == 1:
+                answer[2] = "its own"
+            found.append(answer)
+    return found
+
+
+def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
+    golden = json.loads((HERE / "master_answers.json").read_text())
+    assert len(golden) == len(calls()) > 100
+    for call, ours, real in zip(calls(), answers(master), golden, strict=True):
+        assert ours == real, call
+
+
+class Slave:
+    """A node's Slave API that notes what it is called with."""
+
+    def __init__(self) -> None:
+        self.called: queue.SimpleQueue[tuple[Any, ...]] = queue.SimpleQueue()
+
+        class Quiet(SimpleXMLRPCRequestHandler):
+            def log_message(self, format: str, *args: object) -> None:
+                pass
+
+        self._server = SimpleXMLRPCServer(("127.0.0.1", 0), Quiet)
+        self._server.register_instance(self)
+        self.uri = f"http://127.0.0.1:{self._server.server_address[1]}/"
+        threading.Thread(target=self._server.serve_forever, args=(0.02,), daemon=True).start()
+
+    def _dispatch(self, method: str, args: tuple[Any, ...]) -> list[Any]:
+        self.called.put((method, *args))
+        return [1, "", 0]
+
+    def next(self) -> tuple[Any, ...]:
+        return self.called.get(timeout=5)
+
+    def close(self) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+@pytest.fixture
+def slaves() -> Iterator[list[Slave]]:
+    found = [Slave(), Slave()]
+    yield found
+    for slave in found:
+        slave.close()
+
+
+@pytest.fixture
+def proxy(master: str) -> Iterator[ServerProxy]:
+    with ServerProxy(master) as found:
+        yield found
+
+
+def test_subscribers_are_told_the_full_list_each_time(proxy: ServerProxy, slaves: list[Slave]) -> None:
+    subscriber, publisher = slaves
+    proxy.registerSubscriber("/sub", "/t", "std_msgs/Bool", subscriber.uri)
+    proxy.registerPublisher("/pub", "/t", "std_msgs/Bool", publisher.uri)
+    assert subscriber.next() == ("publisherUpdate", "/master", "/t", [publisher.uri])
+    proxy.registerPublisher("/other", "/t", "std_msgs/Bool", "http://127.0.0.1:1/")
+    assert subscriber.next() == ("publisherUpdate", "/master", "/t", [publisher.uri, "http://127.0.0.1:1/"])
+    proxy.unregisterPublisher("/other", "/t", "http://127.0.0.1:1/")
+    assert subscriber.next() == ("publisherUpdate", "/master", "/t", [publisher.uri])
+    proxy.unregisterPublisher("/pub", "/t", publisher.uri)
+    assert subscriber.next() == ("publisherUpdate", "/master", "/t", [])
+
+
+def test_the_older_node_of_a_name_is_told_to_stop(proxy: ServerProxy, slaves: list[Slave]) -> None:
+    old, new = slaves
+    proxy.registerPublisher("/same", "/t", "std_msgs/Bool", old.uri)
+    proxy.registerPublisher("/same", "/u", "std_msgs/Bool", new.uri)
+    method, caller, reason = old.next()
+    assert (method, caller) == ("shutdown", "/master")
+    assert "new node registered with same name" in reason
+    state: Any = proxy.getSystemState("/test")
+    assert state[2][0] == [["/u", ["/same"]]]
+    # Its late unregistering does not touch the newcomer.
+    assert proxy.unregisterPublisher("/same", "/u", old.uri)[2] == 0  # type: ignore[index]
+
+
+def test_a_subscriber_that_never_answers_delays_nobody(proxy: ServerProxy, slaves: list[Slave]) -> None:
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        dead = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+        proxy.registerSubscriber("/dead", "/t", "std_msgs/Bool", dead)
+        proxy.registerSubscriber("/sub", "/t", "std_msgs/Bool", slaves[0].uri)
+        proxy.registerPublisher("/pub", "/t", "std_msgs/Bool", slaves[1].uri)
+        assert slaves[0].next() == ("publisherUpdate", "/master", "/t", [slaves[1].uri])
+
+
+def test_param_updates(proxy: ServerProxy, slaves: list[Slave]) -> None:
+    told = slaves[0]
+    proxy.subscribeParam("/node", told.uri, "/a/b")
+    proxy.setParam("/other", "/a/b", {"c": 1})
+    assert told.next() == ("paramUpdate", "/master", "/a/b/", {"c": 1})
+    proxy.setParam("/other", "/a/b/c", 2)
+    assert told.next() == ("paramUpdate", "/master", "/a/b/c/", 2)
+    proxy.setParam("/other", "/a", {"b": 3})
+    assert told.next() == ("paramUpdate", "/master", "/a/b/", 3)
+    # Who sets it is not told; who deletes it is somebody else.
+    proxy.setParam("/node", "/a/b", 4)
+    proxy.deleteParam("/other", "/a/b")
+    assert told.next() == ("paramUpdate", "/master", "/a/b/", {})
+
+
+def test_many_calls_in_one(proxy: ServerProxy) -> None:
+    answer: Any = proxy.system.multicall(
+        [
+            {"methodName": "setParam", "params": ["/test", "/p", 1]},
+            {"methodName": "getParam", "params": ["/test", "/p"]},
+            {"methodName": "nonsense", "params": []},
+            {},
+        ]
+    )
+    assert answer[:2] == [[[1, "parameter /p set", 0]], [[1, "Parameter [/p]", 1]]]
+    assert [set(entry) for entry in answer[2:]] == [{"faultCode", "faultString"}] * 2
+
+
+@pytest.mark.parametrize(
+    ("request_bytes", "status"),
+    [
+        (b"garbage\r\n\r\n", b"400"),
+        (b"GET / HTTP/1.1\r\n\r\n", b"405"),
+        (b"POST / HTTP/1.1\r\nContent-Length: 3\r\n\r\nabc", b"400"),
+        (b"POST / HTTP/1.1\r\nContent-Length: 99999999999\r\n\r\n", b"413"),
+        (b"POST / HTTP/1.1\r\nContent-Length: x\r\n\r\n", b"400"),
+        (b'POST / HTTP/1.1\r\nContent-Length: 41\r\n\r\n<!DOCTYPE a [<!ENTITY b "c">]><methodCall>', b"400"),
+    ],
+)
+def test_bad_requests_are_refused_and_harm_nobody(master: str, request_bytes: bytes, status: bytes) -> None:
+    port = int(master.rsplit(":", 1)[1])
+    with socket.create_connection(("127.0.0.1", port), 5) as sock:
+        sock.sendall(request_bytes)
+        answer = b""
+        while more := sock.recv(4096):
+            answer += more
+    assert answer.split(b" ", 2)[1] == status
+    with ServerProxy(master) as proxy:
+        assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
