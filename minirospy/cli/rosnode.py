@@ -63,7 +63,7 @@ def _ping(argv: Sequence[str]) -> int:
                 time.sleep(1.0)
         except KeyboardInterrupt:
             pass
-        if times:
+        if times and options.count != 1:
             print(f"ping average: {sum(times) / len(times):f}ms")
         return 0
 

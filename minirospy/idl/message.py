@@ -203,7 +203,7 @@ def strify_message(
     if isinstance(val, str):
         return _quoted(val) if val else "''"
     if isinstance(val, TVal):
-        return _time_text(val, indent, time_offset)
+        return _time_text(val, indent, time_offset, fixed_numeric_width)
     if isinstance(val, bytes | bytearray | memoryview):
         return str(val)
     options = (time_offset, current_time, field_filter, fixed_numeric_width)
@@ -250,10 +250,10 @@ def _list_text(values: Sequence[Any], indent: str, options: tuple[Any, ...]) -> 
     return "".join(f"\n{indent}- {strify_message(value, '', *options)}" for value in values)
 
 
-def _time_text(value: TVal, indent: str, offset: Any) -> str:
+def _time_text(value: TVal, indent: str, offset: Any, width: int | None) -> str:
     if offset is not None and isinstance(value, Time):
         value = value - offset
-    return f"\n{indent}secs: {value.secs}\n{indent}nsecs: {value.nsecs:>9}"
+    return f"\n{indent}secs: {value.secs:{width or 1}d}\n{indent}nsecs: {value.nsecs:{width or 9}d}"
 
 
 def _number(value: Any, width: int | None) -> str:
