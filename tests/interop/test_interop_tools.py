@@ -166,7 +166,7 @@ def scene(request: pytest.FixtureRequest, any_master: str) -> Iterator[str]:
 
 
 ALL_REAL_AND_ALL_OURS = pytest.mark.parametrize(
-    ("any_master", "scene"), [("real master", "rospy"), ("our master", "ours")], indirect=True
+    ("any_master", "scene"), [("rospy", "rospy"), ("ours", "ours")], indirect=True
 )
 
 
