@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from minirospy.errors import UsageError
@@ -20,8 +20,7 @@ __all__ = ["DEFAULT_MASTER_PORT", "Environment"]
 DEFAULT_MASTER_PORT = 11311
 
 
-@dataclass(frozen=True)
-class Environment:
+class Environment(NamedTuple):
     """Where the master is, how this process is reached, and where its files go.
 
     ``host`` is the name that peers are told; ``bind_host`` the address that servers listen on
@@ -33,7 +32,7 @@ class Environment:
     namespace: str
     home: Path
     log_dir: Path
-    package_path: tuple[Path, ...] = field(default=())
+    package_path: tuple[Path, ...] = ()
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:

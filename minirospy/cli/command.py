@@ -18,15 +18,29 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from minirospy.errors import MessageException, MinirospyError, ROSException, ServiceException, UsageError
 
 __all__ = ["Parser", "run"]
 
 
+class _Help(argparse.HelpFormatter):
+    """Help as wide as the terminal; argparse asks shutil for that, whose import costs more than its own."""
+
+    def __init__(self, prog: str, *args: Any, **kwargs: Any) -> None:
+        try:
+            width = os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
+        except (OSError, ValueError):
+            width = 80
+        super().__init__(prog, *args, **{"width": max(width, 40) - 2, **kwargs})
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser whose complaint is one line that ends with what to type for help."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **{"formatter_class": _Help, **kwargs})
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message} (`{self.prog} -h` shows what there is)")

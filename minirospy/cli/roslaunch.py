@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from minirospy.cli.command import Parser, run
@@ -31,7 +30,7 @@ def _roslaunch(words: list[str]) -> int:
     args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
     environment = Environment.read()
     if options.port is not None:
-        environment = replace(environment, master_uri=f"http://localhost:{options.port}")
+        environment = environment._replace(master_uri=f"http://localhost:{options.port}")
     packages = Packages(environment)
     if not options.what:
         parser.error("say what to launch: PACKAGE FILE, or one or more launch files")
