@@ -42,7 +42,9 @@ def digest(message):
 
 
 def say(*words):
-    print(*words, flush=True)
+    """One write a line: callbacks of several topics speak at once."""
+    sys.stdout.write(" ".join(map(str, words)) + "\n")
+    sys.stdout.flush()
 
 
 def talk():
