@@ -122,7 +122,9 @@ def test_anon_is_the_same_name_in_all_places(packages: Packages) -> None:
 
 def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
     file = tmp_path / "a.launch"
-    file.write_text('<launch><arg name="a"/><arg name="b" default="1" doc="a number"/><arg name="c" value="2"/></launch>')
+    file.write_text(
+        '<launch><arg name="a"/><arg name="b" default="1" doc="a number"/><arg name="c" value="2"/></launch>'
+    )
     assert [(arg.name, arg.default, arg.doc) for arg in describe_args(str(file))] == [
         ("a", None, None),
         ("b", "1", "a number"),
@@ -156,7 +158,7 @@ def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
         ('<arg name="a"/>', "required arg 'a' is not set: add a:=VALUE"),
         ('<arg name="a" default="1" value="2"/>', "one and only one of value/default"),
         ('<arg name="a" value="1"/><arg name="a" value="2"/>', "already been declared"),
-        ('<rosparam>[1</rosparam>', "not YAML"),
+        ("<rosparam>[1</rosparam>", "not YAML"),
         ("<rosparam>[1]</rosparam>", "must hold a YAML dictionary"),
         ('<rosparam command="what"/>', r"no command \[what\]"),
         ('<include file="/no/such.launch"/>', r"cannot include \[/no/such.launch\]"),
