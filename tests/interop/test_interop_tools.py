@@ -7,7 +7,6 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -224,20 +223,6 @@ def test_killing(any_master: str, killing: Path, killed: Path) -> None:
     assert _run(any_master, killing, f"rosnode kill {name}").startswith(f"killing {name}\n")
     pub.communicate(timeout=20)
     assert name not in _run(any_master, killing, "rosnode list").split()
-
-
-def test_listing_starts_faster(any_master: str) -> None:
-    """`rostopic list` takes at most half of the real one's time; the smallest of several runs of each."""
-
-    def seconds(tools: Path) -> float:
-        times = []
-        for _ in range(5):
-            start = time.perf_counter()
-            _run(any_master, tools, "rostopic list")
-            times.append(time.perf_counter() - start)
-        return min(times)
-
-    assert seconds(OURS) <= 0.5 * seconds(REAL)
 
 
 def _environment(uri: str) -> dict[str, str]:
