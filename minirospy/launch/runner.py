@@ -159,6 +159,10 @@ class Launcher:
         log_file = None if screen else folder / f"{stem}-stdout.log"
         cwd = self._packages.find(node.package) if node.cwd == "node" else self._environment.home
         cwd.mkdir(parents=True, exist_ok=True)
+        if log_file or not sys.stdout.isatty():
+            # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
+            # writes whole lines, which those of another node do not cut in two.
+            environment.setdefault("PYTHONUNBUFFERED", "1")
         with _output(log_file) as output:
             process = self._spawn(name, [*command, log_argument], environment, output, cwd)
         process.node, process.log_file = node, folder / f"{stem}*.log"
@@ -325,8 +329,6 @@ def node_environment(node: NodeSpec, environment: Environment) -> dict[str, str]
         variables["ROS_NAMESPACE"] = namespace
     else:
         variables.pop("ROS_NAMESPACE", None)
-    # So that what a node prints is seen when it prints it.
-    variables.setdefault("PYTHONUNBUFFERED", "1")
     return variables
 
 

@@ -43,7 +43,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
     (folder / "wait.py").write_text(
-        "import sys, time\nprint('waiting', *sys.argv[1:], flush=True)\n"
+        # One write a line: roslaunch writes to the same pipe at the same time.
+        "import sys, time\nsys.stdout.write(' '.join(['waiting', *sys.argv[1:]]) + '\\n')\nsys.stdout.flush()\n"
         "try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
     )
     (folder / "stop.py").write_text("import sys\nprint('stopping')\nsys.exit(int(sys.argv[1]))\n")
