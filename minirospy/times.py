@@ -20,14 +20,18 @@ class TVal:
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
         """``secs`` may be a float where ``nsecs`` is 0. Raises ValueError or TypeError."""
+        if type(secs) is int and type(nsecs) is int and 0 <= nsecs < _BILLION:
+            self.secs: int = secs
+            self.nsecs: int = nsecs
+            return
         if isinstance(secs, float):
             if nsecs:
                 raise ValueError("if secs is a float, nsecs cannot be set")
             total = int(secs)
             nsecs = round((secs - total) * 1e9)
             secs = total
-        self.secs: int = int(secs)
-        self.nsecs: int = int(nsecs)
+        self.secs = int(secs)
+        self.nsecs = int(nsecs)
         self.canon()
 
     @classmethod

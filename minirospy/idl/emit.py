@@ -1,29 +1,25 @@
 """Spec -> Python source: one readable module a message or service.
 
-A generated module imports public names of ``genpy`` alone, so that it works beside real ROS too. Its
-``serialize`` and ``deserialize`` are straight lines: fields of fixed size that follow each other, nested ones
-included, share one compiled ``struct``; every length is checked against the bytes that are there.
+A generated module imports public names of ``genpy`` alone, so that it works beside real ROS too. How its
+``serialize`` and ``deserialize`` are made: ``codec``.
 """
 
 from __future__ import annotations
 
-import keyword
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import NamedTuple
 
+from minirospy.idl.codec import keeps_buffer, lazy_arrays, write_deserialize, write_serialize
 from minirospy.idl.digest import (
     Lookup,
     full_text,
     message_md5,
     service_md5,
 )
-from minirospy.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec, ServiceSpec
+from minirospy.idl.source import Source, python_name
+from minirospy.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
 
 __all__ = ["emit_message", "emit_package", "emit_service", "python_name"]
 
-_RESERVED = {*keyword.kwlist, "self", "serialize", "deserialize"}
 _PYTHON_TYPE = {
     "bool": "bool",
     "float32": "float",
@@ -32,12 +28,57 @@ _PYTHON_TYPE = {
     "time": "genpy.Time",
     "duration": "genpy.Duration",
 }
-_BITS = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
 
-
-def python_name(field: str) -> str:
-    """A field's name in Python: a word that Python keeps for itself gets an underscore."""
-    return field + "_" if field in _RESERVED else field
+_NATIVE = [
+    "# struct is faster in the machine's own order, where that is also the order of ROS.",
+    '_NATIVE = "@" if sys.byteorder == "little" else "<"',
+]
+_HELPERS = {
+    "_new": ["_new: Any = object.__new__"],
+    "_Time": ["_Time = genpy.Time"],
+    "_Duration": ["_Duration = genpy.Duration"],
+    "_numbers": [
+        "",
+        "",
+        "@lru_cache(maxsize=256)",
+        "def _numbers(letter: str, count: int) -> struct.Struct:",
+        '    return struct.Struct(f"{_NATIVE}{count}{letter}")',
+    ],
+    "_packed": [
+        "",
+        "",
+        "def _packed(letter: str, values: Any) -> bytes:",
+        '    """The length and the bytes of an array of numbers, which may be one of numpy."""',
+        "    length = _struct_I.pack(len(values))",
+        "    if isinstance(values, (list, tuple)):",
+        "        return length + _numbers(letter, len(values)).pack(*values)",
+        '    if getattr(values, "dtype", None) == f"<{letter}":',
+        "        return length + bytes(values.tobytes())",
+        '    values = values.tolist() if hasattr(values, "tolist") else values',
+        "    return length + _numbers(letter, len(values)).pack(*values)",
+    ],
+    "_Arrays": [
+        "",
+        "",
+        "class _Arrays(genpy.Message):",
+        '    """Keeps arrays of numbers as the bytes that came, until one is read for the first time."""',
+        "",
+        '    __slots__ = ["_raw"]',
+        "    _letters: dict[str, str] = {}",
+        "    _raw: dict[str, bytes]",
+        "",
+        "    if not TYPE_CHECKING:",
+        "",
+        "        def __getattr__(self, name):",
+        "            if name not in self._letters:",
+        '                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")',
+        "            raw, letter = self._raw[name], self._letters[name]",
+        "            value = _numbers(letter, len(raw) // struct.calcsize(letter)).unpack(raw)",
+        "            setattr(self, name, value)",
+        "            return value",
+    ],
+}
+"""What a module needs beside its classes: name -> lines, in the order in which they stand."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
@@ -84,131 +125,128 @@ def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
     return "\n".join(lines)
 
 
-class _Leaf(NamedTuple):
-    """A field as the bytes have it: nested messages are opened up into their leaves."""
-
-    path: str
-    type: FieldType
-
-
 class _Module:
-    """Collects the lines of one module."""
+    """Writes one module."""
 
     def __init__(self, lookup: Lookup) -> None:
         self._lookup = lookup
-        self._lines: list[str] = []
-        self._indent = ""
-        self._structs: dict[str, str] = {}
-        self._classes: dict[str, str] = {}
-        self._counter = 0
+        self._source = Source()
 
     def source(self, messages: list[MessageSpec], service: ServiceSpec | None, origin: str) -> str:
         for message in messages:
             self._message(message)
         if service:
             self._service(service)
-        head = [
+        return "\n".join(
+            [*self._head(origin, {message.full_name for message in messages}), *self._source.lines, ""]
+        )
+
+    def _head(self, origin: str, own: set[str]) -> list[str]:
+        """Everything above the classes: imports, compiled structs, helpers."""
+        helpers = self._source.helpers
+        if "_packed" in helpers:
+            self._source.struct("I")
+        structs = dict(sorted(self._source.structs.items()))
+        native = {letters for letters in structs if _is_even(letters)}
+        if helpers & {"_packed", "_Arrays"}:
+            helpers.add("_numbers")
+        if native or "_numbers" in helpers:
+            helpers.add("_NATIVE")
+        lines = [
             f'"""Generated by minirospy from {origin}. Do not edit."""',
             "",
             "from __future__ import annotations",
             "",
             "import struct",
-            "from typing import Any",
+            *(["import sys"] if "_NATIVE" in helpers else []),
+            *(["from functools import lru_cache"] if "_numbers" in helpers else []),
+            f"from typing import {'TYPE_CHECKING, ' if '_Arrays' in helpers else ''}Any",
             "",
             "import genpy",
         ]
-        own = {message.full_name for message in messages}
-        for full_name, alias in sorted(self._classes.items()):
+        for full_name, alias in sorted(self._source.classes.items()):
             package, name = full_name.split("/")
             if full_name not in own:
-                head.append(f"from {package}.msg._{name} import {name} as {alias}")
-        head.append("")
-        head += [f'{alias} = struct.Struct("{letters}")' for letters, alias in sorted(self._structs.items())]
-        return "\n".join([*head, *self._lines, ""])
-
-    # --- lines
-
-    def _line(self, text: str = "") -> None:
-        self._lines.append(self._indent + text if text else "")
-
-    @contextmanager
-    def _block(self, head: str) -> Iterator[None]:
-        self._line(head)
-        self._indent += "    "
-        yield
-        self._indent = self._indent[:-4]
-
-    def _struct(self, letters: str) -> str:
-        return self._structs.setdefault("<" + letters, f"_struct_{letters}")
-
-    def _class(self, full_name: str) -> str:
-        return self._classes.setdefault(full_name, "_" + full_name.replace("/", "_"))
-
-    def _fresh(self, stem: str) -> str:
-        self._counter += 1
-        return f"_{stem}{self._counter}"
-
-    # --- classes
+                lines.append(f"from {package}.msg._{name} import {name} as {alias}")
+        lines.append("")
+        if "_NATIVE" in helpers:
+            lines += _NATIVE
+        for letters, alias in structs.items():
+            form = f'f"{{_NATIVE}}{letters}"' if letters in native else f'"<{letters}"'
+            lines.append(f"{alias} = struct.Struct({form})")
+        for name, helper in _HELPERS.items():
+            if name in helpers:
+                lines += helper
+        return lines
 
     def _message(self, spec: MessageSpec) -> None:
+        line = self._source.line
         names = [python_name(field.name) for field in spec.fields]
-        self._line()
-        self._line()
-        with self._block(f"class {spec.name}(genpy.Message):"):
-            self._line(f'"""{spec.full_name}"""')
-            self._line()
-            self._line(f'_md5sum = "{message_md5(spec, self._lookup)}"')
-            self._line(f'_type = "{spec.full_name}"')
-            self._line(f"_has_header = {spec.has_header}")
-            self._line(f"_full_text = {full_text(spec, self._lookup)!r}")
-            self._line("_takes_memoryview = True")
+        lazy = lazy_arrays(spec)
+        base = self._source.use("_Arrays") if lazy else "genpy.Message"
+        line()
+        line()
+        with self._source.block(f"class {spec.name}({base}):"):
+            line(f'"""{spec.full_name}"""')
+            line()
+            line(f'_md5sum = "{message_md5(spec, self._lookup)}"')
+            line(f'_type = "{spec.full_name}"')
+            line(f"_has_header = {spec.has_header}")
+            line(f"_full_text = {full_text(spec, self._lookup)!r}")
+            line(f"_takes_memoryview = {keeps_buffer(spec, self._lookup)}")
+            if lazy:
+                line(f"_letters = {lazy!r}")
             for constant in spec.constants:
-                self._line(f"{python_name(constant.name)} = {_constant(constant.value)}")
-            self._line(f"__slots__ = {names!r}")
-            self._line(f"_slot_types = {[str(field.type) for field in spec.fields]!r}")
+                line(f"{python_name(constant.name)} = {_constant(constant.value)}")
+            line(f"__slots__ = {names!r}")
+            line(f"_slot_types = {[str(field.type) for field in spec.fields]!r}")
             for name, field in zip(names, spec.fields, strict=True):
-                self._line(f"{name}: {self._annotation(field.type)}")
-            self._line()
+                line(f"{name}: {self._annotation(field.type)}")
+            line()
             self._init(spec.fields, names)
-            self._serialize(spec)
-            self._deserialize(spec)
+            line()
+            write_serialize(self._source, spec, self._lookup)
+            line()
+            write_deserialize(self._source, spec, self._lookup)
 
     def _service(self, spec: ServiceSpec) -> None:
-        self._line()
-        self._line()
-        with self._block(f"class {spec.name}:"):
-            self._line(f'"""{spec.full_name}"""')
-            self._line()
-            self._line(f'_type = "{spec.full_name}"')
-            self._line(f'_md5sum = "{service_md5(spec, self._lookup)}"')
-            self._line(f"_request_class = {spec.request.name}")
-            self._line(f"_response_class = {spec.response.name}")
+        line = self._source.line
+        line()
+        line()
+        with self._source.block(f"class {spec.name}:"):
+            line(f'"""{spec.full_name}"""')
+            line()
+            line(f'_type = "{spec.full_name}"')
+            line(f'_md5sum = "{service_md5(spec, self._lookup)}"')
+            line(f"_request_class = {spec.request.name}")
+            line(f"_response_class = {spec.response.name}")
 
     def _annotation(self, type_: FieldType) -> str:
         if type_.is_bytes:
             return "bytes"
-        base = _PYTHON_TYPE.get(type_.base) or ("int" if type_.is_primitive else self._class(type_.base))
+        base = _PYTHON_TYPE.get(type_.base) or (
+            "int" if type_.is_primitive else self._source.class_(type_.base)
+        )
         return f"list[{base}]" if type_.is_array else base
 
     def _init(self, fields: tuple[Field, ...], names: list[str]) -> None:
-        with self._block("def __init__(self, *args: Any, **kwds: Any) -> None:"):
-            self._line('"""All fields in order, or some by name."""')
-            with self._block("if args or kwds:"):
-                self._line("super().__init__(*args, **kwds)")
+        with self._source.block("def __init__(self, *args: Any, **kwds: Any) -> None:"):
+            self._source.line('"""All fields in order, or some by name."""')
+            with self._source.block("if args or kwds:"):
+                self._source.line("super().__init__(*args, **kwds)")
                 for name, field in zip(names, fields, strict=True):
-                    with self._block(f"if self.{name} is None:"):
-                        self._line(f"self.{name} = {self._default(field.type)}")
+                    with self._source.block(f"if self.{name} is None:"):
+                        self._source.line(f"self.{name} = {self._default(field.type)}")
             if names:
-                with self._block("else:"):
+                with self._source.block("else:"):
                     for name, field in zip(names, fields, strict=True):
-                        self._line(f"self.{name} = {self._default(field.type)}")
-        self._line()
+                        self._source.line(f"self.{name} = {self._default(field.type)}")
 
     def _default(self, type_: FieldType) -> str:
         if type_.is_bytes:
             return f"bytes({type_.length})" if type_.length else 'b""'
         if not type_.is_primitive:
-            one = self._class(type_.base) + "()"
+            one = self._source.class_(type_.base) + "()"
         elif type_.base in ("time", "duration"):
             one = _PYTHON_TYPE[type_.base] + "()"
         else:
@@ -221,250 +259,11 @@ class _Module:
             return f"[{one} for _ in range({type_.length})]"
         return f"[{one}] * {type_.length}"
 
-    # --- leaves and runs
 
-    def _leaves(self, fields: tuple[Field, ...], path: str) -> Iterator[_Leaf]:
-        for field in fields:
-            inner = f"{path}.{python_name(field.name)}"
-            if field.type.is_array or field.type.is_primitive:
-                yield _Leaf(inner, field.type)
-            else:
-                yield from self._leaves(self._lookup(field.type.base).fields, inner)
-
-    def _runs(self, fields: tuple[Field, ...], path: str) -> Iterator[_Leaf | list[_Leaf]]:
-        """The leaves, those of fixed size that follow each other gathered in lists."""
-        run: list[_Leaf] = []
-        for leaf in self._leaves(fields, path):
-            if not leaf.type.is_array and PRIMITIVES[leaf.type.base]:
-                run.append(leaf)
-                continue
-            if run:
-                yield run
-                run = []
-            yield leaf
-        if run:
-            yield run
-
-    def _least_size(self, type_: FieldType) -> int:
-        """The bytes that a value of this type takes at least."""
-        if type_.is_array and type_.length is None:
-            return 4
-        if type_.is_primitive:
-            one = sum(_BITS[letter] for letter in PRIMITIVES[type_.base]) or 4
-        else:
-            one = sum(self._least_size(field.type) for field in self._lookup(type_.base).fields)
-        return one * (type_.length or 0) if type_.is_array else one
-
-    # --- serialize
-
-    def _serialize(self, spec: MessageSpec) -> None:
-        with self._block("def serialize(self, buff: Any) -> None:"):
-            self._line('"""Write the message. Raises genpy.SerializationError."""')
-            if not spec.fields:
-                self._line()
-                return
-            with self._block("try:"):
-                self._write_fields(spec.fields, "self", "buff.write")
-            with self._block("except (struct.error, TypeError, AttributeError, ValueError) as error:"):
-                self._line("self._check_types(error)")
-        self._line()
-
-    def _write_fields(self, fields: tuple[Field, ...], path: str, write: str) -> None:
-        for part in self._runs(fields, path):
-            if isinstance(part, list):
-                letters, values = _packing(part)
-                self._line(f"{write}({self._struct(letters)}.pack({values}))")
-            elif not part.type.is_array:
-                self._write_string(part.path, write)
-            else:
-                self._write_array(part, write)
-
-    def _write_string(self, path: str, write: str) -> None:
-        text = self._fresh("s")
-        self._line(f"{text} = {path}")
-        with self._block(f"if not isinstance({text}, bytes):"):
-            self._line(f"{text} = {text}.encode()")
-        self._line(f"{write}({self._struct('I')}.pack(len({text})))")
-        self._line(f"{write}({text})")
-
-    def _write_array(self, leaf: _Leaf, write: str) -> None:
-        type_ = leaf.type
-        values = self._fresh("a")
-        self._line(f"{values} = {leaf.path}")
-        if type_.length is None:
-            self._line(f"{write}({self._struct('I')}.pack(len({values})))")
-        elif not type_.is_bytes and not (type_.is_primitive and len(PRIMITIVES[type_.base]) == 1):
-            with self._block(f"if len({values}) != {type_.length}:"):
-                self._line(
-                    f'raise ValueError(f"{leaf.path.split(".")[-1]} has {{len({values})}} values '
-                    f'instead of {type_.length}")'
-                )
-        letters = PRIMITIVES.get(type_.base, "")
-        if type_.is_bytes:
-            self._write_bytes(values, type_.length, write)
-        elif len(letters) == 1:
-            count = f"{type_.length}" if type_.length is not None else f"{{len({values})}}"
-            self._line(f'{write}(struct.pack(f"<{count}{letters}", *{values}))')
-        elif type_.base == "string":
-            one = self._fresh("v")
-            with self._block(f"for {one} in {values}:"):
-                self._write_string(one, write)
-        else:
-            self._write_elements(type_, values, write)
-
-    def _write_bytes(self, values: str, length: int | None, write: str) -> None:
-        with self._block(f"if isinstance({values}, (list, tuple)):"):
-            self._line(f"{values} = bytes({values})")
-        if length is None:
-            with self._block(f"elif isinstance({values}, str):"):
-                self._line('raise TypeError("a uint8[] is bytes, not a str")')
-            self._line(f"{write}({values})")
-        else:
-            self._line(f"{write}({self._struct(f'{length}s')}.pack({values}))")
-            with self._block(f"if len({values}) != {length}:"):
-                self._line(f'raise ValueError(f"{{len({values})}} bytes instead of {length}")')
-
-    def _write_elements(self, type_: FieldType, values: str, write: str) -> None:
-        one = self._fresh("v")
-        if type_.is_primitive:
-            pack = f"{self._struct(PRIMITIVES[type_.base])}.pack({one}.secs, {one}.nsecs)"
-            self._line(f'{write}(b"".join([{pack} for {one} in {values}]))')
-            return
-        fields = self._lookup(type_.base).fields
-        runs = list(self._runs(fields, one))
-        if len(runs) == 1 and isinstance(runs[0], list):
-            letters, packed = _packing(runs[0])
-            pack = f"{self._struct(letters)}.pack({packed})"
-            self._line(f'{write}(b"".join([{pack} for {one} in {values}]))')
-        elif fields:
-            with self._block(f"for {one} in {values}:"):
-                self._write_fields(fields, one, write)
-
-    # --- deserialize
-
-    def _deserialize(self, spec: MessageSpec) -> None:
-        with self._block(f"def deserialize(self, str: Any) -> {spec.name}:"):
-            self._line('"""Read the message from bytes. Raises genpy.DeserializationError."""')
-            if not spec.fields:
-                self._line("return self")
-                return
-            with self._block("try:"):
-                self._line("end = 0")
-                self._line("size = len(str)")
-                for field in spec.fields:
-                    if not field.type.is_array and not field.type.is_primitive:
-                        name = python_name(field.name)
-                        self._create(f"self.{name}", field.type.base)
-                self._read_fields(spec.fields, "self")
-                self._line("return self")
-            with self._block("except struct.error as error:"):
-                self._line("raise genpy.DeserializationError(error) from error")
-
-    def _create(self, path: str, base: str) -> None:
-        """Make an empty message and the ones in it: what follows sets every field."""
-        class_ = self._class(base)
-        local = self._fresh("m")
-        self._line(f"{local} = {path} = {class_}.__new__({class_})")
-        for field in self._lookup(base).fields:
-            if field.type.is_array:
-                continue
-            inner = f"{local}.{python_name(field.name)}"
-            if field.type.base in ("time", "duration"):
-                self._line(f"{inner} = {_PYTHON_TYPE[field.type.base]}()")
-            elif not field.type.is_primitive:
-                self._create(inner, field.type.base)
-
-    def _read_fields(self, fields: tuple[Field, ...], path: str) -> None:
-        if path == "self":
-            for field in fields:
-                if not field.type.is_array and field.type.base in ("time", "duration"):
-                    self._line(f"self.{python_name(field.name)} = {_PYTHON_TYPE[field.type.base]}()")
-        for part in self._runs(fields, path):
-            if isinstance(part, list):
-                self._read_run(part)
-            elif not part.type.is_array:
-                self._read_string(part.path)
-            else:
-                self._read_array(part)
-
-    def _read_run(self, run: list[_Leaf]) -> None:
-        letters, _ = _packing(run)
-        targets = ", ".join(target for leaf in run for target in _targets(leaf))
-        size = sum(_BITS[letter] for leaf in run for letter in PRIMITIVES[leaf.type.base])
-        self._line(f"({targets},) = {self._struct(letters)}.unpack_from(str, end)")
-        self._line(f"end += {size}")
-        for leaf in run:
-            if leaf.type.base == "bool":
-                self._line(f"{leaf.path} = bool({leaf.path})")
-
-    def _read_length(self, least: int) -> str:
-        """Read a length, and refuse one that the bytes cannot hold."""
-        count = self._fresh("n")
-        self._line(f"({count},) = {self._struct('I')}.unpack_from(str, end)")
-        self._line("end += 4")
-        bound = f"{count} * {least}" if least > 1 else count
-        with self._block(f"if {bound} > size - end:"):
-            self._line(
-                f'raise genpy.DeserializationError(f"a length of {{{count}}} is longer than the message")'
-            )
-        return count
-
-    def _read_string(self, path: str) -> None:
-        count = self._read_length(1)
-        self._line(f'{path} = bytes(str[end : end + {count}]).decode("utf-8", "replace")')
-        self._line(f"end += {count}")
-
-    def _read_array(self, leaf: _Leaf) -> None:
-        type_ = leaf.type
-        letters = PRIMITIVES.get(type_.base, "")
-        element = FieldType(type_.base)
-        count = f"{type_.length}"
-        if type_.length is None:
-            # Elements without bytes: a count beyond the message's size is nonsense all the same.
-            count = self._read_length(max(1, self._least_size(element)))
-        if type_.is_bytes:
-            if type_.length is not None:
-                with self._block(f"if {count} > size - end:"):
-                    self._line('raise genpy.DeserializationError("the message ends inside an array")')
-            self._line(f"{leaf.path} = bytes(str[end : end + {count}])")
-            self._line(f"end += {count}")
-        elif len(letters) == 1:
-            form = f'f"<{{{count}}}{letters}"' if type_.length is None else f'"<{count}{letters}"'
-            values = f"struct.unpack_from({form}, str, end)"
-            convert = f"list(map(bool, {values}))" if type_.base == "bool" else f"list({values})"
-            self._line(f"{leaf.path} = {convert}")
-            width = _BITS[letters]
-            self._line(f"end += {f'{width} * ' if width > 1 else ''}{count}")
-        else:
-            self._read_elements(leaf, type_, count)
-
-    def _read_elements(self, leaf: _Leaf, type_: FieldType, count: str) -> None:
-        values, one = self._fresh("a"), self._fresh("v")
-        # Typed so that mypy accepts the generated source as it is.
-        self._line(f"{values}: list[Any] = []")
-        with self._block(f"for _ in range({count}):"):
-            if type_.base == "string":
-                self._read_string(one)
-            elif type_.is_primitive:
-                self._line(f"{one} = {_PYTHON_TYPE[type_.base]}()")
-                self._read_run([_Leaf(one, FieldType(type_.base))])
-            else:
-                self._create(one, type_.base)
-                self._read_fields(self._lookup(type_.base).fields, one)
-            self._line(f"{values}.append({one})")
-        self._line(f"{leaf.path} = {values}")
-
-
-def _packing(run: list[_Leaf]) -> tuple[str, str]:
-    """The letters for ``struct`` and the values to pack."""
-    letters = "".join(PRIMITIVES[leaf.type.base] for leaf in run)
-    return letters, ", ".join(target for leaf in run for target in _targets(leaf))
-
-
-def _targets(leaf: _Leaf) -> list[str]:
-    if leaf.type.base in ("time", "duration"):
-        return [f"{leaf.path}.secs", f"{leaf.path}.nsecs"]
-    return [leaf.path]
+def _is_even(letters: str) -> bool:
+    """Whether ``struct`` puts no padding between these letters, some of which are floats."""
+    kinds = {letter for letter in letters if letter.isalpha()}
+    return ("f" in kinds and kinds <= set("fiI")) or ("d" in kinds and kinds <= set("dqQ"))
 
 
 def _constant(value: object) -> str:

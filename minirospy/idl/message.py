@@ -73,7 +73,7 @@ class Message:
     def serialize(self, buff: Any) -> None:
         """Write this message to ``buff``."""
 
-    def deserialize(self, str: Any) -> Message:
+    def deserialize(self, data: Any) -> Message:
         """Read this message from bytes."""
         return self
 

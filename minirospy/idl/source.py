@@ -1,0 +1,74 @@
+"""The text of a generated module while it is written: lines, blocks, and the names that they share."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+__all__ = ["Source", "python_name"]
+
+_SAME = re.compile(r"([a-zA-Z])\1{2,}")
+_RESERVED = {*keyword.kwlist, "self", "serialize", "deserialize"}
+
+
+def python_name(field: str) -> str:
+    """A field's name in Python: a word that Python keeps for itself gets an underscore."""
+    return field + "_" if field in _RESERVED else field
+
+
+class Source:
+    """Collects lines; what they need from the module's head is noted as it is first used."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.structs: dict[str, str] = {}
+        """Letters for ``struct`` -> the module's name of the compiled struct."""
+        self.classes: dict[str, str] = {}
+        """``pkg/Name`` -> the module's name of that class."""
+        self.helpers: set[str] = set()
+        """Names of the helpers of ``emit`` that the module needs."""
+        self._indent = ""
+        self._taken: set[str] = set()
+
+    def line(self, text: str = "") -> None:
+        """Add a line to the current block."""
+        self.lines.append(self._indent + text if text else "")
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Lines written inside belong to ``head``."""
+        self.line(head)
+        self._indent += "    "
+        yield
+        self._indent = self._indent[:-4]
+
+    @contextmanager
+    def function(self, head: str) -> Iterator[None]:
+        """A block with local names of its own."""
+        self._taken = set()
+        with self.block(head):
+            yield
+
+    def struct(self, letters: str) -> str:
+        """The name of the compiled struct of these letters (``If``: an unsigned int, then a float)."""
+        short = _SAME.sub(lambda match: f"{len(match[0])}{match[1]}", letters)
+        return self.structs.setdefault(short, f"_struct_{short}")
+
+    def use(self, helper: str) -> str:
+        """Note that the module needs a helper."""
+        self.helpers.add(helper)
+        return helper
+
+    def class_(self, full_name: str) -> str:
+        """The name of a message's class."""
+        return self.classes.setdefault(full_name, "_" + full_name.replace("/", "_"))
+
+    def local(self, stem: str) -> str:
+        """A local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
+        number = 1
+        while f"{stem}{number}" in self._taken:
+            number += 1
+        self._taken.add(f"{stem}{number}")
+        return f"{stem}{number}"
