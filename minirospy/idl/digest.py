@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 
+from minirospy.errors import DefinitionError
 from minirospy.idl.spec import MessageSpec, ServiceSpec
 
 __all__ = [
@@ -16,7 +17,6 @@ __all__ = [
     "full_text",
     "md5_text",
     "message_md5",
-    "service_full_text",
     "service_md5",
 ]
 
@@ -27,25 +27,21 @@ _SEPARATOR = "=" * 80
 
 
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """What the md5sum counts: constants, then fields, nested types replaced by their md5sums."""
-    lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]
-    for field in spec.fields:
-        if field.type.is_primitive:
-            lines.append(f"{field.type} {field.name}")
-        else:
-            lines.append(f"{message_md5(lookup(field.type.base), lookup)} {field.name}")
-    return "\n".join(lines)
+    """What the md5sum counts: constants, then fields, nested types replaced by their md5sums.
+
+    Raises DefinitionError where a message contains itself.
+    """
+    return _md5_text(spec, lookup, ())
 
 
 def message_md5(spec: MessageSpec, lookup: Lookup) -> str:
-    """A message's md5sum."""
-    return hashlib.md5(md5_text(spec, lookup).encode(), usedforsecurity=False).hexdigest()
+    """A message's md5sum. Raises DefinitionError where it contains itself."""
+    return _md5(md5_text(spec, lookup))
 
 
 def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
     """A service's md5sum: over request and response together."""
-    text = md5_text(spec.request, lookup) + md5_text(spec.response, lookup)
-    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+    return _md5(md5_text(spec.request, lookup) + md5_text(spec.response, lookup))
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
@@ -69,6 +65,19 @@ def full_text(spec: MessageSpec, lookup: Lookup) -> str:
     return "\n".join(parts)
 
 
-def service_full_text(spec: ServiceSpec, lookup: Lookup) -> str:
-    """A service's text with its parts, each with what it needs."""
-    return f"{full_text(spec.request, lookup)}---\n{full_text(spec.response, lookup)}"
+def _md5(text: str) -> str:
+    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+
+
+def _md5_text(spec: MessageSpec, lookup: Lookup, around: tuple[str, ...]) -> str:
+    """``around``: the messages that this one is a part of."""
+    if spec.full_name in around:
+        raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
+    around += (spec.full_name,)
+    lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]
+    for field in spec.fields:
+        type_ = str(field.type)
+        if not field.type.is_primitive:
+            type_ = _md5(_md5_text(lookup(field.type.base), lookup, around))
+        lines.append(f"{type_} {field.name}")
+    return "\n".join(lines)

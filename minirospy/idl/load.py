@@ -6,11 +6,12 @@ a full text at run time.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import linecache
 import sys
 import types
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,14 @@ from minirospy.idl.spec import ActionSpec, MessageSpec, ServiceSpec
 __all__ = [
     "Catalogue",
     "class_from_text",
+    "compile_package",
     "get_message_class",
     "get_service_class",
     "message_class",
+    "read_definition",
     "service_class",
     "specs_of_text",
+    "write_if_changed",
     "write_package",
 ]
 
@@ -33,10 +37,17 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions below some folders: package name -> package folder. Specs are parsed once."""
+    """The definitions of some packages: package name -> its folder. Specs are parsed once.
 
-    def __init__(self, packages: dict[str, Path]) -> None:
+    A package's definitions are the files in its folders msg, srv and action, or, where ``definitions`` names the
+    package, just those.
+    """
+
+    def __init__(
+        self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
+    ) -> None:
         self.packages = packages
+        self._definitions = {package: tuple(files) for package, files in (definitions or {}).items()}
         self._specs: dict[str, MessageSpec] = {}
 
     @classmethod
@@ -49,6 +60,15 @@ class Catalogue:
                     found.setdefault(folder.name, folder)
         return cls(found)
 
+    def files(self, package: str, kind: str) -> dict[str, Path]:
+        """A package's definitions of a kind (msg, srv, action): name -> file."""
+        found: Iterable[Path]
+        if package in self._definitions:
+            found = (path for path in self._definitions[package] if path.suffix == f".{kind}")
+        else:
+            found = (self.packages[package] / kind).glob(f"*.{kind}")
+        return {path.stem: path for path in sorted(found)}
+
     def message(self, full_name: str) -> MessageSpec:
         """The spec of ``pkg/Name``. Raises NotFoundError, DefinitionError."""
         if full_name not in self._specs:
@@ -57,8 +77,7 @@ class Catalogue:
 
     def messages(self, package: str) -> list[MessageSpec]:
         """All messages of a package, those of its actions included, by name."""
-        folder = self.packages[package]
-        names = {path.stem for path in (folder / "msg").glob("*.msg")}
+        names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
         return [self.message(f"{package}/{name}") for name in sorted(names)]
@@ -68,8 +87,8 @@ class Catalogue:
         from minirospy.idl.parse import parse_service
 
         return [
-            parse_service(path.read_text(encoding="utf-8"), package, path.stem, str(path))
-            for path in sorted((self.packages[package] / "srv").glob("*.srv"))
+            parse_service(read_definition(path), package, name, str(path))
+            for name, path in self.files(package, "srv").items()
         ]
 
     def actions(self, package: str) -> list[ActionSpec]:
@@ -77,9 +96,10 @@ class Catalogue:
         from minirospy.idl.parse import parse_action
 
         found = []
-        for path in sorted((self.packages[package] / "action").glob("*.action")):
-            action = parse_action(path.read_text(encoding="utf-8"), package, path.stem, str(path))
-            self._specs.update({message.full_name: message for message in action.messages})
+        for name, path in self.files(package, "action").items():
+            action = parse_action(read_definition(path), package, name, str(path))
+            for message in action.messages:
+                self._specs.setdefault(message.full_name, message)
             found.append(action)
         return found
 
@@ -87,23 +107,29 @@ class Catalogue:
         from minirospy.idl.parse import parse_message
 
         package, _, name = full_name.partition("/")
-        folder = self.packages.get(package)
-        if folder is None:
+        if package not in self.packages:
             raise NotFoundError("package", package, self.packages, f"it should define [{full_name}]")
-        path = folder / "msg" / f"{name}.msg"
-        if not path.is_file():
-            self.actions(package)
-            if full_name in self._specs:
-                return self._specs[full_name]
-            known = [f"{package}/{other.stem}" for other in (folder / "msg").glob("*.msg")]
-            raise NotFoundError("message type", full_name, known)
-        return parse_message(path.read_text(encoding="utf-8"), package, name, str(path))
+        files = self.files(package, "msg")
+        if name in files:
+            return parse_message(read_definition(files[name]), package, name, str(files[name]))
+        self.actions(package)
+        if full_name in self._specs:
+            return self._specs[full_name]
+        raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
 
 
-def write_package(catalogue: Catalogue, package: str, root: Path) -> list[Path]:
-    """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
+def read_definition(path: Path) -> str:
+    """The text of a definition's file. Raises DefinitionError where it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DefinitionError(str(path), 1, f"cannot be read: {error}") from error
 
-    A file whose text would be the same is left alone. Raises DefinitionError, NotFoundError.
+
+def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
+    """A package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
+
+    Raises DefinitionError, NotFoundError.
     """
     from minirospy.idl.emit import emit_message, emit_package, emit_service
 
@@ -119,17 +145,30 @@ def write_package(catalogue: Catalogue, package: str, root: Path) -> list[Path]:
     for kind, modules in (("msg", msgs), ("srv", srvs)):
         if modules:
             sources[f"{kind}/__init__.py"] = emit_package(package, kind, modules)
+    return sources
+
+
+def write_package(catalogue: Catalogue, package: str, root: Path) -> list[Path]:
+    """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
+
+    A file whose text would be the same is left alone. Raises DefinitionError, NotFoundError.
+    """
+    sources = compile_package(catalogue, package)
     folder = root / package
     if not (folder / "__init__.py").exists():
         sources["__init__.py"] = f'"""{package}: generated by minirospy from its definitions."""\n'
-    written = []
-    for name, source in sources.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if not path.exists() or path.read_text(encoding="utf-8") != source:
-            path.write_text(source, encoding="utf-8")
-            written.append(path)
-    return written
+    return [path for name, source in sources.items() if write_if_changed(path := folder / name, source)]
+
+
+def write_if_changed(path: Path, text: str) -> bool:
+    """Write a file unless it says that already; whether it was written."""
+    data = text.encode()
+    with contextlib.suppress(OSError):
+        if path.read_bytes() == data:
+            return False
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+    return True
 
 
 def get_message_class(name: str) -> Any:
@@ -163,7 +202,8 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     from minirospy.idl.parse import parse_message
 
     specs: dict[str, MessageSpec] = {}
-    for number, part in enumerate(text.split(_SEPARATOR + "\n")):
+    # The newline before a line of "=" belongs to it: a text that ends without one stays so.
+    for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
         name, body = full_name, part
         if number:
             head, _, body = part.partition("\n")
@@ -190,12 +230,14 @@ def class_from_text(full_name: str, text: str) -> Any:
 
     made: dict[str, Any] = {}
 
-    def make(name: str) -> Any:
+    def make(name: str, around: tuple[str, ...] = ()) -> Any:
         """Run the generated source; its imports of other types find those made here."""
+        if name in around:
+            raise DefinitionError(full_name, 1, f"[{name}] contains itself")
         if name not in made:
             for field in lookup(name).fields:
                 if not field.type.is_primitive:
-                    make(field.type.base)
+                    make(field.type.base, (*around, name))
             source = emit_message(lookup(name), lookup)
             made[name] = _run(source, name, made)
         return made[name]

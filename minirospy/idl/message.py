@@ -6,7 +6,6 @@ The names and rules are genpy's, since user code relies on them: http://docs.ros
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -35,12 +34,10 @@ _INTEGERS = {
     "byte": (-128, 128),
     "char": (0, 256),
 }
-_PLAIN = re.compile(r"^[A-Za-z_/][A-Za-z0-9_/.]*$", re.ASCII)
+_PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.]*", re.ASCII)
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
-_ESCAPES = {
-    "\0": "\\0", "\a": "\\a", "\b": "\\b", "\t": "\\t", "\n": "\\n", "\v": "\\v", "\f": "\\f", "\r": "\\r",
-    "\x1b": "\\e", '"': '\\"', "\\": "\\\\", "\x85": "\\N", "\xa0": "\\_", "\u2028": "\\L", "\u2029": "\\P",
-}  # fmt: skip
+# From this length on YAML folds a text with spaces in it.
+_FOLDED = 76
 
 
 class Message:
@@ -155,6 +152,8 @@ def fill_message_args(msg: Any, msg_args: Any, keys: Mapping[str, Any] | None = 
     if not hasattr(msg, "_slot_types"):
         raise ValueError(f"msg must be a Message instance: {msg}")
     words = keys or {}
+    if msg_args is None:
+        msg_args = []
     if isinstance(msg_args, dict):
         msg_args = [msg_args] if msg_args else [{}]
     elif not isinstance(msg_args, list | tuple):
@@ -227,8 +226,8 @@ def _message_text(message: Any, indent: str, options: tuple[Any, ...]) -> str:
     for name in names:
         value = getattr(message, name)
         type_ = types[name]
-        if type_.startswith(("uint8[", "char[")) and isinstance(value, bytes | bytearray | memoryview):
-            # Bytes are numbers to the reader.
+        if type_.startswith("uint8[") and isinstance(value, bytes | bytearray | memoryview):
+            # Bytes are numbers to the reader; genpy leaves a char[] as it is.
             value = list(value)
         lines.append(f"{indent}{name}: {strify_message(value, indent + '  ', *options)}")
     text = "\n".join(lines)
@@ -243,7 +242,7 @@ def _list_text(values: Sequence[Any], indent: str, options: tuple[Any, ...]) -> 
         width = options[3]
         return "[" + ", ".join(_number(value, width) for value in values) + "]"
     if isinstance(first, str):
-        return "".join(f"\n{indent}- {_item(value)}" for value in values)
+        return "".join(f"\n{indent}{line}" for line in _items(values))
     if isinstance(first, TVal) or hasattr(first, "_slot_types"):
         inner = indent + "  "
         return "".join(f"\n{indent}- {strify_message(value, inner, *options)}" for value in values)
@@ -260,35 +259,28 @@ def _number(value: Any, width: int | None) -> str:
     if width is None or isinstance(value, bool):
         return str(value)
     if isinstance(value, float):
-        text = f"{value:.{max(width - 2, 0)}f}" if width else str(value)
+        text = f"{value:.{width}f}"
         return text[: max(width, text.find("."))]
     return f"{value:{width}d}"
 
 
 def _quoted(text: str) -> str:
-    if text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
+    if len(text) < _FOLDED and text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
         return f'"{text}"'
-    return '"' + "".join(_ESCAPES.get(c) or _escaped(c) for c in text) + '"'
-
-
-def _escaped(character: str) -> str:
-    if " " <= character <= "~":
-        return character
-    code = ord(character)
-    if code < 0x100:
-        return f"\\x{code:02X}"
-    return f"\\u{code:04X}" if code < 0x10000 else f"\\U{code:08X}"
-
-
-def _item(text: Any) -> str:
-    """A string in a list, as YAML writes it where it may leave quotes out."""
-    if not isinstance(text, str):
-        return str(text)
-    if _PLAIN.match(text) and text.lower() not in _NOT_PLAIN:
-        return text
     import yaml
 
-    return str(yaml.dump(text, width=sys.maxsize)).removesuffix("\n").removesuffix("\n...")
+    return str(yaml.dump(text, default_style='"')).rstrip("\n")
+
+
+def _items(texts: Sequence[Any]) -> list[str]:
+    """The lines of a list of strings, as YAML writes it."""
+    if all(
+        isinstance(text, str) and _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN for text in texts
+    ):
+        return [f"- {text}" for text in texts]
+    import yaml
+
+    return str(yaml.dump(list(texts))).rstrip("\n").splitlines()
 
 
 # --- checks
@@ -301,10 +293,9 @@ def _check_bool(name: str, type_: str, value: Any) -> None:
 
 def _check_integer(name: str, type_: str, value: Any) -> None:
     low, high = _INTEGERS[type_]
-    if not hasattr(value, "__index__"):
-        raise SerializationError(f"field {name} must be an integer type")
-    if value < 0 <= low:
-        raise SerializationError(f"field {name} must be unsigned integer type")
+    if not hasattr(value, "__index__") or value < 0 <= low:
+        kind = "unsigned" if low == 0 else "an"
+        raise SerializationError(f"field {name} must be {kind} integer type")
     if not low <= value < high:
         raise SerializationError(f"field {name} exceeds specified width [{type_}]")
 
@@ -363,7 +354,8 @@ def _fill(message: Any, values: Any, words: Mapping[str, Any], path: str) -> Non
         for name, value in values.items():
             if name not in types:
                 raise MessageException(f"No field name [{path}{name}]")
-            _fill_field(message, name, types[name], value, words, path)
+            # YAML reads a key without a value as null: an empty string was meant.
+            _fill_field(message, name, types[name], "" if value is None else value, words, path)
         return
     if not isinstance(values, list | tuple):
         raise ValueError(f"invalid msg_args type: {values}")
@@ -419,6 +411,8 @@ def _filled_time(current: TVal, value: Any, words: Mapping[str, Any]) -> Any:
     match value:
         case str():
             return _word(value, words)
+        case dict() if not value:
+            return current
         case {"secs": int(secs), "nsecs": int(nsecs)}:
             return type(current)(secs, nsecs)
         case {"secs": int(secs)} if len(value) == 1:
