@@ -35,7 +35,10 @@ class CompileDefinitions(BuildHookInterface):
         if version == "editable":
             return
         for package in catalogue.packages:
-            build_data["artifacts"] += [f"minirospy/overlay/{package}/**/*.py"]
+            build_data["artifacts"] += [
+                f"minirospy/overlay/{package}/**/*.py",
+                f"minirospy/overlay/{package}/py.typed",
+            ]
         build_data["force_include"] |= {
             str(root / "minirospy_overlay.pth"): "minirospy_overlay.pth",
             str(root / "msgs"): "minirospy/share/msgs",

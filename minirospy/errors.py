@@ -15,8 +15,11 @@
     |   |   +-- RpcUnreachable          the peer could not be reached, or did not answer in time
     |   +-- WireError                   bytes that are not TCPROS
     |   |   +-- HandshakeRefused        the peer answered a connection header with ``error=``
-    |   +-- DefinitionError             a .msg, .srv or .action text that does not parse (file, line)
-    |   +-- LaunchError                 a launch file that does not load (file, line)
+    |   +-- SourceError                 a text that a person wrote (file, line)
+    |   |   +-- DefinitionError         a .msg, .srv or .action text that does not parse
+    |   |   +-- ManifestError           a package.xml that does not read
+    |   |   +-- BuildError              a workspace or package that cannot be built
+    |   |   +-- LaunchError             a launch file that does not load
     |   +-- BoardError                  the virtual board cannot be reached
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit where it goes
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
@@ -41,10 +44,12 @@ from collections.abc import Iterable
 
 __all__ = [
     "BoardError",
+    "BuildError",
     "DefinitionError",
     "DeserializationError",
     "HandshakeRefused",
     "LaunchError",
+    "ManifestError",
     "MasterUnreachableError",
     "MessageException",
     "MinirospyError",
@@ -63,6 +68,7 @@ __all__ = [
     "RpcUnreachable",
     "SerializationError",
     "ServiceException",
+    "SourceError",
     "TransportException",
     "TransportInitError",
     "TransportTerminated",
@@ -186,21 +192,8 @@ class HandshakeRefused(WireError):
     """The peer answered our connection header with ``error=text``."""
 
 
-class DefinitionError(MinirospyError):
-    """An interface definition does not parse: ``where`` is the file or type, ``line`` counts from 1."""
-
-    def __init__(self, where: str, line: int, text: str) -> None:
-        super().__init__(where, line, text)
-        self.where = where
-        self.line = line
-        self.text = text
-
-    def __str__(self) -> str:
-        return f"{self.where}:{self.line}: {self.text}"
-
-
-class LaunchError(MinirospyError):
-    """A launch file does not load: ``file`` and ``line`` (from 1; 0 where unknown)."""
+class SourceError(MinirospyError):
+    """A text that a person wrote does not do: ``file`` (or what else names it), ``line`` (from 1; 0: the whole)."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
@@ -210,6 +203,22 @@ class LaunchError(MinirospyError):
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}: {self.text}" if self.line else f"{self.file}: {self.text}"
+
+
+class DefinitionError(SourceError):
+    """An interface definition does not parse; of one without a file, ``file`` is its type."""
+
+
+class ManifestError(SourceError):
+    """A package.xml does not read."""
+
+
+class BuildError(SourceError):
+    """A workspace or a package cannot be built."""
+
+
+class LaunchError(SourceError):
+    """A launch file does not load."""
 
 
 class BoardError(MinirospyError):

@@ -32,6 +32,11 @@ _VERBS = {
     "param": _Verb("rosparam", "main", "get, set parameters (as rosparam)"),
     "msg": _Verb("rosmsg", "main", "show message types (as rosmsg)"),
     "srv": _Verb("rosmsg", "main_srv", "show service types (as rossrv)"),
+    "pack": _Verb("rospack", "main", "find packages and their dependencies (as rospack)"),
+    "make": _Verb("catkin", "catkin_make", "build a workspace (as catkin_make)"),
+    "shell": _Verb("shell", "main", 'roscd and completion: eval "$(minirospy shell)"'),
+    # Without a summary, as shells call it and people do not.
+    "complete": _Verb("complete", "main", ""),
 }
 
 
@@ -44,7 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _dispatch(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         width = max(map(len, _VERBS))
-        lines = [f"  minirospy {verb:{width}}  {entry.summary}" for verb, entry in _VERBS.items()]
+        lines = [
+            f"  minirospy {verb:{width}}  {entry.summary}" for verb, entry in _VERBS.items() if entry.summary
+        ]
         print(
             "\n".join([f"minirospy {minirospy.__version__}: ROS 1 for any computer with Python", "", *lines])
         )

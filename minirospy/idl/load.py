@@ -22,6 +22,7 @@ from minirospy.idl.spec import ActionSpec, MessageSpec, ServiceSpec
 __all__ = [
     "Catalogue",
     "class_from_text",
+    "classes_from_text",
     "compile_package",
     "get_message_class",
     "get_service_class",
@@ -129,11 +130,12 @@ def read_definition(path: Path) -> str:
 def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
     """A package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
 
+    With them goes the empty ``py.typed``, which tells mypy to believe the annotations (PEP 561).
     Raises DefinitionError, NotFoundError.
     """
     from minirospy.idl.emit import emit_message, emit_package, emit_service
 
-    sources: dict[str, str] = {}
+    sources = {"py.typed": ""}
     msgs: dict[str, list[str]] = {}
     for message in catalogue.messages(package):
         sources[f"msg/_{message.name}.py"] = emit_message(message, catalogue.message)
@@ -213,14 +215,21 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     return specs
 
 
-@lru_cache(maxsize=256)
 def class_from_text(full_name: str, text: str) -> Any:
     """A message class from a full text, as a publisher sends it, for a type that is not installed.
 
     Raises DefinitionError.
     """
+    return classes_from_text(full_name, text)[full_name]
+
+
+@lru_cache(maxsize=256)
+def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
+    """The class of a full text, and those of all types in it that it needs, by name. Raises DefinitionError."""
     from minirospy.idl.emit import emit_message
 
+    if not all(full_name.partition("/")):
+        raise DefinitionError(full_name, 1, f"[{full_name}] is not of the form package/Type")
     specs = specs_of_text(full_name, text)
 
     def lookup(name: str) -> MessageSpec:
@@ -242,7 +251,9 @@ def class_from_text(full_name: str, text: str) -> Any:
             made[name] = _run(source, name, made)
         return made[name]
 
-    return make(full_name)
+    # Sent on as it came, even where ours would be written otherwise.
+    make(full_name)._full_text = text
+    return types.MappingProxyType(made)
 
 
 def _run(source: str, name: str, made: dict[str, Any]) -> Any:

@@ -9,13 +9,23 @@ from __future__ import annotations
 import os
 import re
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, NotFoundError
 
-__all__ = ["NotExecutableError", "Packages"]
+__all__ = [
+    "CrawlTime",
+    "NotExecutableError",
+    "Packages",
+    "built_in_roots",
+    "crawl",
+    "crawl_times",
+    "package_name",
+]
 
 _MANIFEST = "package.xml"
 _IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
@@ -40,17 +50,25 @@ class Packages:
 
     def __init__(self, environment: Environment | None = None) -> None:
         environment = environment or Environment.read()
-        self._roots = (*environment.package_path, *_built_in_roots())
+        self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
+
+    @classmethod
+    def below(cls, *roots: Path) -> Packages:
+        """The packages in these folders alone."""
+        packages = cls.__new__(cls)
+        packages.roots = roots
+        packages._crawls = {}
+        return packages
 
     def find(self, name: str) -> Path:
         """The folder of a package. Raises NotFoundError with the nearest names."""
-        for root in self._roots:
+        for root in self.roots:
             # Where a folder is named as its package, nothing else need be read.
-            if _package_name(root / name) == name:
+            if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
-                if _package_name(folder) == name:
+                if package_name(folder) == name:
                     return folder
         raise NotFoundError(
             "package", name, self.folders(), "ROS_PACKAGE_PATH names the folders that are searched"
@@ -62,11 +80,15 @@ class Packages:
 
     def folders(self) -> dict[str, Path]:
         """Every package and its folder."""
-        found: dict[str, Path] = {}
-        for root in self._roots:
+        return {name: folders[0] for name, folders in self.copies().items()}
+
+    def copies(self) -> dict[str, list[Path]]:
+        """Every package and each folder that holds one of its name; the first is the one that counts."""
+        found: dict[str, dict[Path, None]] = {}
+        for root in self.roots:
             for folder in self._crawled(root):
-                found.setdefault(_package_name(folder) or folder.name, folder)
-        return found
+                found.setdefault(package_name(folder) or folder.name, {})[folder] = None
+        return {name: list(folders) for name, folders in found.items()}
 
     def executables(self, package: str) -> list[str]:
         """The names that `rosrun package` can run, sorted."""
@@ -110,40 +132,72 @@ class Packages:
 
     def _crawled(self, root: Path) -> list[Path]:
         if root not in self._crawls:
-            self._crawls[root] = list(_crawl(root))
+            self._crawls[root] = list(crawl(root))
         return self._crawls[root]
 
 
-def _built_in_roots() -> tuple[Path, ...]:
+class CrawlTime(NamedTuple):
+    """A folder that is searched for packages: how long that takes, all below it, and whether one is found."""
+
+    folder: Path
+    seconds: float
+    has_package: bool
+
+
+def crawl_times(root: Path) -> list[CrawlTime]:
+    """The search of a folder and of each below it that is no package."""
+    found: list[CrawlTime] = []
+
+    def visit(folder: Path) -> bool:
+        if (folder / _MANIFEST).is_file():
+            return True
+        begun = time.perf_counter()
+        has_package = False
+        for below in _subfolders(folder):
+            has_package |= visit(below)
+        found.append(CrawlTime(folder, time.perf_counter() - begun, has_package))
+        return has_package
+
+    visit(root)
+    return found
+
+
+def built_in_roots() -> tuple[Path, ...]:
     """What minirospy brings along: beside the package in a checkout, in its ``share`` when installed."""
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
     return (base / "msgs", base / "rpi_feros", base / "launch")
 
 
-def _crawl(root: Path) -> Iterator[Path]:
+def crawl(root: Path) -> Iterator[Path]:
     """The package folders at or below ``root``, as rospack searches: not inside a package, not in hidden folders."""
     if (root / _MANIFEST).is_file():
-        yield root
+        if not (root / "CATKIN_IGNORE").exists():
+            yield root
         return
+    for folder in _subfolders(root):
+        yield from crawl(folder)
+
+
+def _subfolders(folder: Path) -> list[Path]:
+    """The folders in one that may hold packages, sorted; none where a file says that it is to be ignored."""
     try:
-        entries = sorted(os.scandir(root), key=lambda entry: entry.name)
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
-        return
+        return []
     if any(entry.name in _IGNORE for entry in entries):
-        return
-    for entry in entries:
-        if entry.is_dir() and not entry.name.startswith("."):
-            yield from _crawl(Path(entry.path))
+        return []
+    return [Path(entry.path) for entry in entries if not entry.name.startswith(".") and entry.is_dir()]
 
 
-def _package_name(folder: Path) -> str | None:
+def package_name(folder: Path) -> str | None:
+    """The name in the package.xml of a folder (the folder's where it says none); None where no such file is."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
         return None
     match = _NAME.search(text)
-    return match[1].decode("utf-8", "replace") if match else None
+    return match[1].decode("utf-8", "replace") if match else folder.name
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -153,7 +207,7 @@ def _files(folder: Path) -> Iterator[Path]:
         for name in sorted(names):
             yield Path(path, name)
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
-        built = Path(prefix, "lib", _package_name(folder) or folder.name)
+        built = Path(prefix, "lib", package_name(folder) or folder.name)
         if prefix and built.is_dir():
             yield from (path for path in sorted(built.iterdir()) if path.is_file())
 

@@ -5,7 +5,11 @@ set -eu
 packages="ros-core rosbash python3-rospy python3-rosmaster python3-std-srvs python3-sensor-msgs python3-nav-msgs
 python3-diagnostic-msgs python3-tf2-msgs python3-actionlib python3-numpy
 ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-actionlib-msgs ros-geometry-msgs ros-sensor-msgs ros-diagnostic-msgs
-ros-nav-msgs ros-roscpp-msg
+ros-nav-msgs ros-roscpp-msg ros-shape-msgs ros-stereo-msgs ros-trajectory-msgs ros-visualization-msgs
+ros-map-msgs ros-move-base-msgs ros-pcl-msgs ros-tf2-msgs ros-topic-tools-srvs
+python3-shape-msgs python3-stereo-msgs python3-trajectory-msgs python3-visualization-msgs python3-map-msgs
+python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure
+catkin cmake ros-message-generation
 g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev"
 missing=""
 for package in $packages; do

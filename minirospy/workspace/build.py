@@ -1,0 +1,417 @@
+"""Building a workspace: packages in ``src`` -> ``devel``, with generated messages and the files to source.
+
+Nothing is compiled by a compiler, and nothing is copied: Python stays where it is written, and ``devel`` points to
+it. What did not change is not made again. Source: http://wiki.ros.org/catkin/workspaces.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from minirospy.errors import BuildError, NotFoundError
+from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
+from minirospy.idl.spec import MessageSpec
+from minirospy.workspace.manifest import Kind
+from minirospy.workspace.packages import Packages, built_in_roots, crawl
+from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
+from minirospy.workspace.python_setup import PythonSetup, read_python_setup
+from minirospy.workspace.setup_files import SetUp, setup_files
+
+__all__ = ["Workspace", "build", "build_order", "find_workspace", "own_set_up", "read_plans", "write_set_up"]
+
+_PROVIDED = frozenset(
+    """
+    actionlib angles catkin class_loader cmake_modules cpp_common cv_bridge diagnostic_updater dynamic_reconfigure
+    eigen_conversions gencpp geneus genlisp genmsg gennodejs genpy image_geometry image_transport
+    interactive_markers joint_state_publisher kdl_parser laser_geometry message_filters message_generation
+    message_runtime nodelet pluginlib python_qt_binding robot_state_publisher rosbag rosbuild rosbash rosconsole
+    rosgraph roslang roslaunch roslib roslint rosmaster rosmsg rosnode rosout rospack rosparam rospy rosservice
+    rostest rostime rostopic rosunit roswtf rqt_gui rqt_gui_py rviz tf tf2 tf2_eigen tf2_geometry_msgs tf2_kdl
+    tf2_py tf2_ros tf2_sensor_msgs tf_conversions urdf urdfdom xacro xmlrpcpp
+    """.split()  # noqa: SIM905
+)
+"""Packages without messages that packages of Python name: minirospy does their part, or a compiler would."""
+
+_WORDS = {".msg": "message", ".srv": "service", ".action": "action"}
+_RELAY = '''"""Made by catkin_make: {name} lies in {folder}; what was generated for it lies here."""
+
+import sys
+
+if {root!r} not in sys.path:
+    sys.path.insert(1, {root!r})
+__path__.insert(0, {folder!r})
+'''
+_RELAY_RUN = """__file__ = {file!r}
+with open(__file__, "rb") as _source:
+    exec(compile(_source.read(), __file__, "exec"))
+"""
+
+
+class Workspace(NamedTuple):
+    """The folders of a workspace."""
+
+    root: Path
+    source: Path
+    build: Path
+    devel: Path
+    install: Path
+
+    @classmethod
+    def at(cls, root: Path, source: str = "src", build: str = "build", devel: str = "devel") -> Workspace:
+        """The workspace whose folder is ``root``."""
+        return cls(root, root / source, root / build, root / devel, root / "install")
+
+
+def find_workspace(start: Path) -> Path:
+    """The workspace that ``start`` lies in: where it was built before, or where the folder src is.
+
+    Raises BuildError.
+    """
+    start = start.resolve()
+    for folder in (start, *start.parents):
+        if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
+            return folder
+    for folder in (start, *start.parents):
+        if (folder / "src").is_dir() and not (folder / "package.xml").is_file():
+            return folder
+    raise BuildError(str(start), 0, "not in a workspace: make one with `mkdir src`, and put packages into it")
+
+
+def read_plans(source: Path) -> list[Plan]:
+    """The plans of all packages below a folder, in the order to build them in.
+
+    Raises BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
+    """
+    plans: dict[str, Plan] = {}
+    for folder in crawl(source):
+        plan = read_plan(folder)
+        if plan.name in plans:
+            raise BuildError(
+                str(folder / "package.xml"),
+                0,
+                f"two packages are called [{plan.name}]: here and in "
+                f"{plans[plan.name].folder}; an empty file CATKIN_IGNORE in one of the folders hides it",
+            )
+        plans[plan.name] = plan
+    return build_order(plans)
+
+
+def build_order(plans: Mapping[str, Plan]) -> list[Plan]:
+    """Each package after those that it depends on, otherwise by name. Raises BuildError on a cycle."""
+    ordered: list[Plan] = []
+    state: dict[str, bool] = {}
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        if state.get(name):
+            return
+        if name in path:
+            cycle = [*path[path.index(name) :], name]
+            raise BuildError(
+                str(plans[name].folder / "package.xml"),
+                0,
+                f"packages depend on each other in a circle: {' -> '.join(cycle)}",
+            )
+        plan = plans[name]
+        kinds = (Kind.BUILD, Kind.BUILDTOOL, Kind.BUILD_EXPORT)
+        needed = {*plan.manifest.depends(*kinds), *plan.message_depends, *(need for need, _ in plan.needs)}
+        for other in sorted(needed & plans.keys()):
+            visit(other, (*path, name))
+        state[name] = True
+        ordered.append(plan)
+
+    for name in sorted(plans):
+        visit(name, ())
+    return ordered
+
+
+class Report(NamedTuple):
+    """What was done for a package. ``made``: what was generated, in words; empty where nothing had changed."""
+
+    plan: Plan
+    made: str
+    changed: bool
+    warnings: tuple[str, ...]
+
+
+def build(
+    workspace: Workspace,
+    plans: Sequence[Plan],
+    outside: Packages,
+    chosen: Collection[str] | None = None,
+    report: Callable[[Report], None] = lambda each: None,
+) -> None:
+    """Build the packages (``chosen`` of them, or all) into the devel folder; ``report`` hears of each.
+
+    ``outside`` is where the packages of other workspaces and of minirospy are found.
+    Raises BuildError, DefinitionError.
+    """
+    builder = _Builder(workspace, plans, outside)
+    for plan in plans:
+        if chosen is None or plan.name in chosen:
+            report(builder.package(plan))
+    if chosen is None:
+        builder.remove_gone()
+
+
+def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
+    """What this installation of minirospy puts into setup files."""
+    return SetUp(
+        prefix=prefix,
+        sources=sources,
+        parents=parents,
+        programs=Path(sys.executable).parent,
+        share=built_in_roots(),
+        functions=Path(__file__).parent / "shell",
+    )
+
+
+def write_set_up(
+    prefix: Path, sources: tuple[Path, ...], environment: Mapping[str, str] = os.environ
+) -> None:
+    """Write what is sourced. The workspaces that are sourced now become those below this one.
+
+    Where none is sourced, those of the last time stay.
+    """
+    # A workspace that is built from its own terminal does not stand on itself.
+    own = {prefix, prefix.parent / "devel", prefix.parent / "install"}
+    sourced = map(Path, filter(None, environment.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)))
+    parents = [path for path in sourced if path not in own and (path / ".catkin").is_file()]
+    note = prefix / ".minirospy_parents"
+    if not parents and note.is_file():
+        parents = [Path(line) for line in note.read_text(encoding="utf-8").splitlines()]
+    write_if_changed(note, "".join(f"{path}\n" for path in parents))
+    for name, text in setup_files(own_set_up(prefix, sources, tuple(parents))).items():
+        path = prefix / name
+        if write_if_changed(path, text) and name == "env.sh":
+            path.chmod(0o755)
+
+
+class _Builder:
+    """Builds packages of one workspace, one after the other."""
+
+    def __init__(self, workspace: Workspace, plans: Sequence[Plan], outside: Packages) -> None:
+        self._workspace = workspace
+        self._plans = {plan.name: plan for plan in plans}
+        self._modules = workspace.devel / DIST_PACKAGES
+        self._stamps = workspace.build / "minirospy"
+        self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
+        self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
+        self._key = _key([path for plan in plans for path in (*plan.definitions, plan.cmake_lists)])
+
+    def package(self, plan: Plan) -> Report:
+        warnings = self._check_needs(plan)
+        warnings += tuple(
+            f"{path} is not built: no add_{_WORDS[path.suffix]}_files() names it" for path in plan.left_out
+        )
+        stamp = self._stamps / f"{plan.name}.json"
+        setup = read_python_setup(plan.folder) if plan.has_setup else None
+        relays = _relays(setup, self._workspace.devel) if setup else {}
+        changed = [path for path, text in relays.items() if write_if_changed(path, text)]
+        outputs = list(relays)
+        if plan.definitions:
+            before = _read_stamp(stamp)
+            if (
+                before.get("key") == self._key
+                and all(map(os.path.exists, before.get("outputs", [])))
+                and not changed
+            ):
+                return Report(plan, "", False, warnings)
+            warnings += self._check_messages(plan)
+            modules = self._compile(plan, bool(setup and plan.name in setup.packages))
+            changed += [path for path, text in modules.items() if write_if_changed(path, text)]
+            outputs += modules
+        self._finish(stamp, outputs)
+        return Report(plan, _counts(plan, setup), bool(changed), warnings)
+
+    def remove_gone(self) -> None:
+        """Take away what packages left behind that are not in the workspace any more."""
+        for stamp in self._stamps.glob("*.json"):
+            if stamp.stem not in self._plans:
+                self._remove(_read_stamp(stamp).get("outputs", []))
+                stamp.unlink()
+
+    def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
+        """The generated modules of a package: file -> text. Raises DefinitionError, BuildError."""
+        folder = self._modules / plan.name
+        modules = {folder / name: text for name, text in compile_package(self._catalogue, plan.name).items()}
+        if not has_relay:
+            modules[folder / "__init__.py"] = (
+                f'"""{plan.name}: generated by minirospy from its definitions."""\n'
+            )
+        return modules
+
+    def _finish(self, stamp: Path, outputs: Iterable[Path]) -> None:
+        """Note what was made; take away what was made before and is not any more."""
+        names = sorted(map(str, outputs))
+        self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
+        write_if_changed(stamp, json.dumps({"key": self._key, "outputs": names}, indent=1))
+
+    def _remove(self, names: Iterable[str]) -> None:
+        for name in names:
+            path = Path(name)
+            path.unlink(missing_ok=True)
+            for folder in path.parents:
+                # A folder that is empty but for Python's own cache goes too.
+                if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
+                    break
+                for cached in folder.glob("__pycache__/*.pyc"):
+                    cached.unlink()
+                for empty in (folder / "__pycache__", folder):
+                    if empty.is_dir() and not any(empty.iterdir()):
+                        empty.rmdir()
+
+    # --- checks
+
+    def _check_needs(self, plan: Plan) -> tuple[str, ...]:
+        """Packages that find_package names and nobody has: an error where it looks like a typing error."""
+        warnings = []
+        known = self._folders.keys() | _PROVIDED
+        for name, line in plan.needs:
+            if name not in known:
+                self._check_typing(plan, name, known, line)
+                warnings.append(
+                    f"{plan.cmake_lists}:{line}: package [{name}] is not installed; going on without it"
+                )
+        return tuple(warnings)
+
+    def _check_typing(self, plan: Plan, name: str, known: Collection[str], line: int) -> None:
+        near = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.85)
+        if near:
+            raise BuildError(
+                str(plan.cmake_lists), line, f"package [{name}] not found; did you mean {near[0]}?"
+            )
+
+    def _check_messages(self, plan: Plan) -> tuple[str, ...]:
+        """Every type in a package's definitions is there, and its package is named where catkin wants it named."""
+        for name in plan.message_depends:
+            if name not in self._folders:
+                near = difflib.get_close_matches(name, sorted(self._folders), n=1)
+                raise BuildError(
+                    str(plan.cmake_lists),
+                    _line_of(plan.cmake_lists, name),
+                    f"generate_messages(DEPENDENCIES {name}): no such package"
+                    + (f"; did you mean {near[0]}?" if near else ""),
+                )
+        allowed = {plan.name, *self._closure(plan.message_depends)}
+        for file in plan.definitions:
+            for spec in self._specs(plan, file):
+                self._check_fields(plan, file, spec, allowed)
+        named = set(plan.manifest.depends())
+        return tuple(
+            f"{plan.manifest.path}: messages of [{plan.name}] contain types of [{name}]: add <depend>{name}</depend>"
+            for name in plan.message_depends
+            if name not in named
+        )
+
+    def _specs(self, plan: Plan, file: Path) -> list[MessageSpec]:
+        if file.suffix == ".msg":
+            return [self._catalogue.message(f"{plan.name}/{file.stem}")]
+        if file.suffix == ".srv":
+            services = self._catalogue.services(plan.name)
+            return [
+                part for each in services if each.name == file.stem for part in (each.request, each.response)
+            ]
+        actions = self._catalogue.actions(plan.name)
+        return [message for action in actions if action.name == file.stem for message in action.messages]
+
+    def _check_fields(self, plan: Plan, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
+        for field in spec.fields:
+            if field.type.is_primitive:
+                continue
+            base = field.type.base
+            package = base.partition("/")[0]
+            if package not in allowed:
+                raise BuildError(
+                    str(file),
+                    _line_of(file, field.name),
+                    f"[{base}] is of package [{package}]: name it in generate_messages(DEPENDENCIES {package}) in "
+                    f"CMakeLists.txt, and with <depend>{package}</depend> in package.xml",
+                )
+            try:
+                self._catalogue.message(base)
+            except NotFoundError as error:
+                raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
+
+    def _closure(self, names: Iterable[str]) -> set[str]:
+        """The packages whose messages are within reach of those of ``names``."""
+        found: set[str] = set()
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
+            if name in found or name not in self._folders:
+                continue
+            found.add(name)
+            if name in self._plans:
+                waiting += self._plans[name].message_depends
+            else:
+                waiting += {
+                    field.type.base.partition("/")[0]
+                    for message in self._catalogue.messages(name)
+                    for field in message.fields
+                    if not field.type.is_primitive
+                }
+        return found
+
+
+def _key(files: Iterable[Path]) -> str:
+    """What generated code depends on: the definitions and the compiler, by their times and sizes."""
+    compiler = sorted((Path(__file__).parents[1] / "idl").glob("*.py"))
+    marks = []
+    for path in (*sorted(files), *compiler):
+        status = path.stat()
+        marks.append(f"{path} {status.st_mtime_ns} {status.st_size}")
+    import hashlib
+
+    return hashlib.sha256("\n".join(marks).encode()).hexdigest()
+
+
+def _read_stamp(stamp: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(stamp.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _relays(setup: PythonSetup, devel: Path) -> dict[Path, str]:
+    """The modules in devel that stand for those in source folders: file -> text."""
+    modules = devel / DIST_PACKAGES
+    relays = {}
+    for name, folder in setup.packages.items():
+        text = _RELAY.format(name=name, folder=str(folder), root=str(folder.parent))
+        if (folder / "__init__.py").is_file():
+            text += _RELAY_RUN.format(file=str(folder / "__init__.py"))
+        relays[modules / name / "__init__.py"] = text
+    for name, file in setup.modules.items():
+        text = f'"""Made by catkin_make: {name} lies in {file}."""\n\n'
+        relays[modules / f"{name}.py"] = text + _RELAY_RUN.format(file=str(file))
+    return relays
+
+
+def _counts(plan: Plan, setup: PythonSetup | None) -> str:
+    """``2 messages, 1 service, package foo``."""
+    words = []
+    for suffix, word in _WORDS.items():
+        count = sum(path.suffix == suffix for path in plan.definitions)
+        if count:
+            words.append(f"{count} {word}{'' if count == 1 else 's'}")
+    if setup:
+        words += [f"Python package {name}" for name in setup.packages]
+        words += [f"Python module {name}" for name in setup.modules]
+    return ", ".join(words)
+
+
+def _line_of(file: Path, name: str) -> int:
+    """The line of a file in which a word stands first; 1 where it does not."""
+    word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
+    for number, line in enumerate(read_definition(file).split("\n"), 1):
+        if word.search(line.split("#", 1)[0]):
+            return number
+    return 1

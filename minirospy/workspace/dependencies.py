@@ -1,0 +1,190 @@
+"""Which package needs which: packages in, their dependencies out, as rospack counts them.
+
+A dependency here is what a package needs to run (``run_depend``, ``exec_depend``, ``depend``) and what is a package
+itself; the other names in a manifest are rosdep keys. Source: http://docs.ros.org/api/rospack/html/commandline.html.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from minirospy.errors import ManifestError, MinirospyError, NotFoundError
+from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    from minirospy.workspace.manifest import Manifest
+
+__all__ = ["CircularDependencyError", "Dependencies", "is_metapackage"]
+
+_RUNNING = ("run_depend", "exec_depend", "depend")
+
+
+class CircularDependencyError(MinirospyError):
+    """Packages need each other; ``circle`` begins and ends with the same one."""
+
+    def __init__(self, circle: tuple[str, ...]) -> None:
+        super().__init__(circle)
+        self.circle = circle
+
+    def __str__(self) -> str:
+        if len(self.circle) == 2:
+            return f"package '{self.circle[0]}' depends on itself"
+        return f"circular dependency: {' -> '.join(self.circle)}"
+
+
+class Dependencies:
+    """The dependencies between packages; manifests are read when they are asked for, once.
+
+    Metapackages are no packages here, as they are none to rospack. ``complain`` hears of manifests that do not
+    read, where all are searched.
+    """
+
+    def __init__(
+        self,
+        packages: Packages,
+        variables: Mapping[str, str] | None = None,
+        complain: Callable[[ManifestError], None] | None = None,
+    ) -> None:
+        self._packages = packages
+        self._variables = variables
+        self._complain = complain or (lambda error: None)
+        self._manifests: dict[str, Manifest] = {}
+
+    @property
+    def roots(self) -> tuple[Path, ...]:
+        """The folders that are searched."""
+        return self._packages.roots
+
+    @cached_property
+    def copies(self) -> dict[str, list[Path]]:
+        """Every package, sorted, and the folders that hold one of its name; the first is the one that counts."""
+        return {
+            name: folders
+            for name, folders in sorted(self._packages.copies().items())
+            if not is_metapackage(folders[0])
+        }
+
+    @cached_property
+    def metapackages(self) -> dict[str, Path]:
+        """Every metapackage and its folder."""
+        return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
+
+    def folder(self, name: str) -> Path:
+        """The folder of a package. Raises NotFoundError, with the nearest names."""
+        folder = self._packages.find(name)
+        if is_metapackage(folder):
+            raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
+        return folder
+
+    def manifest(self, name: str) -> Manifest:
+        """The manifest of a package or metapackage. Raises NotFoundError, ManifestError."""
+        if name not in self._manifests:
+            # `rospack find` goes without.
+            from minirospy.workspace.manifest import read_manifest
+
+            self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
+        return self._manifests[name]
+
+    def direct(self, name: str) -> list[str]:
+        """The packages that a package names, by kind of tag. Raises NotFoundError, ManifestError."""
+        self.folder(name)
+        dependencies = self.manifest(name).dependencies
+        wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
+        return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
+
+    def all(self, name: str) -> list[str]:
+        """What a package needs, directly or not; each stands after what it needs itself.
+
+        Raises CircularDependencyError and as :meth:`direct`.
+        """
+        found: dict[str, None] = {}
+
+        def visit(current: str, above: tuple[str, ...]) -> None:
+            if current in above:
+                raise CircularDependencyError((*above[above.index(current) :], current))
+            for each in self.direct(current):
+                if each not in found:
+                    visit(each, (*above, current))
+                    found[each] = None
+
+        visit(name, ())
+        return list(found)
+
+    def tree(self, name: str) -> Iterator[tuple[int, str]]:
+        """Each dependency below what names it, with its depth from 0; repeated where it is named again.
+
+        Raises as :meth:`all`.
+        """
+        return _walk(name, self.direct, ())
+
+    def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
+        """Each way from a package to another that it needs. Raises as :meth:`all`."""
+        found = []
+        way: list[str] = [name]
+        for depth, each in self.tree(name):
+            way[depth + 1 :] = [each]
+            if each == target:
+                found.append(tuple(way))
+        return found
+
+    def dependents(self, name: str) -> list[str]:
+        """The packages that name this one, sorted. Raises NotFoundError."""
+        self.folder(name)
+        return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
+
+    def all_dependents(self, name: str) -> list[str]:
+        """The packages that need this one, directly or not, sorted. Raises NotFoundError."""
+        found: dict[str, None] = {}
+        waiting = [name]
+        while waiting:
+            for other in self.dependents(waiting.pop()):
+                if other != name and other not in found:
+                    found[other] = None
+                    waiting.append(other)
+        return sorted(found)
+
+    def keys(self, name: str) -> list[str]:
+        """Every name that a package asks for, of whatever kind, sorted. Raises NotFoundError, ManifestError."""
+        self.folder(name)
+        return sorted(self.manifest(name).depends())
+
+    def _direct_or_none(self, name: str) -> list[str]:
+        if name not in self._readable:
+            return []
+        return self.direct(name)
+
+    @cached_property
+    def _readable(self) -> set[str]:
+        found = set()
+        for name in self.copies:
+            try:
+                self.manifest(name)
+            except ManifestError as error:
+                self._complain(error)
+            else:
+                found.add(name)
+        return found
+
+
+def is_metapackage(folder: Path) -> bool:
+    """Whether the package in a folder is one that only names others."""
+    try:
+        # A text that lacks the word needs no parser.
+        if b"<metapackage" not in (folder / "package.xml").read_bytes():
+            return False
+        from minirospy.workspace.manifest import read_manifest
+
+        return read_manifest(folder).is_metapackage
+    except (OSError, ManifestError):
+        return False
+
+
+def _walk(name: str, direct: Callable[[str], list[str]], above: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    if name in above:
+        raise CircularDependencyError((*above[above.index(name) :], name))
+    for each in direct(name):
+        yield len(above), each
+        yield from _walk(each, direct, (*above, name))

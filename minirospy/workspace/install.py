@@ -1,0 +1,86 @@
+"""`catkin_make install`: copies of what a package needs to run, below the folder install."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from minirospy.errors import BuildError
+from minirospy.workspace.build import Workspace
+from minirospy.workspace.plan import DIST_PACKAGES, Install, Plan
+from minirospy.workspace.python_setup import read_python_setup
+
+__all__ = ["install"]
+
+_SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
+
+
+def install(workspace: Workspace, plan: Plan) -> int:
+    """Copy what one package installs; the number of files. Raises BuildError."""
+    copies = dict(_copies(workspace, plan))
+    for target, (source, program) in copies.items():
+        if target.is_symlink() or target.is_dir():
+            raise BuildError(str(target), 0, "is in the way of a file to install")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, target)
+        if program:
+            target.chmod(target.stat().st_mode | 0o111)
+    return len(copies)
+
+
+def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
+    """What goes where: target -> source, and whether it becomes executable."""
+    share = workspace.install / "share" / plan.name
+    modules = workspace.install / DIST_PACKAGES
+    yield share / "package.xml", (plan.folder / "package.xml", False)
+    for path in plan.definitions:
+        yield share / path.suffix[1:] / path.name, (path, False)
+    built = workspace.devel / DIST_PACKAGES / plan.name
+    if plan.definitions:
+        for path in built.rglob("*.py"):
+            yield modules / plan.name / path.relative_to(built), (path, False)
+    if plan.has_setup:
+        setup = read_python_setup(plan.folder)
+        for name, folder in setup.packages.items():
+            for path in _files(folder):
+                yield modules / name / path.relative_to(folder), (path, False)
+        for name, path in setup.modules.items():
+            yield modules / f"{name}.py", (path, False)
+        for path in setup.scripts:
+            yield workspace.install / "bin" / path.name, (path, True)
+    for rule in plan.installs:
+        yield from _rule(workspace, plan, rule)
+
+
+def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Path, tuple[Path, bool]]]:
+    place = workspace.install / rule.destination
+    for name in rule.sources:
+        source = plan.folder / name
+        if source.is_file():
+            yield place / (rule.rename or source.name), (source, rule.program)
+            continue
+        # As in CMake: with a slash at its end, what is in the folder; else the folder.
+        target = place if name.endswith("/") else place / source.name
+        for path in _files(source):
+            if any(
+                fnmatch.fnmatch(part, each)
+                for each in rule.excluded
+                for part in path.relative_to(source).parts
+            ):
+                continue
+            if not rule.patterns or any(fnmatch.fnmatch(path.name, pattern) for pattern in rule.patterns):
+                yield target / path.relative_to(source), (path, _is_script(path))
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path
+
+
+def _is_script(path: Path) -> bool:
+    with path.open("rb") as file:
+        return bool(_SHEBANG.match(file.readline(200)))

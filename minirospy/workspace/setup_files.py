@@ -1,0 +1,300 @@
+"""What is sourced: ``devel/setup.bash`` and its like, as texts. Pure.
+
+The shells do all of it themselves, so that a new terminal waits for no Python. Sourcing one workspace's setup file
+takes the variables of the one before back, and puts those of the workspaces below it and its own in front.
+Source: http://wiki.ros.org/catkin/workspaces, http://wiki.ros.org/ROS/EnvironmentVariables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.workspace.plan import DIST_PACKAGES
+
+__all__ = ["SHELLS", "SetUp", "setup_files", "shell_text"]
+
+SHELLS = ("bash", "zsh", "sh", "fish", "bat")
+
+
+class SetUp(NamedTuple):
+    """What the texts are made of.
+
+    ``prefix``: the devel or install folder; ``sources``: its folders of packages; ``parents``: the prefixes of the
+    workspaces below it, the nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own
+    packages; ``functions``: the folder of ros.bash, ros.fish, ros.bat.
+    """
+
+    prefix: Path
+    sources: tuple[Path, ...]
+    parents: tuple[Path, ...]
+    programs: Path
+    share: tuple[Path, ...]
+    functions: Path
+
+
+def setup_files(setup: SetUp) -> dict[str, str]:
+    """File name -> text, of all that a prefix needs to be sourced."""
+    files = {
+        ".catkin": ";".join(map(str, setup.sources)),
+        "setup.sh": _posix(setup, setup.parents),
+        "local_setup.sh": _posix(setup, ()),
+        "env.sh": _ENV,
+        "setup.fish": _fish(setup, setup.parents),
+        "setup.bat": _bat(setup, setup.parents),
+        "env.bat": '@echo off\ncall "%~dp0setup.bat"\n%*\n',
+    }
+    for stem in ("setup", "local_setup"):
+        files[f"{stem}.bash"] = _BASH.format(
+            file=f"{stem}.sh", functions=_quoted(setup.functions / "ros.bash")
+        )
+        files[f"{stem}.zsh"] = _ZSH.format(file=f"{stem}.sh", functions=_quoted(setup.functions / "ros.bash"))
+    return files
+
+
+def shell_text(shell: str, setup: SetUp) -> str:
+    """What ``eval "$(minirospy shell)"`` evaluates: the environment without a workspace, and the functions."""
+    if shell == "fish":
+        return _fish_base(setup) + f"source {_quoted(setup.functions / 'ros.fish')}\n"
+    if shell == "bat":
+        return _bat_base(setup) + f'call "{setup.functions / "ros.bat"}"\n'
+    functions = "" if shell == "sh" else f". {_quoted(setup.functions / 'ros.bash')}\n"
+    return _posix_base(setup) + functions
+
+
+# --- bash, zsh, sh
+
+_HEAD = "# Made by minirospy: `source` it to work with the packages of this workspace.\n"
+
+_BASH = (
+    _HEAD
+    + """_minirospy_prefix=$(builtin cd "$(dirname "${{BASH_SOURCE[0]}}")" >/dev/null && pwd)
+. "$_minirospy_prefix/{file}"
+. {functions}
+unset _minirospy_prefix
+"""
+)
+_ZSH = (
+    _HEAD
+    + """_minirospy_prefix=$(builtin cd -q "$(dirname "${{(%):-%x}}")" >/dev/null && pwd)
+. "$_minirospy_prefix/{file}"
+. {functions}
+unset _minirospy_prefix
+"""
+)
+_ENV = """#!/bin/sh
+# Runs a command with the environment of this workspace: env.sh COMMAND ...
+if [ $# -eq 0 ]; then
+  echo "usage: env.sh COMMAND ..." >&2
+  exit 1
+fi
+_minirospy_prefix=$(cd "$(dirname "$0")" >/dev/null && pwd)
+. "$_minirospy_prefix/setup.sh"
+unset _minirospy_prefix
+exec "$@"
+"""
+
+_POSIX_FUNCTIONS = """# _minirospy_put VARIABLE ENTRY: put it in front, and take it away where it was before.
+_minirospy_put() {
+  _minirospy_take "$1" "$2"
+  eval "export $1=\\"\\$2\\${$1:+:\\$$1}\\""
+}
+# _minirospy_take VARIABLE ENTRY: take it out.
+_minirospy_take() {
+  eval "_minirospy_rest=\\${$1:-}"
+  _minirospy_kept=
+  while [ -n "$_minirospy_rest" ]; do
+    _minirospy_entry=${_minirospy_rest%%:*}
+    case $_minirospy_rest in
+      *:*) _minirospy_rest=${_minirospy_rest#*:} ;;
+      *) _minirospy_rest= ;;
+    esac
+    if [ -n "$_minirospy_entry" ] && [ "$_minirospy_entry" != "$2" ]; then
+      _minirospy_kept="${_minirospy_kept:+$_minirospy_kept:}$_minirospy_entry"
+    fi
+  done
+  if [ -n "$_minirospy_kept" ]; then
+    eval "export $1=\\"\\$_minirospy_kept\\""
+  else
+    unset "$1"
+  fi
+}
+# _minirospy_sources PREFIX put|take: the folders of packages that its file .catkin names.
+_minirospy_sources() {
+  _minirospy_list=$(cat "$1/.catkin" 2>/dev/null)
+  while [ -n "$_minirospy_list" ]; do
+    "_minirospy_$2" ROS_PACKAGE_PATH "${_minirospy_list##*;}"
+    case $_minirospy_list in
+      *\\;*) _minirospy_list=${_minirospy_list%;*} ;;
+      *) _minirospy_list= ;;
+    esac
+  done
+}
+# _minirospy_workspace PREFIX put|take: all variables of one workspace.
+_minirospy_workspace() {
+  _minirospy_sources "$1" "$2"
+  "_minirospy_$2" CMAKE_PREFIX_PATH "$1"
+  "_minirospy_$2" PYTHONPATH "$1/@DIST_PACKAGES@"
+  "_minirospy_$2" PATH "$1/bin"
+  "_minirospy_$2" LD_LIBRARY_PATH "$1/lib"
+  "_minirospy_$2" PKG_CONFIG_PATH "$1/lib/pkgconfig"
+  "_minirospy_$2" ROSLISP_PACKAGE_DIRECTORIES "$1/share/common-lisp"
+}
+"""
+
+
+def _posix(setup: SetUp, parents: Sequence[Path]) -> str:
+    chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(parents))
+    return (
+        _HEAD
+        + f': "${{_minirospy_prefix:={setup.prefix}}}"\n'
+        + _POSIX_FUNCTIONS.replace("@DIST_PACKAGES@", DIST_PACKAGES)
+        + _posix_base(setup)
+        + f"""if [ "${{1:-}}" != --extend ]; then
+  # The workspaces that were sourced before make way.
+  _minirospy_before=${{CMAKE_PREFIX_PATH:-}}
+  while [ -n "$_minirospy_before" ]; do
+    _minirospy_one=${{_minirospy_before%%:*}}
+    case $_minirospy_before in
+      *:*) _minirospy_before=${{_minirospy_before#*:}} ;;
+      *) _minirospy_before= ;;
+    esac
+    [ ! -f "$_minirospy_one/.catkin" ] || _minirospy_workspace "$_minirospy_one" take
+  done
+{chain or "  :"}
+fi
+_minirospy_workspace "$_minirospy_prefix" put
+"""
+        + "".join(
+            f'_minirospy_share={_quoted(folder)}\ncase ":${{ROS_PACKAGE_PATH:-}}:" in\n'
+            '  *":$_minirospy_share:"*) ;;\n'
+            '  *) export ROS_PACKAGE_PATH="$ROS_PACKAGE_PATH:$_minirospy_share" ;;\nesac\n'
+            for folder in setup.share
+        )
+        + """if [ -d "$_minirospy_prefix/etc/catkin/profile.d" ]; then
+  for _minirospy_hook in "$_minirospy_prefix"/etc/catkin/profile.d/*.sh; do
+    [ ! -f "$_minirospy_hook" ] || . "$_minirospy_hook"
+  done
+fi
+unset -f _minirospy_put _minirospy_take _minirospy_sources _minirospy_workspace
+unset _minirospy_rest _minirospy_kept _minirospy_entry _minirospy_list _minirospy_before _minirospy_one
+unset _minirospy_share _minirospy_hook
+[ -n "${BASH_VERSION:-}${ZSH_VERSION:-}" ] || unset _minirospy_prefix
+"""
+    )
+
+
+def _posix_base(setup: SetUp) -> str:
+    programs = _quoted(setup.programs)
+    return (
+        "".join(f'export {name}="${{{name}:-{value}}}"\n' for name, value in _BASE.items())
+        + f'command -v minirospy >/dev/null 2>&1 || export PATH={programs}:"$PATH"\n'
+    )
+
+
+_BASE = {
+    "ROS_DISTRO": "noetic",
+    "ROS_VERSION": "1",
+    "ROS_PYTHON_VERSION": "3",
+    "ROS_MASTER_URI": "http://localhost:11311",
+}
+
+
+def _quoted(path: Path) -> str:
+    """A path as one word of a shell."""
+    return "'" + str(path).replace("'", "'\\''") + "'"
+
+
+# --- fish
+
+
+def _fish(setup: SetUp, parents: Sequence[Path]) -> str:
+    chain = "\n".join(f"    _minirospy_workspace {_quoted(parent)} put" for parent in reversed(parents))
+    return (
+        _HEAD
+        + "set -l _minirospy_prefix (builtin realpath (dirname (status filename)))\n"
+        + _FISH_FUNCTIONS.replace("@DIST_PACKAGES@", DIST_PACKAGES)
+        + _fish_base(setup)
+        + f"""if test "$argv[1]" != --extend
+    for one in $CMAKE_PREFIX_PATH
+        test -f $one/.catkin; and _minirospy_workspace $one take
+    end
+{chain or "    true"}
+end
+_minirospy_workspace $_minirospy_prefix put
+"""
+        + "".join(
+            f"contains {_quoted(folder)} $ROS_PACKAGE_PATH; or set -gx --path --append ROS_PACKAGE_PATH "
+            f"{_quoted(folder)}\n"
+            for folder in setup.share
+        )
+        + "functions -e _minirospy_put _minirospy_take _minirospy_workspace\n"
+        + f"source {_quoted(setup.functions / 'ros.fish')}\n"
+    )
+
+
+_FISH_FUNCTIONS = """function _minirospy_take -a variable entry
+    set -l kept
+    for each in $$variable
+        test "$each" = "$entry"; or set -a kept $each
+    end
+    if test -n "$kept"
+        set -gx --path $variable $kept
+    else
+        set -e $variable
+    end
+end
+function _minirospy_put -a variable entry
+    _minirospy_take $variable $entry
+    set -gx --path $variable $entry $$variable
+end
+function _minirospy_workspace -a prefix action
+    for variable in CMAKE_PREFIX_PATH ROS_PACKAGE_PATH PYTHONPATH LD_LIBRARY_PATH PKG_CONFIG_PATH \\
+        ROSLISP_PACKAGE_DIRECTORIES
+        set -q $variable; and set -gx --path $variable $$variable
+    end
+    for folder in (string split ';' (cat $prefix/.catkin))[-1..1]
+        _minirospy_$action ROS_PACKAGE_PATH $folder
+    end
+    _minirospy_$action CMAKE_PREFIX_PATH $prefix
+    _minirospy_$action PYTHONPATH $prefix/@DIST_PACKAGES@
+    _minirospy_$action PATH $prefix/bin
+    _minirospy_$action LD_LIBRARY_PATH $prefix/lib
+    _minirospy_$action PKG_CONFIG_PATH $prefix/lib/pkgconfig
+    _minirospy_$action ROSLISP_PACKAGE_DIRECTORIES $prefix/share/common-lisp
+end
+set -q CMAKE_PREFIX_PATH; and set -gx --path CMAKE_PREFIX_PATH $CMAKE_PREFIX_PATH
+"""
+
+
+def _fish_base(setup: SetUp) -> str:
+    return (
+        "".join(f"set -q {name}; or set -gx {name} {value}\n" for name, value in _BASE.items())
+        + f"command -q minirospy; or set -gx PATH {_quoted(setup.programs)} $PATH\n"
+    )
+
+
+# --- cmd.exe
+
+
+def _bat(setup: SetUp, parents: Sequence[Path]) -> str:
+    lines = ["@echo off", "rem Made by minirospy: `call` it to work with the packages of this workspace.", ""]
+    text = "\n".join(lines) + _bat_base(setup)
+    for prefix in (*reversed(parents), None):
+        text += _bat_workspace(str(prefix) if prefix else "%~dp0", setup.sources if prefix is None else ())
+    text += "".join(f'set "ROS_PACKAGE_PATH=%ROS_PACKAGE_PATH%;{folder}"\n' for folder in setup.share)
+    return text + f'call "{setup.functions / "ros.bat"}"\n'
+
+
+def _bat_workspace(prefix: str, sources: Sequence[Path]) -> str:
+    prefix = prefix.removesuffix("\\")
+    entries = [("PYTHONPATH", f"{prefix}\\{DIST_PACKAGES}".replace("/", "\\")), ("CMAKE_PREFIX_PATH", prefix)]
+    entries += [("PATH", f"{prefix}\\bin"), *(("ROS_PACKAGE_PATH", str(source)) for source in sources)]
+    return "".join(f'set "{name}={entry};%{name}%"\n' for name, entry in entries)
+
+
+def _bat_base(setup: SetUp) -> str:
+    return "".join(f'if not defined {name} set "{name}={value}"\n' for name, value in _BASE.items()) + (
+        f'where minirospy >nul 2>nul || set "PATH={setup.programs};%PATH%"\n'
+    )

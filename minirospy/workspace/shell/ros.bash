@@ -1,0 +1,292 @@
+# roscd, rosls, rosed, roscp, rospd, rosd and TAB completion, for bash and zsh: to be sourced.
+#
+# What can be completed is known by `minirospy complete` alone; here is only what a program cannot do for its shell:
+# change its folder, and take part in its line editing. Source: http://wiki.ros.org/rosbash.
+# shellcheck shell=bash
+
+# --- where packages are
+
+# _ros_find PACKAGE: print its folder; complain and fail where there is none.
+_ros_find() {
+    command rospack find "$1"
+}
+
+# _ros_folder COMMAND PACKAGE[/FOLDER]: print that folder; the complaint is COMMAND's.
+_ros_folder() {
+    local folder package complaint
+    package=${2%%/*}
+    [ -n "$package" ] || package=$2
+    if ! folder=$(_ros_find "$package" 2>/dev/null) || [ -z "$folder" ]; then
+        complaint=$(_ros_find "$package" 2>&1 >/dev/null)
+        # Before its error there may be warnings.
+        complaint=${complaint##*$'\n'}
+        printf '%s: ERROR: %s\n' "$1" "${complaint#*rospack\] Error: }" >&2
+        return 1
+    fi
+    # A Python of Windows ends its lines as Windows does.
+    printf '%s\n' "${folder%$'\r'}${2#"$package"}"
+}
+
+# _ros_workspace: print where `roscd` alone goes.
+_ros_workspace() {
+    local rest prefix
+    if [ -n "${ROS_WORKSPACE:-}" ]; then
+        printf '%s\n' "$ROS_WORKSPACE"
+        return
+    fi
+    rest=${CMAKE_PREFIX_PATH:-}
+    while [ -n "$rest" ]; do
+        prefix=${rest%%:*}
+        rest=${rest#"$prefix"}
+        rest=${rest#:}
+        if [ -f "$prefix/.catkin" ] || [ -f "$prefix/setup.bash" ]; then
+            printf '%s\n' "$prefix"
+            return
+        fi
+    done
+    printf '%s\n' 'roscd: ERROR: no workspace: source its devel/setup.bash, or set ROS_WORKSPACE' >&2
+    return 1
+}
+
+# _ros_log_folder: print where logs go.
+_ros_log_folder() {
+    printf '%s\n' "${ROS_LOG_DIR:-${ROS_HOME:-$HOME/.ros}/log}"
+}
+
+# _ros_usage COMMAND [STATUS]: print how it is typed, on stderr where STATUS is not 0; return STATUS.
+_ros_usage() {
+    local text
+    case $1 in
+        roscd) text='package\n\nJump to target package.' ;;
+        rosls) text='package [options of ls]\n\nLists contents of a package directory.' ;;
+        rosed) text='package filename\n\nEdit a file in a package, with the editor that EDITOR names.' ;;
+        roscp) text='package filename target\n\nCopy a file from a package to target location.' ;;
+        rospd) text='[package | number]\n\nLike pushd, but with packages; a number turns the stack that rosd shows.' ;;
+    esac
+    if [ "${2:-0}" -eq 0 ]; then
+        printf 'usage: %s %b\n' "$1" "$text"
+    else
+        printf 'usage: %s %b\n' "$1" "$text" >&2
+    fi
+    return "${2:-0}"
+}
+
+# --- commands
+
+roscd() {
+    local folder
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage roscd && return ;;
+        0: | 1:) folder=$(_ros_workspace) || return ;;
+        1:log) folder=$(_ros_log_folder) ;;
+        1:*) folder=$(_ros_folder roscd "$1") || return ;;
+        *) _ros_usage roscd 2 || return ;;
+    esac
+    if [ ! -d "$folder" ]; then
+        printf '%s\n' "roscd: ERROR: there is no folder $folder" >&2
+        return 1
+    fi
+    # `builtin`, so that nobody's `cd` that prints or asks comes in between.
+    builtin cd -- "$folder" || return
+}
+
+rosls() {
+    local package='' folder word
+    local -a flags
+    flags=()
+    for word in "$@"; do
+        case $word in
+            --help) _ros_usage rosls && return ;;
+            -*) flags+=("$word") ;;
+            *)
+                [ -z "$package" ] || _ros_usage rosls 2 || return
+                package=$word
+                ;;
+        esac
+    done
+    if [ -z "$package" ]; then
+        _ros_usage rosls 2
+        return
+    fi
+    folder=$(_ros_folder rosls "$package") || return
+    ls ${flags[@]+"${flags[@]}"} -- "$folder"
+}
+
+# _ros_file COMMAND PACKAGE FILE: put the path of FILE, a path or a name in PACKAGE, into _ros_found; ask where many are.
+_ros_file() {
+    local folder file
+    folder=$(_ros_folder "$1" "$2") || return
+    _ros_found=()
+    if [ -f "$folder/$3" ]; then
+        _ros_found=("$folder/$3")
+        return
+    fi
+    while IFS= read -r file; do
+        _ros_found+=("$file")
+    done < <(find -L "$folder" -name '.?*' -prune -o -name __pycache__ -prune -o -type f -name "${3##*/}" -path "*/$3" -print 2>/dev/null | sort)
+    case ${#_ros_found[@]} in
+        0)
+            printf '%s\n' "$1: ERROR: there is no file $3 in package [$2], which is in $folder" >&2
+            return 1
+            ;;
+        1) return ;;
+    esac
+    printf '%s\n' 'You have chosen a non-unique filename, please pick one of the following:' >&2
+    select file in "${_ros_found[@]}"; do
+        if [ -n "$file" ]; then
+            _ros_found=("$file")
+            return
+        fi
+    done
+    return 1
+}
+
+rosed() {
+    local editor
+    local -a _ros_found
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage rosed && return ;;
+        2:*) ;;
+        *) _ros_usage rosed 2 || return ;;
+    esac
+    _ros_file rosed "$1" "$2" || return
+    for editor in "${EDITOR:-}" "${VISUAL:-}" nano vim vi emacs; do
+        if [ -n "$editor" ] && command -v "${editor%% *}" >/dev/null 2>&1; then
+            # As git does it: EDITOR may hold options, as in "code --wait".
+            eval "$editor \"\${_ros_found[@]}\""
+            return
+        fi
+    done
+    printf '%s\n' 'rosed: ERROR: no editor is installed: set EDITOR to yours' >&2
+    return 1
+}
+
+roscp() {
+    local -a _ros_found
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage roscp && return ;;
+        3:*) ;;
+        *) _ros_usage roscp 2 || return ;;
+    esac
+    _ros_file roscp "$1" "$2" || return
+    cp -- "${_ros_found[@]}" "$3"
+}
+
+# rosd: the stack of folders, numbered.
+rosd() {
+    local number=0 folder
+    while IFS= read -r folder; do
+        printf '%s %s\n' "$number" "$folder"
+        number=$((number + 1))
+    done < <(dirs -l -p)
+}
+
+# rospd [PACKAGE[/FOLDER] | NUMBER]: push a package's folder onto the stack, or turn the stack to a number of it.
+rospd() {
+    local folder
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage rospd && return ;;
+        0: | 1:) builtin pushd "$PWD" >/dev/null || return ;;
+        1:[0-9] | 1:[0-9][0-9] | 1:+[0-9] | 1:+[0-9][0-9]) 
+            if ! builtin pushd "+${1#+}" >/dev/null 2>&1; then
+                printf '%s\n' "rospd: ERROR: the stack has no number ${1#+}: rosd shows it" >&2
+                return 1
+            fi
+            ;;
+        1:*)
+            folder=$(_ros_folder rospd "$1") || return
+            builtin pushd "$folder" >/dev/null || return
+            ;;
+        *) _ros_usage rospd 2 || return ;;
+    esac
+    rosd
+}
+
+# --- TAB
+
+# _ros_candidates INDEX WORD...: put what can stand at WORD number INDEX into _ros_found.
+_ros_candidates() {
+    local line
+    _ros_found=()
+    while IFS= read -r line; do
+        # Not inside of "": there, zsh takes $'\n' as it stands.
+        line=${line%$'\r'}
+        line=${line//$'\v'/$'\n'}
+        _ros_found+=("$line")
+    done < <(command minirospy complete "$@" 2>/dev/null)
+}
+
+# _ros_complete_bash: what readline calls; COMP_* in, COMPREPLY out.
+_ros_complete_bash() {
+    local line="${COMP_LINE:0:COMP_POINT}" word='' fragment gap candidate cut=''
+    local -a words _ros_found
+    words=()
+    # bash takes words apart at = and : as in `rate:=5`; what has no space in between belongs together.
+    for fragment in "${COMP_WORDS[@]:0:COMP_CWORD+1}"; do
+        gap=${line%%[![:space:]]*}
+        line=${line#"$gap"}
+        if [ ${#words[@]} -gt 0 ] && [ -z "$gap" ] && [ -n "$word" ]; then
+            word=$word$fragment
+            words[${#words[@]}-1]=$word
+        else
+            word=$fragment
+            words+=("$word")
+        fi
+        line=${line#"$fragment"}
+    done
+    # The cursor may stand inside a word: what is behind it does not count.
+    _ros_candidates "$((${#words[@]} - 1))" "${words[@]}"
+    case $word in
+        [\"\']*) cut=${word%"${word#?}"} ;;
+        *[:=]*) cut=${word%"${word##*[:=]}"} ;;
+    esac
+    COMPREPLY=()
+    for candidate in ${_ros_found[@]+"${_ros_found[@]}"}; do
+        candidate=${candidate#"$cut"}
+        case $word in
+            # readline closes a quote that it has found open.
+            [\"\']*) candidate=${candidate%"$cut"} ;;
+            *) case $candidate in */ | *=) ;; *) candidate="$candidate " ;; esac ;;
+        esac
+        COMPREPLY+=("$candidate")
+    done
+}
+
+# _ros_complete_zsh: what zsh's completion system calls; words and CURRENT in, compadd out.
+_ros_complete_zsh() {
+    local candidate word quote=''
+    local -a _ros_found ready partial
+    _ros_candidates "$((CURRENT - 1))" "${words[@]}"
+    word=${words[CURRENT]}
+    case $word in [\"\']*) quote=${word%"${word#?}"} ;; esac
+    for candidate in ${_ros_found[@]+"${_ros_found[@]}"}; do
+        if [ -n "$quote" ]; then
+            # zsh keeps a quote that it has found open to itself, and closes it.
+            candidate=${candidate#"$quote"}
+            candidate=${candidate%"$quote"}
+        fi
+        case $candidate in
+            */ | *=) partial+=("$candidate") ;;
+            *) ready+=("$candidate") ;;
+        esac
+    done
+    compadd -Q -S '' -a partial
+    compadd -Q -a ready
+}
+
+_ros_commands() {
+    printf '%s\n' roscd rosls rosed roscp rospd rosrun roslaunch roscore rostopic rosnode rosservice rosparam \
+        rosmsg rossrv rospack catkin_make catkin minirospy
+}
+
+if [ -n "${ZSH_VERSION:-}" ]; then
+    if ! type compdef >/dev/null 2>&1; then
+        # A zsh without a .zshrc has no completion system yet. -u: ask no question about folders' owners.
+        autoload -Uz compinit && compinit -u
+    fi
+    for _ros_command in $(_ros_commands); do compdef _ros_complete_zsh "$_ros_command"; done
+elif type complete >/dev/null 2>&1; then
+    # shellcheck disable=SC2046 # they are many words
+    complete -o nospace -F _ros_complete_bash $(_ros_commands)
+fi
+unset _ros_command

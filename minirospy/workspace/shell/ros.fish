@@ -1,0 +1,213 @@
+# roscd, rosls, rosed, roscp, rospd, rosd and TAB completion, for fish: to be sourced.
+#
+# What can be completed is known by `minirospy complete` alone; here is only what a program cannot do for its shell.
+# The same as ros.bash, which says more. Source: http://wiki.ros.org/rosbash.
+
+# --- where packages are
+
+function _ros_find --argument-names package --description 'print the folder of a package'
+    command rospack find $package
+end
+
+function _ros_folder --argument-names name target --description 'print the folder PACKAGE[/FOLDER]; complain as command name'
+    set --local parts (string split --max 1 / -- $target)
+    test -n "$parts[1]"; or set parts $target
+    set --local folder (_ros_find $parts[1] 2>/dev/null)
+    if test -z "$folder"
+        set --local complaint (_ros_find $parts[1] 2>&1 >/dev/null)
+        # Before its error there may be warnings.
+        printf '%s: ERROR: %s\n' $name (string replace --regex '^\[rospack\] Error: ' '' -- "$complaint[-1]") >&2
+        return 1
+    end
+    test -n "$parts[2]"; and set folder $folder/$parts[2]
+    printf '%s\n' $folder
+end
+
+function _ros_workspace --description 'print where roscd alone goes'
+    if set --query ROS_WORKSPACE; and test -n "$ROS_WORKSPACE"
+        printf '%s\n' $ROS_WORKSPACE
+        return
+    end
+    # fish splits on import only variables whose names end in PATH: CMAKE_PREFIX_PATH is one.
+    for prefix in (string split : -- $CMAKE_PREFIX_PATH)
+        if test -f $prefix/.catkin -o -f $prefix/setup.bash -o -f $prefix/setup.fish
+            printf '%s\n' $prefix
+            return
+        end
+    end
+    printf '%s\n' 'roscd: ERROR: no workspace: source its devel/setup.fish, or set ROS_WORKSPACE' >&2
+    return 1
+end
+
+function _ros_log_folder --description 'print where logs go'
+    if set --query ROS_LOG_DIR
+        printf '%s\n' $ROS_LOG_DIR
+    else if set --query ROS_HOME
+        printf '%s\n' $ROS_HOME/log
+    else
+        printf '%s\n' $HOME/.ros/log
+    end
+end
+
+function _ros_usage --argument-names name --description 'print how a command is typed'
+    printf 'usage: %s ' $name
+    switch $name
+        case roscd
+            printf '%s\n' package '' 'Jump to target package.'
+        case rosls
+            printf '%s\n' 'package [options of ls]' '' 'Lists contents of a package directory.'
+        case rosed
+            printf '%s\n' 'package filename' '' 'Edit a file in a package, with the editor that EDITOR names.'
+        case roscp
+            printf '%s\n' 'package filename target' '' 'Copy a file from a package to target location.'
+        case rospd
+            printf '%s\n' '[package | number]' '' 'Like pushd, but with packages; a number turns the stack that rosd shows.'
+    end
+end
+
+# --- commands
+
+function roscd --description 'go to the folder of a package'
+    set --local folder
+    if contains -- "$argv" -h --help
+        _ros_usage roscd
+        return
+    else if test (count $argv) -gt 1
+        _ros_usage roscd >&2
+        return 2
+    else if test -z "$argv"
+        set folder (_ros_workspace); or return
+    else if test "$argv" = log
+        set folder (_ros_log_folder)
+    else
+        set folder (_ros_folder roscd $argv); or return
+    end
+    if not test -d "$folder"
+        printf '%s\n' "roscd: ERROR: there is no folder $folder" >&2
+        return 1
+    end
+    cd $folder
+end
+
+function rosls --description 'list the files of a package'
+    if contains -- --help $argv
+        _ros_usage rosls
+        return
+    end
+    set --local flags (string match -- '-*' $argv)
+    set --local packages (string match --invert -- '-*' $argv)
+    if test (count $packages) -ne 1
+        _ros_usage rosls >&2
+        return 2
+    end
+    set --local folder (_ros_folder rosls $packages); or return
+    ls $flags -- $folder
+end
+
+function _ros_file --argument-names name package file --description 'put the path of a file of a package into _ros_found; ask where many are'
+    set --local folder (_ros_folder $name $package); or return
+    if test -f $folder/$file
+        set --global _ros_found $folder/$file
+        return
+    end
+    set --local base (string split / -- $file)[-1]
+    set --global _ros_found (find -L $folder -name '.?*' -prune -o -name __pycache__ -prune -o -type f -name $base -path "*/$file" -print 2>/dev/null | sort)
+    switch (count $_ros_found)
+        case 0
+            printf '%s\n' "$name: ERROR: there is no file $file in package [$package], which is in $folder" >&2
+            return 1
+        case 1
+            return
+    end
+    printf '%s\n' 'You have chosen a non-unique filename, please pick one of the following:' >&2
+    for number in (seq (count $_ros_found))
+        printf '%s) %s\n' $number $_ros_found[$number] >&2
+    end
+    while read --prompt-str '#? ' --local answer
+        if string match --quiet --regex '^[1-9][0-9]*$' -- $answer; and test $answer -le (count $_ros_found)
+            set --global _ros_found $_ros_found[$answer]
+            return
+        end
+    end
+    return 1
+end
+
+function rosed --description 'edit a file of a package'
+    if contains -- "$argv" -h --help
+        _ros_usage rosed
+        return
+    else if test (count $argv) -ne 2
+        _ros_usage rosed >&2
+        return 2
+    end
+    _ros_file rosed $argv; or return
+    for editor in "$EDITOR" "$VISUAL" nano vim vi emacs
+        # EDITOR may hold options, as in "code --wait".
+        set --local words (string split --no-empty ' ' -- $editor)
+        if test -n "$editor"; and type --query $words[1]
+            $words $_ros_found
+            return
+        end
+    end
+    printf '%s\n' 'rosed: ERROR: no editor is installed: set EDITOR to yours' >&2
+    return 1
+end
+
+function roscp --description 'copy a file of a package'
+    if contains -- "$argv" -h --help
+        _ros_usage roscp
+        return
+    else if test (count $argv) -ne 3
+        _ros_usage roscp >&2
+        return 2
+    end
+    _ros_file roscp $argv[1] $argv[2]; or return
+    cp -- $_ros_found $argv[3]
+end
+
+function rosd --description 'show the stack of folders, numbered'
+    set --local number 0
+    for folder in $PWD $dirstack
+        printf '%s %s\n' $number $folder
+        set number (math $number + 1)
+    end
+end
+
+function rospd --description 'push the folder of a package onto the stack, or turn the stack'
+    if contains -- "$argv" -h --help
+        _ros_usage rospd
+        return
+    else if test (count $argv) -gt 1
+        _ros_usage rospd >&2
+        return 2
+    else if test -z "$argv"
+        pushd $PWD >/dev/null; or return
+    else if string match --quiet --regex '^\+?[0-9]+$' -- $argv
+        set --local number (string replace + '' -- $argv)
+        if test $number -gt (count $dirstack)
+            printf '%s\n' "rospd: ERROR: the stack has no number $number: rosd shows it" >&2
+            return 1
+        end
+        pushd +$number >/dev/null; or return
+    else
+        set --local folder (_ros_folder rospd $argv); or return
+        pushd $folder >/dev/null; or return
+    end
+    rosd
+end
+
+# --- TAB
+
+function _ros_complete --description 'print what can stand at the cursor'
+    command --query minirospy; or return
+    set --local before (commandline --tokenize --cut-at-cursor --current-process)
+    set --local current (commandline --cut-at-cursor --current-token)
+    # One line, as fish takes each line for a candidate; unquoted, as fish puts its own quotes around it.
+    command minirospy complete --one-line (count $before) $before "$current" 2>/dev/null | string unescape
+end
+
+for name in roscd rosls rosed roscp rospd rosrun roslaunch roscore rostopic rosnode rosservice rosparam \
+        rosmsg rossrv rospack catkin_make catkin minirospy
+    complete --command $name --erase
+    complete --command $name --no-files --arguments '(_ros_complete)'
+end

@@ -1,0 +1,333 @@
+"""cli/complete: what TAB offers; with a graph, without a master, and for anything that may be typed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from minirospy.cli import complete
+from minirospy.cli.complete import candidates, main, prototype
+from minirospy.environment import Environment
+from minirospy.idl.load import Catalogue, message_class
+from minirospy.introspect.messages import fill, serialize
+from minirospy.workspace.packages import Packages
+
+from .conftest import Robot
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A workspace with the package ``my_robot``; the current folder is empty."""
+    package = tmp_path / "src" / "my_robot"
+    for folder in ("scripts", "launch", "config/deep", "msg", ".git"):
+        (package / folder).mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>my_robot</name></package>")
+    (package / "scripts" / "talker.py").write_text("#!/usr/bin/env python3\n")
+    (package / "scripts" / "notes.txt").touch()
+    (package / "config" / "deep" / "my map.yaml").touch()
+    (package / "msg" / "Leds.msg").write_text("Led[] leds\nbool on\n")
+    (package / "msg" / "Led.msg").write_text("string name\nfloat32[2] place\n")
+    (package / "launch" / "all.launch").write_text(
+        '<launch><arg name="rate" default="10"/><arg name="fake" default="true"/><arg name="port"/></launch>'
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return tmp_path
+
+
+def tab(line: str) -> list[str]:
+    """What is offered where ``line`` ends."""
+    words = line.split(" ")
+    return candidates(len(words) - 1, words)
+
+
+# --- verbs and options
+
+
+def test_verbs() -> None:
+    assert tab("rostopic ") == ["bw", "delay", "echo", "find", "hz", "info", "list", "pub", "type"]
+    assert tab("rosnode k") == ["kill"]
+    assert tab("rossrv p") == ["package", "packages"]
+    assert tab("rosparam x") == []
+    assert tab("/opt/bin/rosservice u") == ["uri"]
+
+
+def test_verbs_of_minirospy_itself() -> None:
+    found = tab("minirospy ")
+    assert {"demo", "topic", "run", "board"} <= set(found)
+    assert "complete" not in found
+    assert tab("minirospy topic p") == ["pub"]
+    assert tab("minirospy board rel") == ["release"]
+    assert tab("minirospy demo ") == []
+    assert tab("minirospy nothing ") == []
+
+
+def test_options_of_a_verb() -> None:
+    assert set(tab("rostopic pub -")) >= {"-r", "--rate", "-1", "--once", "-f", "-h", "--latch"}
+    assert tab("rostopic pub --f") == ["--file"]
+    assert "-n" in tab("rosservice list -")
+    assert tab("rosrun --p") == ["--prefix"]
+    assert "--screen" in tab("roslaunch --")
+    assert {"-p", "--port"} <= set(tab("roscore -"))
+    assert tab("minirospy demo --p") == ["--presses"]
+
+
+def test_asking_a_command_leaves_it_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
+    from minirospy.cli import rostopic
+
+    tab("rostopic pub -")
+    assert rostopic.main(["-h"]) == 0
+    assert "rostopic pub" in capsys.readouterr().out
+
+
+def test_choices_of_an_argument() -> None:
+    assert tab("minirospy board set 7 ") == ["0", "1"]
+
+
+def test_tools_of_a_workspace(workspace: Path) -> None:
+    assert tab("rospack f") == ["find"]
+    assert tab("rospack find my_") == ["my_robot"]
+    assert tab("rospack find my_robot ") == []
+    assert tab("rospack list-names ") == []
+    assert tab("rospack depends-why --target=my_") == ["--target=my_robot"]
+    assert "--target=" in tab("rospack depends-why my_robot -")
+    assert "build" in tab("catkin b")
+    assert tab("catkin build my_") == ["my_robot"]
+    assert tab("catkin_make --pkg my_") == ["my_robot"]
+
+
+# --- packages and files
+
+
+def test_programs(workspace: Path) -> None:
+    assert tab("rosrun my_") == ["my_robot"]
+    assert tab("rosrun my_robot ") == ["talker.py"]
+    assert tab("minirospy run my_robot ta") == ["talker.py"]
+    assert tab("rosrun --prefix gdb my_robot ") == ["talker.py"]
+    assert tab("rosrun my_robot talker.py __n") == ["__name:=", "__ns:="]
+    assert tab("rosrun nobody ") == []
+
+
+def test_launch_files_and_their_args(workspace: Path) -> None:
+    assert tab("roslaunch my_robot ") == ["all.launch"]
+    assert tab("roslaunch --screen my_robot a") == ["all.launch"]
+    assert tab("roslaunch my_robot all.launch ") == ["rate:=", "fake:=", "port:="]
+    assert tab("roslaunch my_robot all.launch rate:=5 f") == ["fake:="]
+    assert tab("roslaunch my_robot all.launch rate:=") == ["rate:=10"]
+    assert tab("roslaunch my_robot all.launch fake:=") == ["fake:=true", "fake:=false"]
+    assert tab("roslaunch my_robot all.launch port:=") == []
+
+
+def test_launch_files_by_path(workspace: Path) -> None:
+    folder = workspace / "src" / "my_robot" / "launch"
+    assert tab(f"roslaunch {folder}/") == [f"{folder}/all.launch"]
+    assert tab(f"roslaunch {folder}/all.launch p") == ["port:="]
+
+
+def test_folders_of_packages(workspace: Path) -> None:
+    assert tab("roscd my_") == ["my_robot/"]
+    assert tab("roscd my_robot/c") == ["my_robot/config/"]
+    assert tab("rospd my_robot/config/") == ["my_robot/config/deep/"]
+    assert tab("rosls -l my_robot/s") == ["my_robot/scripts/"]
+    assert tab("roscd my_robot my") == []
+    assert tab("roscd my_robot/.") == ["my_robot/.git/"]
+
+
+def test_files_of_packages(workspace: Path) -> None:
+    assert tab("rosed my_robot t") == ["talker.py"]
+    assert tab("rosed my_robot scripts/") == ["scripts/notes.txt", "scripts/talker.py"]
+    assert tab("rosed my_robot c") == []
+    assert tab("rosed my_robot config/") == ["config/deep/"]
+    assert tab("rosed my_robot talker.py ") == []
+    Path("copy.txt").touch()
+    assert tab("roscp my_robot notes.txt ") == ["copy.txt"]
+
+
+def test_files_of_this_computer(workspace: Path) -> None:
+    Path("params.yaml").touch()
+    Path("folder").mkdir()
+    assert tab("rosparam load ") == ["folder/", "params.yaml"]
+    assert tab("rosparam load ./p") == ["./params.yaml"]
+    assert tab("rostopic pub -f ") == ["folder/", "params.yaml"]
+
+
+# --- types and texts
+
+
+def test_types(workspace: Path) -> None:
+    assert tab("rosmsg show std_m") == ["std_msgs/"]
+    assert tab("rosmsg show std_msgs/Bo") == ["std_msgs/Bool"]
+    assert tab("rosmsg md5 my_robot/L") == ["my_robot/Led", "my_robot/Leds"]
+    assert tab("rosmsg package my_") == ["my_robot"]
+    assert tab("rossrv show std_srvs/Set") == ["std_srvs/SetBool"]
+    assert tab("rosservice find std_s") == ["std_srvs/"]
+    assert tab("rostopic pub /new std_msgs/Boo") == ["std_msgs/Bool"]
+    assert tab("rosmsg show nobody/") == []
+
+
+def test_a_message_to_be_changed(workspace: Path) -> None:
+    assert tab("rostopic pub /t std_msgs/Bool ") == ['"data: false"']
+    assert tab("rostopic pub -r 10 /t std_msgs/Bool ") == ['"data: false"']
+    assert tab("rostopic pub /t std_msgs/String ") == ["\"data: ''\""]
+    assert tab("rostopic pub /t std_msgs/Empty ") == ['"{}"']
+    assert tab("rostopic pub /t std_msgs/Bool true ") == []
+    assert tab("rostopic pub /t std_msgs/Nothing ") == []
+    # A vertical tab stands for a line feed: a candidate is one line.
+    assert tab("rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\vy: 0.0\vz: 0.0"']
+    assert tab("rostopic pub /t my_robot/Leds ") == [
+        "\"leds:\v- name: ''\v  place:\v  - 0.0\v  - 0.0\von: false\""
+    ]
+
+
+def test_a_message_on_one_line() -> None:
+    words = ["rostopic", "pub", "/t", "geometry_msgs/Point", ""]
+    assert candidates(4, words, one_line=True) == ['"{x: 0.0, y: 0.0, z: 0.0}"']
+
+
+def test_quotes_that_are_open_stay(workspace: Path) -> None:
+    assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/Bool", "'da"]) == ["'data: false'"]
+    assert candidates(4, ["rostopic", "pub", '"/t"', "std_msgs/Bool", '"']) == ['"data: false"']
+    assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ['"config/deep/my map.yaml"']
+
+
+_FROM_ROS = {
+    "std_msgs/Header": "seq: 0\nstamp:\n  secs: 0\n  nsecs: 0\nframe_id: ''",
+    "std_msgs/Float64MultiArray": "layout:\n  dim:\n  - label: ''\n    size: 0\n    stride: 0\n  data_offset: 0\ndata:\n- 0",
+    "sensor_msgs/RegionOfInterest": "{x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}",
+    "sensor_msgs/NavSatFix": (
+        "header:\n  seq: 0\n  stamp: {secs: 0, nsecs: 0}\n  frame_id: ''\nstatus: {status: 0, service: 0}\n"
+        "latitude: 0.0\nlongitude: 0.0\naltitude: 0.0\n"
+        "position_covariance: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\nposition_covariance_type: 0"
+    ),
+    "geometry_msgs/Polygon": "points:\n- x: 0.0\n  y: 0.0\n  z: 0.0",
+}
+"""What ROS 1's rosmsg-proto printed."""
+
+
+@pytest.mark.parametrize("type_", _FROM_ROS)
+def test_the_text_is_that_of_ros(type_: str) -> None:
+    catalogue = Catalogue(Packages(Environment.read(host="localhost")).folders())
+    assert prototype(catalogue.message(type_), catalogue) == _FROM_ROS[type_]
+
+
+def test_every_text_is_a_message() -> None:
+    catalogue = Catalogue(Packages(Environment.read(host="localhost")).folders())
+    for package in ("std_msgs", "geometry_msgs", "sensor_msgs", "nav_msgs", "visualization_msgs"):
+        for spec in catalogue.messages(package):
+            text = prototype(spec, catalogue)
+            message = message_class(spec.full_name)()
+            serialize(fill(message, [yaml.safe_load(text)]))
+
+
+# --- the graph
+
+
+def test_topics(robot: Robot) -> None:
+    assert {"/button_state", "/listen", "/ns/chatter", "/poly"} <= set(tab("rostopic echo "))
+    assert tab("rostopic hz /button_state /po") == ["/poly"]
+    assert tab("rostopic info ns/") == ["ns/chatter"]
+    assert tab("minirospy topic bw /but") == ["/button_state"]
+    assert tab("rostopic echo -n 3 /but") == ["/button_state"]
+
+
+def test_fields_of_a_topic(robot: Robot) -> None:
+    assert tab("rostopic echo /poly/") == ["/poly/header", "/poly/polygon"]
+    assert tab("rostopic echo /poly/header/s") == ["/poly/header/seq", "/poly/header/stamp"]
+    assert tab("rostopic echo /poly/header/stamp/") == ["/poly/header/stamp/secs", "/poly/header/stamp/nsecs"]
+    # Shells read brackets as a pattern.
+    assert tab("rostopic echo /poly/polygon/points[0]/y") == ['"/poly/polygon/points[0]/y"']
+    assert tab("rostopic hz /poly/") == []
+
+
+def test_the_type_that_a_topic_has(robot: Robot) -> None:
+    assert tab("rostopic pub /button_state ") == ["std_msgs/Bool"]
+    assert tab("rostopic pub listen ") == ["std_msgs/Bool"]
+    assert "std_msgs/" in tab("rostopic pub /other ")
+
+
+def test_nodes_and_machines(robot: Robot) -> None:
+    assert tab("rosnode info ") == ["/robot"]
+    assert tab("rosnode kill /robot ") == []
+    assert tab("rosnode machine ") == ["localhost"]
+
+
+def test_services_and_a_request(robot: Robot) -> None:
+    assert "/set_led_state" in tab("rosservice call /set")
+    assert tab("rosservice call /set_led_state ") == ['"data: false"']
+    assert tab("rosservice call /fail ") == ['"{}"']
+    assert tab("rosservice info se") == ["set_led_state"]
+
+
+def test_parameters(robot: Robot, command: object) -> None:
+    from minirospy.cli import rosparam
+
+    assert rosparam.main(["set", "/robot/speed", "3"]) == 0
+    assert tab("rosparam get /robot/") == ["/robot/speed"]
+    assert tab("rosparam delete rob") == ["robot/speed"]
+    assert tab("rosparam list /ro") == ["/robot/speed"]
+
+
+# --- whatever happens
+
+
+@pytest.mark.parametrize("verb", ["rostopic echo ", "rosnode info ", "rosservice call ", "rosparam get "])
+def test_without_a_master_there_is_nothing(verb: str) -> None:
+    assert tab(verb) == []
+
+
+def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    import socket
+
+    with socket.create_server(("localhost", 0)) as silent:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
+        start = time.monotonic()
+        assert tab("rostopic echo ") == []
+        assert time.monotonic() - start < complete._LIVE_SECONDS + 0.5
+
+
+def test_packages_are_found_with_a_bad_master_uri(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
+    assert tab("roscd std_m") == ["std_msgs/"]
+    assert tab("rostopic echo ") == []
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["x"],
+        ["-1", "rostopic"],
+        ["99", "rostopic", "echo"],
+        ["1"],
+        ["1", "rostopic"],
+        ["1", "unknown", ""],
+        ["0", "rostopic"],
+        ["2", "rosmsg", "show", "a/b/c"],
+        ["1", "roscd", "nobody/x/"],
+        ["2", "roslaunch", "nobody", "x.launch", ""],
+        ["3", "roslaunch", "nobody", "x.launch", "a:="],
+        ["2", "rostopic", "nothing", ""],
+        ["3", "rostopic", "pub", "'", "\\"],
+        ["--one-line"],
+    ],
+)
+def test_nothing_is_an_error(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(argv) == 0
+    out, err = capsys.readouterr()
+    assert not err
+    assert "Traceback" not in out
+
+
+def test_the_command(workspace: Path) -> None:
+    words = [sys.executable, "-m", "minirospy", "complete", "2", "rosrun", "my_robot", "-weird"]
+    assert subprocess.run(words, capture_output=True, check=True, timeout=20).stdout == b""
+    done = subprocess.run([*words[:-1], ""], capture_output=True, check=True, timeout=20)
+    assert done.stdout == b"talker.py" + os.linesep.encode()
+    assert done.stderr == b""

@@ -1,0 +1,42 @@
+"""What mypy and an editor know of a student's file: the types of rospy and of messages."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+PROGRAM = """
+import rospy
+from sensor_msgs.msg import Image, LaserScan
+from std_srvs.srv import SetBool, SetBoolResponse
+
+scan = LaserScan()
+reveal_type(scan.ranges)
+reveal_type(scan.header.frame_id)
+reveal_type(scan.header.stamp)
+reveal_type(Image().data)
+reveal_type(SetBoolResponse().success)
+scan.rangs
+rospy.init_nod("x")
+"""
+
+
+def test_a_file_of_a_user(tmp_path: Path) -> None:
+    (tmp_path / "node.py").write_text(PROGRAM)
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "node.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.splitlines() == [
+        'node.py:7: note: Revealed type is "list[float]"',
+        'node.py:8: note: Revealed type is "str"',
+        'node.py:9: note: Revealed type is "minirospy.times.Time"',
+        'node.py:10: note: Revealed type is "bytes"',
+        'node.py:11: note: Revealed type is "bool"',
+        'node.py:12: error: "LaserScan" has no attribute "rangs"; maybe "ranges"?  [attr-defined]',
+        'node.py:13: error: Module has no attribute "init_nod"; maybe "init_node"?  [attr-defined]',
+    ]

@@ -1,0 +1,438 @@
+"""catkin_make's work: plans, order, generated modules, relays, and each mistake in one line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from minirospy.cli.catkin import catkin_make
+from minirospy.errors import BuildError, DefinitionError, ManifestError, SourceError
+from minirospy.workspace.build import find_workspace, read_plans
+
+if TYPE_CHECKING:
+    from conftest import Scene
+
+
+def python(scene: Scene, code: str) -> str:
+    """What a program prints that sees the workspace."""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(scene.modules)},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=scene.root,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+# --- what is made
+
+
+def test_messages_services_and_actions(scene: Scene) -> None:
+    scene.messages(
+        "led_msgs",
+        {
+            "msg/Led.msg": "int64 number\nstring status\nPlace place\n",
+            "msg/Place.msg": "geometry_msgs/Point point\n",
+            "srv/Zone.srv": "int16 zone\n---\nbool success\n",
+            "action/Run.action": "int16 runs\n---\nint16 last\n---\nint16 now\n",
+        },
+        "std_msgs geometry_msgs actionlib_msgs",
+    )
+    report = scene.build()["led_msgs"]
+    assert (report.made, report.changed, report.warnings) == ("2 messages, 1 service, 1 action", True, ())
+    said = python(
+        scene,
+        "from led_msgs.msg import *; from led_msgs.srv import Zone, ZoneResponse; import led_msgs\n"
+        "print(Led(number=3).place.point.x, RunAction().action_goal.goal.runs, ZoneResponse(True).success)\n"
+        "print(led_msgs.__file__)",
+    )
+    assert said.splitlines() == ["0.0 0 True", str(scene.modules / "led_msgs" / "__init__.py")]
+
+
+def test_a_workspace_hides_a_package_of_ours(scene: Scene) -> None:
+    scene.messages("rpi_msgs", {"msg/mine.msg": "int8 x\n"})
+    scene.build()
+    assert python(scene, "import rpi_msgs.msg; print(dir(rpi_msgs.msg))") == "['mine']\n"
+
+
+def test_packages_use_messages_of_each_other(scene: Scene) -> None:
+    scene.messages("a_user", {"msg/User.msg": "z_base/Base base\n"}, "z_base")
+    scene.messages("z_base", {"msg/Base.msg": "std_msgs/Header header\n"})
+    assert list(scene.build()) == ["z_base", "a_user"]
+    assert python(scene, "from a_user.msg import User; print(User().base.header.seq)") == "0\n"
+
+
+def test_a_second_build_makes_nothing(scene: Scene) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.build()
+    before = {path: path.stat().st_mtime_ns for path in scene.devel.rglob("*")}
+    report = scene.build()["led_msgs"]
+    assert (report.made, report.changed) == ("", False)
+    assert {path: path.stat().st_mtime_ns for path in scene.devel.rglob("*")} == before
+
+
+def test_a_change_is_seen_also_in_packages_that_use_it(scene: Scene) -> None:
+    base = scene.messages("base", {"msg/Base.msg": "int8 x\n"})
+    scene.messages("user", {"msg/User.msg": "base/Base base\n"}, "base")
+    scene.build()
+    first = python(scene, "from user.msg import User; print(User._md5sum)")
+    (base / "msg" / "Base.msg").write_text("int16 x\n")
+    assert scene.build()["user"].changed
+    assert python(scene, "from user.msg import User; print(User._md5sum)") != first
+
+
+def test_what_is_gone_from_the_sources_goes_from_devel(scene: Scene) -> None:
+    folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n", "msg/Old.msg": "int8 x\n"})
+    scene.messages("old_msgs", {"msg/A.msg": "int8 x\n"})
+    scene.build()
+    file = folder / "CMakeLists.txt"
+    file.write_text(file.read_text().replace(" Old.msg", ""))
+    (folder / "msg" / "Old.msg").unlink()
+    for path in sorted((scene.source / "old_msgs").rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    scene.build()
+    assert sorted(path.name for path in (scene.modules / "led_msgs" / "msg").glob("*.py")) == [
+        "_Led.py",
+        "__init__.py",
+    ]
+    assert not (scene.modules / "old_msgs").exists()
+
+
+def test_a_deleted_module_is_made_again(scene: Scene) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.build()
+    (scene.modules / "led_msgs" / "msg" / "_Led.py").unlink()
+    assert scene.build()["led_msgs"].made == "1 message"
+
+
+def test_a_folder_without_file_names_is_taken_whole(scene: Scene) -> None:
+    cmake = "add_message_files(DIRECTORY more/msg)\ngenerate_messages()"
+    scene.package("p", cmake, "", {"more/msg/A.msg": "int8 a\n", "more/msg/B.msg": "A a\n"})
+    assert scene.build()["p"].made == "2 messages"
+
+
+# --- Python packages
+
+SETUP = """from distutils.core import setup
+from catkin_pkg.python_setup import generate_distutils_setup
+setup(**generate_distutils_setup({}))
+"""
+
+
+def test_a_package_of_python_is_imported_from_its_source(scene: Scene) -> None:
+    folder = scene.package(
+        "tools",
+        "catkin_python_setup()",
+        "",
+        {
+            "setup.py": SETUP.format("packages=['tools', 'tools.inner'], package_dir={'': 'src'}"),
+            "src/tools/__init__.py": "VALUE = 3\n",
+            "src/tools/inner/__init__.py": "from .. import VALUE\nDOUBLE = 2 * VALUE\n",
+        },
+    )
+    assert scene.build()["tools"].made == "Python package tools"
+    said = python(scene, "import tools.inner; print(tools.inner.DOUBLE, tools.__file__)")
+    assert said == f"6 {folder / 'src' / 'tools' / '__init__.py'}\n"
+
+
+def test_python_and_messages_in_one_package(scene: Scene) -> None:
+    folder = scene.messages("both", {"msg/A.msg": "int8 a\n"})
+    (folder / "setup.py").write_text(SETUP.format("packages=['both'], package_dir={'both': 'lib/both'}"))
+    (folder / "lib" / "both").mkdir(parents=True)
+    (folder / "lib" / "both" / "__init__.py").write_text("from both.msg import A\nfrom .more import MORE\n")
+    (folder / "lib" / "both" / "more.py").write_text("MORE = 1\n")
+    file = folder / "CMakeLists.txt"
+    file.write_text(file.read_text().replace("add_message", "catkin_python_setup()\nadd_message"))
+    assert scene.build()["both"].made == "1 message, Python package both"
+    assert python(scene, "import both; print(both.A(a=2).a, both.MORE)") == "2 1\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from setuptools import setup, find_packages\nsetup(packages=find_packages('src'), package_dir={'': 'src'})",
+        "import setuptools\nsetuptools.setup(name='x', packages=['tools'], package_dir={'': 'src'})",
+        "#!/usr/bin/env python\nfrom setuptools import setup\nfrom catkin_pkg import python_setup\n"
+        "d = python_setup.generate_distutils_setup()\nd['packages'] = ['tools']\nd['package_dir'] = {'': 'src'}\nsetup(**d)",
+    ],
+)
+def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
+    files = {"setup.py": text, "src/tools/__init__.py": "VALUE = 3\n"}
+    scene.package("tools", "catkin_python_setup()", "", files)
+    scene.build()
+    assert python(scene, "import tools; print(tools.VALUE)") == "3\n"
+
+
+def test_a_compiler_is_not_needed(scene: Scene) -> None:
+    cmake = "add_executable(talker src/t.cpp)\nadd_library(${PROJECT_NAME}_lib src/l.cpp)\nadd_library(x INTERFACE)"
+    scene.package("cpp", cmake, "roscpp")
+    assert scene.build()["cpp"].plan.skipped == ("talker", "cpp_lib")
+
+
+# --- mistakes
+
+
+def mistakes(scene: Scene) -> SourceError:
+    with pytest.raises(SourceError) as caught:
+        scene.build()
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+def good(cmake: str) -> str:
+    return f"{cmake}\ngenerate_messages(DEPENDENCIES std_msgs)"
+
+
+@pytest.mark.parametrize(
+    ("cmake", "line", "text"),
+    [
+        (
+            good("add_message_files(FILES Ledd.msg)"),
+            3,
+            "there is no [Ledd.msg] in folder [msg]; did you mean Led.msg?",
+        ),
+        (good("add_service_files(FILES Led.srv)"), 3, "add_service_files: there is no folder [srv]"),
+        (good("add_message_files(FILES Led)"), 3, "[Led] does not end in .msg"),
+        ("add_message_files(FILES Led.msg)", 3, "generate_messages() is missing"),
+        ("generate_messages()", 3, "nothing to generate"),
+        (
+            "generate_messages(DEPENDENCIES std_msgs)\nadd_message_files(FILES Led.msg)",
+            3,
+            "nothing to generate",
+        ),
+        (
+            "add_message_files(FILES Led.msg)\ngenerate_messages()\nadd_message_files(FILES Led.msg)",
+            5,
+            "must stand before",
+        ),
+        (
+            "add_message_files(FILES Led.msg)\ngenerate_messages(DEPENDENCIES std_msg)",
+            4,
+            "did you mean std_msgs?",
+        ),
+        (
+            "find_package(catkin REQUIRED COMPONENTS\n std_msg)",
+            3,
+            "package [std_msg] not found; did you mean std_msgs?",
+        ),
+        ("catkin_python_setup()", 3, "needs a setup.py"),
+        ("catkin_install_python(PROGRAMS scripts/x.py DESTINATION lib)", 3, "there is no [scripts/x.py]"),
+        ("install(DIRECTORY lanch DESTINATION share)", 3, "there is no [lanch]"),
+        ("project(other)", 3, "project(other), but package.xml names the package [p]"),
+        ("message(", 3, "message( is not closed"),
+    ],
+)
+def test_mistakes_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> None:
+    folder = scene.package("p", cmake, "std_msgs", {"msg/Led.msg": "int8 x\n"})
+    error = mistakes(scene)
+    assert isinstance(error, BuildError)
+    assert (error.file, error.line) == (str(folder / "CMakeLists.txt"), line)
+    assert text in error.text
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "error"),
+    [
+        ("int8 x\nint8 x y\n", 2, "[x y] is not a legal field name"),
+        ("int8\n", 1, "neither 'type name' nor"),
+        ("int8 x\nint8 x\n", 2, "declared twice"),
+        ("int8 A=300\n", 1, "[300] is not a value of type int8"),
+        ("int8 x\n\ngeometry_msgs/Point p\n", 3, "generate_messages(DEPENDENCIES geometry_msgs)"),
+        ("std_msgs/Boool b\n", 1, "message type [std_msgs/Boool] not found; did you mean std_msgs/Bool"),
+        ("Ledd l\n", 1, "message type [p/Ledd] not found; did you mean p/Led?"),
+        ("int8 x\nLed l\n", 1, "contains itself"),
+    ],
+)
+def test_mistakes_in_a_message(scene: Scene, text: str, line: int, error: str) -> None:
+    folder = scene.messages("p", {"msg/Led.msg": text})
+    found = mistakes(scene)
+    assert error in found.text
+    if "itself" not in error:
+        assert (found.file, found.line) == (str(folder / "msg" / "Led.msg"), line)
+
+
+def test_mistakes_in_services_and_actions(scene: Scene) -> None:
+    folder = scene.messages("p", {"srv/S.srv": "int8 x\n---\nint8 y\nint9 z\n"})
+    assert str(mistakes(scene)).startswith(f"{folder / 'srv' / 'S.srv'}:4: ")
+    (folder / "srv" / "S.srv").write_text("int8 x\n")
+    error = mistakes(scene)
+    assert isinstance(error, DefinitionError)
+    assert "write request --- response" in error.text
+
+
+def test_an_action_needs_actionlib_msgs(scene: Scene) -> None:
+    scene.messages("p", {"action/A.action": "---\n---\n"})
+    assert "DEPENDENCIES actionlib_msgs" in mistakes(scene).text
+
+
+def test_two_packages_of_one_name(scene: Scene) -> None:
+    scene.package("p")
+    (scene.source / "more").mkdir()
+    (scene.source / "p").rename(scene.source / "more" / "q")
+    scene.package("p")
+    assert "two packages are called [p]" in mistakes(scene).text
+    (scene.source / "p" / "CATKIN_IGNORE").touch()
+    assert [plan.name for plan in read_plans(scene.source)] == ["p"]
+
+
+def test_packages_in_a_circle(scene: Scene) -> None:
+    scene.package("a", depends="b")
+    scene.package("b", depends="c")
+    scene.package("c", depends="a")
+    assert mistakes(scene).text == "packages depend on each other in a circle: a -> b -> c -> a"
+
+
+def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
+    folder = scene.package("p", "catkin_python_setup()", "", {"setup.py": "import nothing_of_this_name\n"})
+    assert str(mistakes(scene)) == (
+        f"{folder / 'setup.py'}:1: ModuleNotFoundError: No module named 'nothing_of_this_name'"
+    )
+    (folder / "setup.py").write_text(
+        "from setuptools import setup\nsetup(packages=['q'], package_dir={'': 'src'})\n"
+    )
+    assert "[q] is named, but there is no" in mistakes(scene).text
+    (folder / "setup.py").write_text("x = (\n")
+    assert mistakes(scene).line == 1
+    (folder / "CMakeLists.txt").unlink()
+    assert mistakes(scene).text == "package [p] has no CMakeLists.txt"
+    (folder / "package.xml").write_text("<package>\n<name>p</nam></package>")
+    error = mistakes(scene)
+    assert isinstance(error, ManifestError)
+    assert error.line == 2
+
+
+def test_warnings(scene: Scene) -> None:
+    folder = scene.package(
+        "p",
+        "find_package(catkin REQUIRED COMPONENTS rospy some_vendor_driver)\nadd_message_files(FILES A.msg)\n"
+        "generate_messages(DEPENDENCIES geometry_msgs)",
+        "",
+        {"msg/A.msg": "geometry_msgs/Point p\n", "srv/Left.srv": "---\n"},
+    )
+    assert scene.build()["p"].warnings == (
+        f"{folder / 'CMakeLists.txt'}:3: package [some_vendor_driver] is not installed; going on without it",
+        f"{folder / 'srv' / 'Left.srv'} is not built: no add_service_files() names it",
+        f"{folder / 'package.xml'}: messages of [p] contain types of [geometry_msgs]: add <depend>geometry_msgs</depend>",
+    )
+
+
+# --- the command
+
+
+def test_the_command(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package("cpp", "add_executable(talker t.cpp)")
+    assert catkin_make(["-C", str(scene.root), "-j4", "-DCMAKE_BUILD_TYPE=Release"]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[1:] == [
+        f"Source space: {scene.source}",
+        f"Build space: {scene.root / 'build'}",
+        f"Devel space: {scene.devel}",
+        f"Install space: {scene.root / 'install'}",
+        f'Creating file "{scene.source / "CMakeLists.txt"}"',
+        "[ 50%] cpp: nothing to generate",
+        "       cpp: skipped, they need a C++ compiler: talker",
+        "[100%] led_msgs: 1 message",
+    ]
+    assert said.err == ""
+    assert find_workspace(scene.source / "cpp") == scene.root
+    assert catkin_make(["-C", str(scene.root), "--pkg", "led_msgs"]) == 0
+    assert "[100%] led_msgs: up to date" in capsys.readouterr().out
+    assert catkin_make(["-C", str(scene.root), "clean"]) == 0
+    assert not scene.devel.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [
+        (["-C", "nowhere"], 2, "there is no folder nowhere"),
+        (["--nonsense"], 2, "unrecognized arguments: --nonsense"),
+        (["led_msg"], 1, "package [led_msg] not found; did you mean led_msgs?"),
+        (["--source", "source"], 1, "The specified source space does not exist"),
+    ],
+)
+def test_typed_wrong(
+    scene: Scene,
+    words: list[str],
+    status: int,
+    text: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(scene.root)
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    assert catkin_make(words) == status
+    error = capsys.readouterr().err
+    assert error.startswith("catkin_make: ERROR: ")
+    assert text in error
+    assert error.count("\n") == 1
+
+
+def test_not_in_the_package(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = scene.package("p")
+    assert catkin_make(["-C", str(folder)]) == 1
+    assert "run catkin_make in the folder above src" in capsys.readouterr().err
+
+
+def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package(
+        "p",
+        "if(CATKIN_ENABLE_TESTING)\ncatkin_add_nosetests(test)\nendif()",
+        "",
+        {"test/test_led.py": "from led_msgs.msg import Led\ndef test_led():\n    assert Led().number == 0\n"},
+    )
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0
+    assert "1 passed" in capfd.readouterr().out
+    (scene.source / "p" / "test" / "test_led.py").write_text("def test_led():\n    assert False\n")
+    assert catkin_make(["-C", str(scene.root), "run_tests_p"]) == 1
+    assert "1 test targets, with failures" in capfd.readouterr().out
+
+
+def test_install(scene: Scene) -> None:
+    folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package(
+        "tools",
+        "catkin_python_setup()\ncatkin_install_python(PROGRAMS scripts/run.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})\n"
+        "install(DIRECTORY launch/ DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/launch\n"
+        '  FILES_MATCHING PATTERN "*.launch" PATTERN "old" EXCLUDE)\n'
+        "install(FILES a.yaml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION} RENAME b.yaml)",
+        "",
+        {
+            "setup.py": SETUP.format("packages=['tools'], package_dir={'': 'src'}"),
+            "src/tools/__init__.py": "VALUE = 3\n",
+            "scripts/run.py": "#!/usr/bin/env python\n",
+            "launch/x.launch": "<launch/>",
+            "launch/x.txt": "",
+            "launch/old/y.launch": "<launch/>",
+            "a.yaml": "{}",
+        },
+    )
+    assert catkin_make(["-C", str(scene.root), "install"]) == 0
+    installed = scene.root / "install"
+    found = {path.relative_to(installed).as_posix() for path in installed.rglob("*") if path.is_file()}
+    assert {name for name in found if "/" in name} == {
+        "lib/python3/dist-packages/led_msgs/__init__.py",
+        "lib/python3/dist-packages/led_msgs/msg/__init__.py",
+        "lib/python3/dist-packages/led_msgs/msg/_Led.py",
+        "lib/python3/dist-packages/tools/__init__.py",
+        "lib/tools/run.py",
+        "share/led_msgs/msg/Led.msg",
+        "share/led_msgs/package.xml",
+        "share/tools/b.yaml",
+        "share/tools/launch/x.launch",
+        "share/tools/package.xml",
+    }
+    for path in sorted(folder.rglob("*"), reverse=True):
+        path.rmdir() if path.is_dir() else path.unlink()
+    scene.modules = installed / "lib" / "python3" / "dist-packages"
+    assert (
+        python(scene, "import tools, led_msgs.msg; print(tools.VALUE, led_msgs.msg.Led().number)") == "3 0\n"
+    )

@@ -1,0 +1,362 @@
+"""workspace/shell: the functions and TAB in real shells; one that is not installed is skipped."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import minirospy
+
+SHELL = Path(minirospy.__file__).parent / "workspace" / "shell"
+BIN = Path(sys.executable).parent
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells of POSIX systems")
+
+
+class Result(NamedTuple):
+    """How a script ended, and what it printed."""
+
+    status: int
+    out: list[str]
+    err: str
+
+
+class Shell:
+    """A shell that has sourced our file, in a workspace with the package ``my_robot``."""
+
+    def __init__(self, name: str, root: Path) -> None:
+        self.name = name
+        self.root = root
+        self.package = root / "src" / "my_robot"
+        self.environ = {
+            "PATH": os.pathsep.join([str(root / "bin"), str(BIN), "/usr/bin", "/bin"]),
+            "HOME": str(root),
+            "ROS_PACKAGE_PATH": str(root / "src"),
+            "ROS_MASTER_URI": "http://localhost:1",
+            "EDITOR": "echo EDIT",
+        }
+
+    def run(self, script: str, stdin: str = "", **environ: str) -> Result:
+        """Run a script; it starts in the workspace."""
+        file = SHELL / ("ros.fish" if self.name == "fish" else "ros.bash")
+        bare = {"bash": ["--norc", "--noprofile"], "zsh": ["-f"], "fish": ["--no-config"]}[self.name]
+        done = subprocess.run(
+            [self.name, *bare, "-c", f". {file}\n{script}"],
+            check=False,
+            input=stdin,
+            cwd=self.root,
+            env={**self.environ, **environ},
+            capture_output=True,
+            text=True,
+            timeout=30,
+        )
+        return Result(done.returncode, done.stdout.splitlines(), done.stderr)
+
+
+def make_workspace(root: Path) -> None:
+    package = root / "src" / "my_robot"
+    for folder in ("scripts", "launch", "config", "deep/er", ".git"):
+        (package / folder).mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>my_robot</name></package>")
+    for folder in ("scripts", "deep/er", ".git"):
+        (package / folder / "talker.py").write_text("#!/usr/bin/env python3\n")
+    (package / "config" / "a map.yaml").write_text("{}\n")
+    (package / "launch" / "all.launch").write_text('<launch><arg name="rate" default="10"/></launch>')
+    (root / "devel").mkdir()
+    (root / "devel" / "setup.bash").touch()
+    if not (BIN / "rospack").exists():
+        (root / "bin").mkdir()
+        stand_in = root / "bin" / "rospack"
+        stand_in.write_text(
+            f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.rospack import main\nsys.exit(main())\n"
+        )
+        stand_in.chmod(0o755)
+
+
+@pytest.fixture(params=["bash", "zsh", "fish"])
+def shell(request: pytest.FixtureRequest, tmp_path: Path) -> Shell:
+    """Each shell in turn."""
+    if not shutil.which(request.param):
+        pytest.skip(f"{request.param} is not installed")
+    make_workspace(tmp_path)
+    return Shell(request.param, tmp_path)
+
+
+@pytest.fixture
+def bash(tmp_path: Path) -> Shell:
+    """bash alone."""
+    if not shutil.which("bash"):
+        pytest.skip("bash is not installed")
+    make_workspace(tmp_path)
+    return Shell("bash", tmp_path)
+
+
+# --- roscd
+
+
+def test_roscd(shell: Shell) -> None:
+    assert shell.run("roscd my_robot; pwd") == (0, [str(shell.package)], "")
+    assert shell.run("roscd my_robot/deep/er; pwd") == (0, [str(shell.package / "deep" / "er")], "")
+
+
+def test_roscd_alone_goes_to_devel_and_from_there_to_src(shell: Shell) -> None:
+    prefixes = f"/nowhere:{shell.root}/devel:/usr"
+    script = "cd /; roscd; pwd; cd ..; cd src; pwd"
+    expected = [str(shell.root / "devel"), str(shell.root / "src")]
+    assert shell.run(script, CMAKE_PREFIX_PATH=prefixes) == (0, expected, "")
+
+
+def test_roscd_alone_goes_to_ros_workspace_first(shell: Shell) -> None:
+    variables = {"CMAKE_PREFIX_PATH": f"{shell.root}/devel", "ROS_WORKSPACE": str(shell.root / "src")}
+    assert shell.run("roscd; pwd", **variables).out == [str(shell.root / "src")]
+
+
+def test_roscd_alone_without_a_workspace(shell: Shell) -> None:
+    done = shell.run("roscd", CMAKE_PREFIX_PATH="/usr:/nowhere")
+    assert done.status == 1
+    assert done.err.startswith("roscd: ERROR: no workspace: source its devel/setup.")
+    assert shell.run("roscd").status == 1
+
+
+def test_roscd_to_an_unknown_package_names_the_nearest(shell: Shell) -> None:
+    done = shell.run("roscd my_robt")
+    assert (done.status, done.out) == (1, [])
+    assert len(done.err.splitlines()) == 1
+    assert done.err.startswith("roscd: ERROR: package 'my_robt' not found; did you mean my_robot")
+
+
+def test_roscd_to_what_is_no_folder(shell: Shell) -> None:
+    done = shell.run("roscd my_robot/nothing")
+    assert (done.status, done.err) == (1, f"roscd: ERROR: there is no folder {shell.package}/nothing\n")
+
+
+def test_roscd_to_the_logs(shell: Shell) -> None:
+    (shell.root / "logs").mkdir()
+    assert shell.run("roscd log; pwd", ROS_LOG_DIR=str(shell.root / "logs")).out == [str(shell.root / "logs")]
+
+
+@pytest.mark.parametrize("command", ["roscd", "rosed", "roscp", "rospd", "rosls"])
+def test_usage(shell: Shell, command: str) -> None:
+    done = shell.run(f"{command} --help")
+    assert (done.status, done.err) == (0, "")
+    assert done.out[0].startswith(f"usage: {command} ")
+    wrong = shell.run(f"{command} a b c d")
+    assert (wrong.status, wrong.out) == (2, [])
+    assert wrong.err.startswith(f"usage: {command} ")
+
+
+@pytest.mark.parametrize("command", ["rosls nobody", "rosed nobody x", "roscp nobody x y", "rospd nobody"])
+def test_every_command_complains_of_an_unknown_package(shell: Shell, command: str) -> None:
+    done = shell.run(command)
+    assert (done.status, done.out) == (1, [])
+    assert done.err.startswith(f"{command.split(maxsplit=1)[0]}: ERROR: package 'nobody' not found")
+
+
+# --- rosls, rosed, roscp
+
+
+def test_rosls(shell: Shell) -> None:
+    assert shell.run("rosls my_robot") == (0, ["config", "deep", "launch", "package.xml", "scripts"], "")
+    assert shell.run("rosls my_robot/config").out == ["a map.yaml"]
+    assert "-rw" in shell.run("rosls -l my_robot/config").out[1]
+    assert "-rw" in shell.run("rosls my_robot/config -l").out[1]
+
+
+def test_rosed(shell: Shell) -> None:
+    expected = (0, [f"EDIT {shell.package}/launch/all.launch"], "")
+    assert shell.run("rosed my_robot all.launch") == expected
+    assert shell.run("rosed my_robot launch/all.launch") == expected
+    done = shell.run("rosed my_robot nothing.py")
+    expected_complaint = f"there is no file nothing.py in package [my_robot], which is in {shell.package}"
+    assert (done.status, done.err) == (1, f"rosed: ERROR: {expected_complaint}\n")
+
+
+def test_rosed_asks_which_of_many(shell: Shell) -> None:
+    done = shell.run("rosed my_robot talker.py", stdin="x\n2\n")
+    assert done.out[-1].endswith(f"EDIT {shell.package}/scripts/talker.py")
+    assert "You have chosen a non-unique filename" in done.err
+    assert ".git" not in done.err
+    assert shell.run("rosed my_robot talker.py", stdin="").status == 1
+
+
+def test_rosed_with_a_file_whose_name_has_a_blank(shell: Shell) -> None:
+    script = "rosed my_robot 'a map.yaml'"
+    assert shell.run(script, EDITOR="cat").out == ["{}"]
+
+
+def test_rosed_without_editor_says_so(bash: Shell) -> None:
+    done = bash.run(
+        f"PATH={bash.root}/bin; _ros_find() {{ echo {bash.package}; }}; rosed my_robot package.xml", EDITOR=""
+    )
+    assert (done.status, done.err) == (1, "rosed: ERROR: no editor is installed: set EDITOR to yours\n")
+
+
+def test_roscp(shell: Shell) -> None:
+    assert shell.run("roscp my_robot all.launch copy.launch") == (0, [], "")
+    assert (shell.root / "copy.launch").read_bytes() == (shell.package / "launch" / "all.launch").read_bytes()
+    done = shell.run("roscp my_robot nothing copy")
+    assert done.status == 1
+    assert done.err.startswith("roscp: ERROR: there is no file nothing in package [my_robot]")
+
+
+# --- rospd and rosd
+
+
+def test_the_stack(shell: Shell) -> None:
+    root, package = str(shell.root), str(shell.package)
+    assert shell.run("rosd").out == [f"0 {root}"]
+    assert shell.run("rospd").out == [f"0 {root}", f"1 {root}"]
+    assert shell.run("rospd my_robot; pwd").out == [f"0 {package}", f"1 {root}", package]
+    turned = shell.run("rospd my_robot >/dev/null; rospd my_robot/deep >/dev/null; rospd 2; pwd")
+    assert turned.out == [f"0 {root}", f"1 {package}/deep", f"2 {package}", root]
+
+
+def test_the_stack_has_no_such_number(shell: Shell) -> None:
+    done = shell.run("rospd my_robot >/dev/null; rospd 7")
+    assert (done.status, done.out, done.err) == (
+        1,
+        [],
+        "rospd: ERROR: the stack has no number 7: rosd shows it\n",
+    )
+
+
+# --- TAB
+
+
+def bash_tab(bash: Shell, line: str, words: list[str] | None = None) -> list[str]:
+    """What bash is given for a TAB at the end of ``line``; ``words``: as bash takes it apart."""
+    words = line.split(" ") if words is None else words
+    array = " ".join(f"{word!r}" for word in words)
+    done = bash.run(
+        f"""
+        COMP_LINE={line!r}; COMP_POINT=${{#COMP_LINE}}
+        COMP_WORDS=({array}); COMP_CWORD={len(words) - 1}
+        function=$(complete -p {words[0]} | sed 's/.*-F \\([^ ]*\\) .*/\\1/')
+        "$function" {words[0]} "${{COMP_WORDS[COMP_CWORD]}}"
+        printf '<%s>\\0' "${{COMPREPLY[@]}}"
+        """
+    )
+    assert not done.err
+    found = "\n".join(done.out).split("\0")[:-1]
+    return [] if found == ["<>"] else [text[1:-1] for text in found]
+
+
+def test_bash_tab(bash: Shell) -> None:
+    assert bash_tab(bash, "roscd my_") == ["my_robot/"]
+    assert bash_tab(bash, "roscd my_robot/d") == ["my_robot/deep/"]
+    assert bash_tab(bash, "rosrun my_") == ["my_robot "]
+    assert bash_tab(bash, "rosrun my_robot ") == ["talker.py "]
+    assert bash_tab(bash, "roslaunch my_robot ") == ["all.launch "]
+    assert bash_tab(bash, "roslaunch my_robot all.launch ") == ["rate:="]
+    assert bash_tab(bash, "rostopic ec") == ["echo "]
+    assert bash_tab(bash, "minirospy topic ec") == ["echo "]
+    assert bash_tab(bash, "rostopic echo ") == []
+    assert bash_tab(bash, "rosmsg show std_msgs/Boo") == ["std_msgs/Bool "]
+
+
+def test_bash_takes_words_apart_at_colons(bash: Shell) -> None:
+    line = "roslaunch my_robot all.launch rate:="
+    assert bash_tab(bash, line, ["roslaunch", "my_robot", "all.launch", "rate", ":="]) == ["10 "]
+    words = ["roslaunch", "my_robot", "all.launch", "rate", ":=", "1"]
+    assert bash_tab(bash, line + "1", words) == ["10 "]
+    words = ["roslaunch", "my_robot", "all.launch", "a", ":=", "5", "r"]
+    assert bash_tab(bash, "roslaunch my_robot all.launch a:=5 r", words) == ["rate:="]
+
+
+def test_bash_inserts_a_message(bash: Shell) -> None:
+    assert bash_tab(bash, "rostopic pub /t std_msgs/Bool ") == ['"data: false" ']
+    assert bash_tab(bash, "rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\ny: 0.0\nz: 0.0" ']
+    # readline closes the quote.
+    assert bash_tab(bash, 'rostopic pub /t std_msgs/Bool "da') == ["data: false"]
+
+
+def test_bash_knows_every_command(bash: Shell) -> None:
+    registered = "\n".join(bash.run("complete -p").out)
+    for command in (
+        "roscd",
+        "rospd",
+        "roscore",
+        "rosservice",
+        "rosparam",
+        "rossrv",
+        "rospack",
+        "catkin_make",
+    ):
+        assert f"_ros_complete_bash {command}" in registered
+
+
+def test_tab_without_minirospy_is_silent(bash: Shell) -> None:
+    done = bash.run("PATH=/nowhere; _ros_candidates 1 rostopic e; echo ${#_ros_found[@]}")
+    assert (done.out, done.err) == (["0"], "")
+
+
+def zsh_or_skip(tmp_path: Path) -> Shell:
+    if not shutil.which("zsh"):
+        pytest.skip("zsh is not installed")
+    make_workspace(tmp_path)
+    return Shell("zsh", tmp_path)
+
+
+def test_zsh_tab(tmp_path: Path) -> None:
+    zsh = zsh_or_skip(tmp_path)
+    # Outside of its line editor zsh has no compadd: one that prints takes its place.
+    script = """
+    compadd() { for last; do :; done; for each in "${(@P)last}"; do print -r -- "$*:$each"; done }
+    tab() { words=("$@"); CURRENT=${#words}; _ros_complete_zsh }
+    tab roscd my_; tab rosrun my_robot ''; tab roslaunch my_robot all.launch rate:=
+    tab rostopic pub /t geometry_msgs/Point ''; tab rostopic pub /t std_msgs/Bool '"'
+    print ${_comps[roscd]} ${_comps[rostopic]}
+    """
+    assert zsh.run(script) == (
+        0,
+        [
+            "-Q -S  -a partial:my_robot/",
+            "-Q -a ready:talker.py",
+            "-Q -a ready:rate:=10",
+            '-Q -a ready:"x: 0.0',
+            "y: 0.0",
+            'z: 0.0"',
+            "-Q -a ready:data: false",
+            "_ros_complete_zsh _ros_complete_zsh",
+        ],
+        "",
+    )
+
+
+def test_fish_tab(tmp_path: Path) -> None:
+    if not shutil.which("fish"):
+        pytest.skip("fish is not installed")
+    make_workspace(tmp_path)
+    fish = Shell("fish", tmp_path)
+    lines = (
+        "roscd my_",
+        "rosrun my_robot ",
+        "roslaunch my_robot all.launch rate:=",
+        "rostopic pub /t std_msgs/Bool ",
+        "rostopic pub /t geometry_msgs/Point ",
+        "rostopic echo ",
+    )
+    done = fish.run("\n".join(f"complete -C '{line}'" for line in lines))
+    assert done == (0, ["my_robot/", "talker.py", "rate:=10", "data: false", "{x: 0.0, y: 0.0, z: 0.0}"], "")
+    assert fish.run("set PATH /nowhere; complete -C 'rostopic e'").err == ""
+
+
+# --- the files themselves
+
+
+@pytest.mark.skipif(not shutil.which("shellcheck"), reason="shellcheck is not installed")
+def test_shellcheck() -> None:
+    done = subprocess.run(["shellcheck", SHELL / "ros.bash"], check=False, capture_output=True, text=True)
+    assert done.stdout == ""
+
+
+def test_lines_of_the_batch_file_end_as_cmd_needs_them() -> None:
+    # cmd.exe misses labels in a file whose lines end in a line feed alone.
+    text = (SHELL / "ros.bat").read_bytes()
+    assert text.count(b"\r\n") == text.count(b"\n") > 0
