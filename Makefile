@@ -30,6 +30,7 @@ interop: $(STAMP)
 
 bench: $(STAMP)
 	@$(BIN)/python benchmarks/run.py
+	@$(BIN)/python benchmarks/messages.py
 
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .

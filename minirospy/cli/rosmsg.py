@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.cli.command import Parser
 from minirospy.cli.verbs import Family, Verb
+from minirospy.errors import UsageError
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 if TYPE_CHECKING:
@@ -36,7 +37,13 @@ def _show(command: str, kind: Kind, argv: Sequence[str]) -> None:
     parser.add_argument(
         "-r", "--raw", action="store_true", help="print the definition's own text, with comments"
     )
+    if kind is Kind.MESSAGE:
+        parser.add_argument(
+            "-b", "--bag", metavar="BAGFILE", help="not here: types are read from packages alone"
+        )
     options = parser.parse_args(argv)
+    if getattr(options, "bag", None):
+        raise UsageError("-b: types are read from packages alone, bags are not")
     interfaces = _interfaces(kind)
     for type_ in interfaces.find(options.type):
         if "/" not in options.type:

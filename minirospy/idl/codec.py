@@ -245,10 +245,8 @@ class _Writer:
     def _bytes(self, leaf: _Leaf) -> str:
         name = self._source.local(leaf.path.rpartition(".")[2])
         self._line(f"{name} = {leaf.path}")
-        with self._source.block(f"if isinstance({name}, (list, tuple)):"):
-            self._line(f"{name} = bytes({name})")
-        with self._source.block(f"elif isinstance({name}, str):"):
-            self._line(f'raise TypeError("a {leaf.type.base}[] is bytes, not a str")')
+        with self._source.block(f"if not isinstance({name}, bytes):"):
+            self._line(f"{name} = {self._source.use('_octets')}({name})")
         return name
 
     def _tail(self, leaf: _Leaf, name: str) -> None:

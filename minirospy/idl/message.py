@@ -74,6 +74,18 @@ class Message:
         """Read this message from bytes."""
         return self
 
+    def serialize_numpy(self, buff: Any, numpy: Any) -> None:
+        """Write this message, whose arrays may be numpy arrays, to ``buff``."""
+        self.serialize(buff)
+
+    def deserialize_numpy(self, data: Any, numpy: Any) -> Message:
+        """Read this message from bytes; arrays of numbers become numpy arrays."""
+        from minirospy.idl.arrays import arrays_from_bytes
+
+        self.deserialize(data)
+        arrays_from_bytes(self, numpy)
+        return self
+
     def __getstate__(self) -> list[Any]:
         return [getattr(self, name) for name in self.__slots__]
 

@@ -163,7 +163,7 @@ def test_exports_of_a_metapackage() -> None:
 )
 def test_what_is_no_manifest(text: str, why: str) -> None:
     with pytest.raises(ManifestError, match=re.escape(why)):
-        parse_manifest(text, Path("p.xml"))
+        parse_manifest(text.encode(), Path("p.xml"))
 
 
 @pytest.mark.parametrize(

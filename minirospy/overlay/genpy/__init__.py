@@ -1,5 +1,9 @@
 """genpy, filled in by minirospy: what generated messages and user code import of it."""
 
+from genpy import base as base
+from genpy import message as message
+from genpy import rostime as rostime
+from minirospy.idl.genpy import register_unicode_errors, struct_I
 from minirospy.idl.message import DeserializationError, Message, MessageException, SerializationError
 from minirospy.times import Duration, Time, TVal
 
@@ -11,4 +15,7 @@ __all__ = [
     "SerializationError",
     "TVal",
     "Time",
+    "struct_I",
 ]
+
+register_unicode_errors()

@@ -1,5 +1,13 @@
 """genpy.message, filled in by minirospy."""
 
+from minirospy.idl.genpy import (
+    RosMsgUnicodeErrors,
+    get_message_class,
+    get_service_class,
+    is_simple,
+    isstring,
+    struct_I,
+)
 from minirospy.idl.message import (
     DeserializationError,
     Message,
@@ -10,14 +18,24 @@ from minirospy.idl.message import (
     get_printable_message_args,
     strify_message,
 )
+from minirospy.times import Duration, Time, TVal
 
 __all__ = [
     "DeserializationError",
+    "Duration",
     "Message",
     "MessageException",
+    "RosMsgUnicodeErrors",
     "SerializationError",
+    "TVal",
+    "Time",
     "check_type",
     "fill_message_args",
+    "get_message_class",
     "get_printable_message_args",
+    "get_service_class",
+    "is_simple",
+    "isstring",
     "strify_message",
+    "struct_I",
 ]

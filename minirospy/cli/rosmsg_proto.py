@@ -1,0 +1,77 @@
+"""rosmsg-proto: a message or request of default values as YAML, for completion in shells and editors.
+
+Source: `rosmsg-proto -h` of ROS 1, whose text and exit statuses these are. `-e` and `-x` of the real one are left out.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from minirospy.cli.command import Parser, run
+from minirospy.errors import DefinitionError, NotFoundError
+
+__all__ = ["main"]
+
+_INSUFFICIENT = 64
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status."""
+    return run("rosmsg-proto", lambda: _main(argv))
+
+
+def _main(argv: Sequence[str] | None) -> int:
+    parser = Parser("rosmsg-proto", description="Print a message or request of default values as YAML.")
+    parser.add_argument("mode", nargs="?", help="msg or srv")
+    parser.add_argument("type", nargs="?", help="pkg/Name, or the Name alone")
+    parser.add_argument("-f", "--flow_style", choices=("0", "1"), help="1: brackets everywhere; 0: nowhere")
+    parser.add_argument("-s", "--silent", action="store_true", help="print no errors")
+    parser.add_argument("-p", "--prefix", default="", help="what to print before each line")
+    parser.add_argument("-H", "--no-hyphens", action="store_true", help="no quotation marks around it all")
+    options = parser.parse_intermixed_args(argv)
+
+    def fail(status: int, text: str) -> int:
+        if options.silent:
+            return 0
+        print(text, file=sys.stderr)
+        return status
+
+    if options.type is None:
+        return fail(_INSUFFICIENT, "Insufficient arguments")
+    if options.mode not in ("msg", "srv"):
+        return fail(1, f"Invalid mode: .{options.mode}")
+    try:
+        text = _prototype(options.mode, options.type)
+    except (NotFoundError, DefinitionError) as error:
+        return fail(1, f"Unknown message class: {options.type} ({error})")
+    if options.flow_style:
+        text = _restyled(text, flow=options.flow_style == "1")
+    if options.prefix:
+        text = "\n".join(options.prefix + line for line in text.split("\n"))
+    print(text if options.no_hyphens else f'"{text}"')
+    return 0
+
+
+def _prototype(mode: str, name: str) -> str:
+    from minirospy.cli.complete import prototype
+    from minirospy.environment import Environment
+    from minirospy.idl.load import Catalogue
+    from minirospy.introspect.interfaces import Interfaces, Kind
+    from minirospy.workspace.packages import Packages
+
+    packages = Packages(Environment.read(host="localhost"))
+    (type_, *_) = Interfaces(packages, Kind(mode)).find(name)
+    catalogue = Catalogue(packages.folders())
+    if mode == "msg":
+        return prototype(catalogue.message(type_), catalogue)
+    services = catalogue.services(type_.partition("/")[0])
+    return next(prototype(each.request, catalogue) for each in services if each.full_name == type_)
+
+
+def _restyled(text: str, *, flow: bool) -> str:
+    import yaml
+
+    return str(yaml.safe_dump(yaml.safe_load(text), default_flow_style=flow, sort_keys=False)).removesuffix(
+        "\n"
+    )

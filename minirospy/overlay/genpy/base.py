@@ -1,0 +1,5 @@
+"""genpy.base, filled in by minirospy."""
+
+from minirospy.idl.genpy import SIMPLE_TYPES, SIMPLE_TYPES_DICT, MsgGenerationException, is_simple
+
+__all__ = ["SIMPLE_TYPES", "SIMPLE_TYPES_DICT", "MsgGenerationException", "is_simple"]

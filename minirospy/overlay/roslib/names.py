@@ -1,0 +1,77 @@
+"""roslib.names, filled in by minirospy: rosgraph's names, and those of resources (``package/name``)."""
+
+import re
+
+from rosgraph.names import (
+    ANYTYPE,
+    GLOBALNS,
+    PRIV_NAME,
+    REMAP,
+    SEP,
+    canonicalize_name,
+    get_ros_namespace,
+    is_global,
+    is_legal_base_name,
+    is_legal_name,
+    is_private,
+    make_global_ns,
+    namespace,
+    ns_join,
+    resolve_name,
+)
+
+from minirospy.names import anonymous_name
+
+__all__ = [
+    "ANYTYPE", "GLOBALNS", "PRIV_NAME", "PRN_SEPARATOR", "REMAP", "SEP", "TYPE_SEPARATOR", "anonymous_name",
+    "canonicalize_name", "get_ros_namespace", "is_global", "is_legal_base_name", "is_legal_name",
+    "is_legal_resource_base_name", "is_legal_resource_name", "is_private", "load_mappings", "make_caller_id",
+    "make_global_ns", "namespace", "ns_join", "package_resource_name", "resolve_name", "resource_name",
+    "resource_name_base", "resource_name_package",
+]  # fmt: skip
+
+PRN_SEPARATOR = TYPE_SEPARATOR = "/"
+
+
+def load_mappings(argv: list[str]) -> dict[str, str]:
+    """The remappings in a command line; private parameters (``_name:=value``) are none."""
+    pairs = [arg.split(REMAP, 1) for arg in argv if REMAP in arg]
+    return {old.strip(): new.strip() for old, new in pairs if not re.match(r"_[^_]", old.strip())}
+
+
+def make_caller_id(name: str) -> str:
+    """A global name in the namespace of the environment, with a slash at its end."""
+    return make_global_ns(ns_join(get_ros_namespace(), name))
+
+
+def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
+    """``package/name``, or the name alone in the package itself."""
+    return name if res_pkg_name == my_pkg else f"{res_pkg_name}{PRN_SEPARATOR}{name}"
+
+
+def resource_name_base(name: str) -> str:
+    """The name without its package."""
+    return name.rpartition(PRN_SEPARATOR)[2]
+
+
+def resource_name_package(name: str) -> str | None:
+    """The package of a name, or None."""
+    return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
+
+
+def package_resource_name(name: str) -> tuple[str, str]:
+    """(package, name); the package is empty where the name has none. Raises ValueError on two slashes."""
+    if name.count(PRN_SEPARATOR) > 1:
+        raise ValueError(f"invalid name [{name}]")
+    package, _, base = name.rpartition(PRN_SEPARATOR)
+    return package, base
+
+
+def is_legal_resource_name(name: str) -> bool:
+    """Whether a name is one of a resource, with or without its package."""
+    return name is not None and bool(re.match(r"^[A-Za-z][\w/]*$", name, re.ASCII)) and "//" not in name
+
+
+def is_legal_resource_base_name(name: str) -> bool:
+    """Whether a name is one of a resource without its package."""
+    return name is not None and bool(re.match(r"^[A-Za-z]\w*$", name, re.ASCII))

@@ -1,0 +1,37 @@
+"""roslib.packages, filled in by minirospy."""
+
+from minirospy.workspace.roslib import (
+    InvalidROSPkgException,
+    MultipleNodesException,
+    ROSPkgException,
+    find_node,
+    find_resource,
+    get_dir_pkg,
+    get_pkg_dir,
+    get_pkg_subdir,
+    list_pkgs_by_path,
+    resource_file,
+)
+from minirospy.workspace.rospkg import MANIFEST_FILE, PACKAGE_FILE
+
+__all__ = [
+    "MANIFEST_FILE",
+    "PACKAGE_FILE",
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "SRC_DIR",
+    "InvalidROSPkgException",
+    "MultipleNodesException",
+    "ROSPkgException",
+    "find_node",
+    "find_resource",
+    "get_dir_pkg",
+    "get_pkg_dir",
+    "get_pkg_subdir",
+    "list_pkgs_by_path",
+    "resource_file",
+]
+
+SRC_DIR = "src"
+ROS_ROOT = "ROS_ROOT"
+ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"

@@ -1,0 +1,51 @@
+"""rospkg, filled in by minirospy: where packages are, and what they need."""
+
+from minirospy.workspace.rospkg import (
+    MANIFEST_FILE,
+    PACKAGE_FILE,
+    STACK_FILE,
+    InvalidManifest,
+    Manifest,
+    ResourceNotFound,
+    RosPack,
+    RosStack,
+    expand_to_packages,
+    get_etc_ros_dir,
+    get_log_dir,
+    get_package_name,
+    get_ros_home,
+    get_ros_package_path,
+    get_ros_paths,
+    get_ros_root,
+    get_stack_version_by_dir,
+    get_test_results_dir,
+    list_by_path,
+    on_ros_path,
+    parse_manifest_file,
+)
+from rospkg import common as common
+from rospkg import environment as environment
+
+__all__ = [
+    "MANIFEST_FILE",
+    "PACKAGE_FILE",
+    "STACK_FILE",
+    "InvalidManifest",
+    "Manifest",
+    "ResourceNotFound",
+    "RosPack",
+    "RosStack",
+    "expand_to_packages",
+    "get_etc_ros_dir",
+    "get_log_dir",
+    "get_package_name",
+    "get_ros_home",
+    "get_ros_package_path",
+    "get_ros_paths",
+    "get_ros_root",
+    "get_stack_version_by_dir",
+    "get_test_results_dir",
+    "list_by_path",
+    "on_ros_path",
+    "parse_manifest_file",
+]

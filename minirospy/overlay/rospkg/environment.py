@@ -1,0 +1,36 @@
+"""rospkg.environment, filled in by minirospy: the names of variables, and what they say."""
+
+from minirospy.workspace.rospkg import (
+    get_etc_ros_dir,
+    get_log_dir,
+    get_ros_home,
+    get_ros_package_path,
+    get_ros_paths,
+    get_ros_root,
+    get_test_results_dir,
+    on_ros_path,
+)
+
+__all__ = [
+    "ROS_ETC_DIR",
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "ROS_TEST_RESULTS_DIR",
+    "get_etc_ros_dir",
+    "get_log_dir",
+    "get_ros_home",
+    "get_ros_package_path",
+    "get_ros_paths",
+    "get_ros_root",
+    "get_test_results_dir",
+    "on_ros_path",
+]
+
+ROS_ROOT = "ROS_ROOT"
+ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
+ROS_HOME = "ROS_HOME"
+ROS_ETC_DIR = "ROS_ETC_DIR"
+ROS_LOG_DIR = "ROS_LOG_DIR"
+ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"

@@ -1,0 +1,12 @@
+"""rospkg.manifest, filled in by minirospy."""
+
+from minirospy.workspace.rospkg import (
+    Depend,
+    Export,
+    InvalidManifest,
+    Manifest,
+    RosDep,
+    parse_manifest_file,
+)
+
+__all__ = ["Depend", "Export", "InvalidManifest", "Manifest", "RosDep", "parse_manifest_file"]

@@ -1,0 +1,5 @@
+"""rospy.numpy_msg, filled in by minirospy: message classes whose arrays are numpy arrays."""
+
+from minirospy.idl.arrays import numpy_class as numpy_msg
+
+__all__ = ["numpy_msg"]

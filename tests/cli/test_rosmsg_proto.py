@@ -1,0 +1,28 @@
+"""rosmsg-proto: messages of default values as YAML."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def test_messages_and_requests(command: Any) -> None:
+    assert command("rosmsg_proto", "msg", "std_msgs/String") == (0, "\"data: ''\"\n", "")
+    assert command("rosmsg_proto", "msg", "Vector3", "-H").out == "x: 0.0\ny: 0.0\nz: 0.0\n"
+    assert command("rosmsg_proto", "srv", "-p", "> ", "-H", "SetBool").out == "> data: false\n"
+    assert command("rosmsg_proto", "msg", "-f1", "Vector3").out == '"{x: 0.0, y: 0.0, z: 0.0}"\n'
+
+
+def test_errors(command: Any) -> None:
+    assert command("rosmsg_proto") == (64, "", "Insufficient arguments\n")
+    assert command("rosmsg_proto", "xx", "String") == (1, "", "Invalid mode: .xx\n")
+    result = command("rosmsg_proto", "msg", "std_msgs/Bol")
+    assert (result.status, result.out) == (1, "")
+    assert result.err.startswith(
+        "Unknown message class: std_msgs/Bol (message type [std_msgs/Bol] not found; did you mean"
+    )
+    assert command("rosmsg_proto", "-s", "msg", "std_msgs/Bol") == (0, "", "")
+
+
+def test_bags_are_refused(command: Any) -> None:
+    result = command("rosmsg", "show", "-b", "x.bag", "std_msgs/Bool")
+    assert result == (2, "", "rosmsg: ERROR: -b: types are read from packages alone, bags are not\n")

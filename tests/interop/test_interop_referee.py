@@ -1,0 +1,26 @@
+"""The cases of tests/referee under real rospy: what is recorded there is what it prints.
+
+`RECORD=1 pytest tests/interop/test_interop_referee.py` writes the records anew.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "referee"))
+from run_case import CASES, recorded, run_case
+
+sys.path.pop(0)
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("name", CASES)
+def test_the_record_is_what_real_rospy_prints(name: str, real_master: str, tmp_path: Path) -> None:
+    said = run_case(name, "/usr/bin/python3", real_master, tmp_path)
+    if os.environ.get("RECORD"):
+        recorded(name).write_text(said)
+    assert said == recorded(name).read_text()

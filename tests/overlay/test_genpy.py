@@ -1,0 +1,148 @@
+"""genpy as user code and generated modules import it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import genpy
+import genpy.base
+import genpy.dynamic
+import genpy.message
+import genpy.rostime
+import pytest
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool, Header, String
+from std_srvs.srv import SetBool
+
+from minirospy.errors import DefinitionError
+from minirospy.idl.load import Catalogue, class_from_text, message_class, service_class
+
+ROOT = Path(__file__).parents[2]
+
+
+def wire(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def test_submodules_are_there_after_import_genpy() -> None:
+    code = "import genpy; print(genpy.message.Message is genpy.Message, genpy.rostime.Time is genpy.Time)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "True True\n"
+
+
+def test_what_generated_modules_need() -> None:
+    assert genpy.struct_I.pack(1) == b"\1\0\0\0"
+    assert genpy.message.struct_I is genpy.struct_I
+    assert issubclass(genpy.SerializationError, genpy.MessageException)
+
+
+def test_the_error_handler_that_modules_of_real_genpy_name(caplog: pytest.LogCaptureFixture) -> None:
+    import codecs
+
+    handler: Any = codecs.lookup_error("rosmsg")
+    handler.msg_type = "test/Text"
+    assert b"a\xff\xfeb".decode("utf-8", "rosmsg") == "a\ufffd\ufffdb"
+    assert b"\xff".decode("utf-8", "rosmsg") == "\ufffd"
+    assert [record.message.split(":")[0] for record in caplog.records] == [
+        "Characters replaced when decoding message test/Text (will print only once)"
+    ]
+
+
+def test_dynamic_classes() -> None:
+    made = genpy.dynamic.generate_dynamic("sensor_msgs/LaserScan", LaserScan._full_text)
+    assert sorted(made) == ["sensor_msgs/LaserScan", "std_msgs/Header"]
+    scan = made["sensor_msgs/LaserScan"]
+    assert (scan._type, scan._md5sum, scan._full_text) == (
+        LaserScan._type,
+        LaserScan._md5sum,
+        LaserScan._full_text,
+    )
+    assert scan._has_header
+    assert type(scan().header) is made["std_msgs/Header"]
+    assert made["std_msgs/Header"]._md5sum == Header._md5sum
+
+
+@pytest.mark.parametrize(
+    ("type_", "text", "why"),
+    [
+        ("x/Y", "int32", "neither"),
+        ("x/Y", "z/Foo f\n", r"lacks \[z/Foo\]"),
+        ("Y", "int32 a\n", "not of the form package/Type"),
+        ("/Y", "int32 a\n", "not of the form package/Type"),
+        ("x/Y", "x/Y y\n", "contains itself"),
+    ],
+)
+def test_texts_that_make_no_class(type_: str, text: str, why: str) -> None:
+    with pytest.raises(DefinitionError, match=why):
+        genpy.dynamic.generate_dynamic(type_, text)
+
+
+@pytest.mark.parametrize("text", ["int32 a", "int32 a\n", "\n# a\r\nint32 a # b\n\n", "int32 A=1\nint32 a\n"])
+def test_the_full_text_is_kept_as_it_came(text: str) -> None:
+    assert class_from_text("x/Y", text)._full_text == text
+
+
+def all_types() -> list[Any]:
+    catalogue = Catalogue.below(ROOT / "msgs")
+    found = []
+    for package in catalogue.packages:
+        found += [message_class(spec.full_name) for spec in catalogue.messages(package)]
+        services = [service_class(spec.full_name) for spec in catalogue.services(package)]
+        found += [each for srv in services for each in (srv._request_class, srv._response_class)]
+    return found
+
+
+def test_every_type_as_a_class_made_at_run_time() -> None:
+    types = all_types()
+    assert len(types) > 200
+    for installed in types:
+        made = class_from_text(installed._type, installed._full_text)
+        assert made._md5sum == installed._md5sum, installed._type
+        assert made._full_text == installed._full_text
+        assert made.__slots__ == installed.__slots__
+        assert made._slot_types == installed._slot_types
+        assert repr(made()) == repr(installed())
+        assert wire(made()) == wire(installed())
+        assert repr(made().deserialize(wire(installed()))) == repr(installed())
+
+
+def test_classes_by_name() -> None:
+    assert genpy.message.get_message_class("std_msgs/Bool") is Bool
+    assert genpy.message.get_message_class("Header") is Header
+    assert genpy.message.get_message_class("std_msgs/Bool", reload_on_error=True) is Bool
+    assert genpy.message.get_message_class("std_msgs/Nope") is None
+    assert genpy.message.get_message_class("nope/Nope") is None
+    assert genpy.message.get_service_class("std_srvs/SetBool") is SetBool
+    assert genpy.message.get_service_class("std_msgs/Bool") is None
+    with pytest.raises(ValueError, match="message type is missing package name: Bool"):
+        genpy.message.get_message_class("Bool")
+    with pytest.raises(ValueError, match=r"invalid name \[std_msgs/msg/Bool\]"):
+        genpy.message.get_message_class("std_msgs/msg/Bool")
+
+
+def test_small_things() -> None:
+    assert genpy.message.isstring("a")
+    assert genpy.message.isstring(b"a")
+    assert not genpy.message.isstring(1)
+    assert genpy.base.is_simple("int32")
+    assert not genpy.base.is_simple("string")
+    assert not genpy.base.is_simple("int32[]")
+    assert genpy.base.SIMPLE_TYPES[:3] == ["int8", "uint8", "bool"]
+    assert genpy.message.get_printable_message_args(PoseStamped(), prefix="a.").startswith(
+        "a.header.seq a.header.stamp "
+    )
+
+
+def test_filling_and_showing() -> None:
+    text = String()
+    genpy.message.fill_message_args(text, ["hello"])
+    assert genpy.message.strify_message(text) == 'data: "hello"'
+    genpy.message.check_type("data", "string", text.data)
+    with pytest.raises(genpy.SerializationError):
+        genpy.message.check_type("data", "int8", 300)

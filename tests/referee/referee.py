@@ -1,0 +1,91 @@
+"""What the cases in this folder print with. It runs under real rospy as well as under ours: only public names of rospy.
+
+A case is a program of a user; what it prints is the same under both, line for line, once numbers that no two runs share
+(ports, process ids, times of the wall clock, temporary folders) are replaced by a word.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+_MASKS = [
+    (re.compile(r"http://[\w.-]+:\d+/?"), "<uri>"),
+    (re.compile(r"rosrpc://[\w.-]+:\d+"), "<rosrpc>"),
+    (re.compile(r"(?:127\.0\.0\.1|localhost)(?:'?, |:)\d+"), "<address>"),
+    (re.compile(r"_\d+_\d{13}"), "<anonymous>"),
+    (re.compile(r"\b1[5-9]\d{8}\.\d+"), "<time>"),
+    (re.compile(r"0x[0-9a-f]{6,}"), "<id>"),
+    (re.compile(r"/tmp/[\w./-]+"), "<file>"),
+]
+_lock = threading.Lock()
+
+
+def show(*values: object) -> None:
+    """Print a line, with what differs between two runs replaced."""
+    text = " ".join(map(str, values))
+    for pattern, word in _MASKS:
+        text = pattern.sub(word, text)
+    with _lock:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+
+
+def outcome(label: str, call: Callable[[], Any]) -> None:
+    """Show what a call gives: its value, or the type and text of what it raises."""
+    try:
+        value = call()
+    except Exception as error:  # noqa: BLE001 - whatever it is
+        show(label, "raises", type(error).__name__, "|", str(error))
+    else:
+        show(label, "gives", repr(value))
+
+
+class Other:
+    """Another program of the same stack: ``code`` runs in it; ``read()`` gives its next line, ``close()`` ends it."""
+
+    def __init__(self, code: str, *arguments: str, environment: dict[str, str] | None = None) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", code, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **(environment or {})},
+        )
+
+    def read(self) -> str:
+        """The next line that it prints."""
+        assert self.process.stdout
+        return self.process.stdout.readline().rstrip("\n")
+
+    def close(self, seconds: float = 10.0) -> int:
+        """Close its input, and interrupt it where that does not end it; its exit status."""
+        assert self.process.stdin
+        assert self.process.stdout
+        self.process.stdin.close()
+        try:
+            self.process.wait(0.2)
+        except subprocess.TimeoutExpired:
+            self.process.terminate()
+        try:
+            return self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait()
+        finally:
+            self.process.stdout.close()
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+    """Whether a condition holds within some time."""
+    waiting = threading.Event()
+    for _ in range(int(seconds / 0.02)):
+        if condition():
+            return True
+        waiting.wait(0.02)
+    return False

@@ -1,0 +1,42 @@
+"""Running a case: its program under one stack, against a master, and what it printed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+HERE = Path(__file__).parent
+CASES = sorted(path.stem for path in (HERE / "cases").glob("*.py"))
+
+
+def run_case(name: str, python: str, uri: str, home: Path) -> str:
+    """What a case prints on stdout, and its exit status as the last line. Its stderr is shown where it fails."""
+    environment = {
+        key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))
+    }
+    done = subprocess.run(
+        [python, str(HERE / "cases" / f"{name}.py")],
+        env={
+            **environment,
+            "ROS_MASTER_URI": uri,
+            "ROS_HOSTNAME": "localhost",
+            "ROS_HOME": str(home),
+            "PYTHONPATH": str(HERE),
+            "PYTHONWARNINGS": "ignore",
+        },
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        cwd=home,
+        check=False,
+    )
+    if done.returncode:
+        print(done.stderr)
+    return f"{done.stdout}exit status {done.returncode}\n"
+
+
+def recorded(name: str) -> Path:
+    """Where what real rospy printed is kept."""
+    return HERE / "recorded" / f"{name}.txt"

@@ -1,0 +1,19 @@
+"""Programs of users print under minirospy what they printed under real rospy (recorded/, made by make interop)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from run_case import CASES, recorded, run_case
+
+sys.path.pop(0)
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str, master: str, tmp_path: Path) -> None:
+    assert run_case(name, sys.executable, master, tmp_path) == recorded(name).read_text()
