@@ -1,0 +1,118 @@
+"""The wheel: what a user's `pip install minirospy` brings, used from an empty folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+USE = """
+import site, sys
+# As in site-packages: path lines are read.
+site.addsitedir(sys.argv[1])
+import rospy, actionlib_msgs.msg, RPi.GPIO, genpy, rospkg, roslib
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import SetBool
+import minirospy, rospy
+from minirospy.workspace.packages import Packages
+print(minirospy.__file__)
+print(LaserScan._md5sum, SetBool._md5sum)
+for name in ("std_msgs", "rpi_feros", "rpi_feros_bringup"):
+    print(Packages().find(name))
+print(Packages().find_executable("rpi_feros", "led_actuator.py")[1])
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout, built as pip builds it, from files under version control alone."""
+    source = tmp_path_factory.mktemp("source") / "minirospy"
+    # What was generated in the checkout stays behind: the build itself must make it.
+    left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
+    shutil.copytree(ROOT, source, ignore=left_out)
+    shutil.copy(ROOT / ".gitignore", source)
+    for generated in (source / "minirospy" / "overlay").glob("*_msgs"):
+        shutil.rmtree(generated)
+    target = tmp_path_factory.mktemp("wheel")
+    command = [
+        sys.executable,
+        "-m",
+        "build",
+        "--wheel",
+        "--no-isolation",
+        "--outdir",
+        str(target),
+        str(source),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (found,) = target.glob("*.whl")
+    return found
+
+
+@pytest.mark.timeout(180)
+def test_the_wheel_is_pure_and_whole(wheel: Path) -> None:
+    assert wheel.name.endswith("-py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    for name in (
+        "minirospy_overlay.pth",
+        "minirospy/py.typed",
+        "minirospy/overlay/rospy/__init__.py",
+        "minirospy/overlay/rospy/py.typed",
+        "minirospy/overlay/std_msgs/py.typed",
+        "minirospy/overlay/std_msgs/msg/_Bool.py",
+        "minirospy/overlay/sick_safetyscanners/srv/_FieldData.py",
+        "minirospy/share/msgs/std_msgs/msg/Bool.msg",
+        "minirospy/share/rpi_feros/package.xml",
+        "minirospy/share/launch/package.xml",
+        "minirospy/workspace/shell/ros.bash",
+        "minirospy/workspace/shell/ros.bat",
+    ):
+        assert name in names
+    assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
+
+
+@pytest.mark.timeout(180)
+def test_it_works_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
+    site = tmp_path / "site-packages"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(
+        # -S: the checkout's own path lines are not read; its libraries are added by hand.
+        [sys.executable, "-S", "-c", USE, str(site)],
+        env={**environment, "PYTHONPATH": _libraries(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == str(site / "minirospy" / "__init__.py")
+    assert lines[1] == "90c7ef2dc6895d81024acba2ac42f369 09fb03525b03e7ea1fd3992bafd87e16"
+    share = site / "minirospy" / "share"
+    assert [Path(line) for line in lines[2:]] == [
+        share / "msgs" / "std_msgs",
+        share / "rpi_feros",
+        share / "launch",
+        share / "rpi_feros" / "scripts" / "led_actuator.py",
+    ]
+
+
+def _libraries(folder: Path) -> str:
+    """A folder with minirospy's dependencies, and nothing else of the environment."""
+    libraries = folder / "libraries"
+    libraries.mkdir()
+    for name in ("yaml", "msgpack", "psutil", "rich"):
+        package = Path(__import__(name).__file__).parent
+        shutil.copytree(package, libraries / name)
+    return str(libraries)
