@@ -54,10 +54,10 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 def _prototype(mode: str, name: str) -> str:
-    from minirospy.cli.complete import prototype
     from minirospy.environment import Environment
     from minirospy.idl.load import Catalogue
     from minirospy.introspect.interfaces import Interfaces, Kind
+    from minirospy.introspect.prototype import prototype
     from minirospy.workspace.packages import Packages
 
     packages = Packages(Environment.read(host="localhost"))

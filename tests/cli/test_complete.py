@@ -12,10 +12,11 @@ import pytest
 import yaml
 
 from minirospy.cli import complete
-from minirospy.cli.complete import candidates, main, prototype
+from minirospy.cli.complete import candidates, main
 from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
+from minirospy.introspect.prototype import prototype
 from minirospy.workspace.packages import Packages
 
 from .conftest import Robot
