@@ -26,7 +26,7 @@ test: $(STAMP)
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
-	@$(BIN)/python -m pytest tests/interop
+	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
 
 bench: $(STAMP)
 	@$(BIN)/python benchmarks/run.py
