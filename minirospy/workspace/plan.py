@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from minirospy.errors import BuildError
 from minirospy.workspace.cmake import Command, keyword_arguments, parse_cmake
-from minirospy.workspace.manifest import Manifest, read_manifest
+from minirospy.workspace.manifest import Kind, Manifest, read_manifest
 
 __all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
@@ -31,6 +31,17 @@ _COMPILED = {
 _TESTS = {"catkin_add_nosetests": "pytest", "catkin_add_pytests": "pytest", "add_rostest": "rostest"}
 _WORDS = frozenset(
     ["REQUIRED", "QUIET", "COMPONENTS", "OPTIONAL_COMPONENTS", "EXACT", "MODULE", "CONFIG", "NO_MODULE"]
+)
+_PACKAGE_WORDS = frozenset(
+    [
+        "INCLUDE_DIRS",
+        "LIBRARIES",
+        "CATKIN_DEPENDS",
+        "DEPENDS",
+        "CFG_EXTRAS",
+        "EXPORTED_TARGETS",
+        "SKIP_CMAKE_CONFIG_GENERATION",
+    ]
 )
 _INSTALL_WORDS = frozenset(
     ["PROGRAMS", "FILES", "DIRECTORY", "TARGETS", "DESTINATION", "RUNTIME", "LIBRARY", "ARCHIVE", "RENAME",
@@ -120,6 +131,7 @@ class _Collector:
             "find_package": self._find_package,
             "generate_messages": self._generate,
             "catkin_python_setup": self._python_setup,
+            "catkin_package": self._catkin_package,
             "catkin_install_python": self._install_python,
             "install": self._install,
             **dict.fromkeys(_FOLDERS, self._add_files),
@@ -207,6 +219,25 @@ class _Collector:
             raise self._error(
                 command.line,
                 "generate_messages(): nothing to generate; add_message_files() and so on stand before it",
+            )
+
+    def _catkin_package(self, command: Command) -> None:
+        """What is passed on to other packages must be named in package.xml, for the build and for the run."""
+        given = keyword_arguments(command.arguments, _PACKAGE_WORDS)
+        found = {name for name, _ in self._needs}
+        building = self._manifest.depends(Kind.BUILD, Kind.BUILDTOOL)
+        running = self._manifest.depends(Kind.EXEC, Kind.BUILD_EXPORT)
+        for name in given.get("CATKIN_DEPENDS", []):
+            if name in found and name not in building:
+                missing = "depend" if name not in running else "build_depend"
+            elif name not in running:
+                missing = "exec_depend"
+            else:
+                continue
+            raise self._error(
+                command.line,
+                f"catkin_package(CATKIN_DEPENDS {name}), but package.xml does not name it: "
+                f"add <{missing}>{name}</{missing}> there",
             )
 
     def _python_setup(self, command: Command) -> None:

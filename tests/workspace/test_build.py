@@ -308,6 +308,27 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     assert error.line == 2
 
 
+@pytest.mark.parametrize(
+    ("depends", "cmake", "text"),
+    [
+        (
+            "",
+            "find_package(catkin REQUIRED COMPONENTS std_msgs)\ncatkin_package(CATKIN_DEPENDS std_msgs)",
+            "<depend>",
+        ),
+        ("", "catkin_package(CATKIN_DEPENDS message_runtime)", "<exec_depend>message_runtime</exec_depend>"),
+    ],
+)
+def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: str, text: str) -> None:
+    """As catkin: what is passed on must be declared."""
+    folder = scene.package("p", cmake, depends)
+    error = mistakes(scene)
+    assert error.file == str(folder / "CMakeLists.txt")
+    assert error.line == 3 + cmake.count("\n")
+    assert "package.xml does not name it" in error.text
+    assert text in error.text
+
+
 def test_warnings(scene: Scene) -> None:
     folder = scene.package(
         "p",
