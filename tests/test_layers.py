@@ -16,7 +16,7 @@ LAYERS = [
     {"client"},
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
-    {"clock", "environment", "names", "times"},
+    {"clock", "environment", "names", "scanner", "times"},
     {"errors"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

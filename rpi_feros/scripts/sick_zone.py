@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""Tell /set_led_zone_state in which zone the nearest thing is: 0 further than 0.4 m, 1 between, 2 nearer than 0.2 m."""
+
+import rospy
+from rpi_msgs.srv import safetyZone
+from sensor_msgs.msg import LaserScan
+
+FAR, NEAR = 0.4, 0.2  # m
+GREEN, YELLOW, RED = range(3)
+
+
+def zone_of(distance: float) -> int:
+    if distance > FAR:
+        return GREEN
+    return YELLOW if distance > NEAR else RED
+
+
+def main() -> None:
+    rospy.init_node("sick_zone")
+    rospy.wait_for_service("/set_led_zone_state")
+    set_zone = rospy.ServiceProxy("/set_led_zone_state", safetyZone)
+    told = None
+
+    def measured(scan: LaserScan) -> None:
+        nonlocal told
+        zone = zone_of(min(scan.ranges))
+        if zone == told:
+            return
+        try:
+            rospy.loginfo(set_zone(zone).message)
+            told = zone
+        except rospy.ServiceException as error:
+            rospy.logwarn(error)
+        except rospy.ROSInterruptException:
+            pass  # Ctrl-C during the call
+
+    rospy.Subscriber("/sick_safetyscanners/scan", LaserScan, measured, queue_size=1)
+    rospy.spin()
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except rospy.ROSInterruptException:
+        pass  # Ctrl-C while it waited for the service
