@@ -41,20 +41,10 @@ class Command(NamedTuple):
 def parse_cmake(text: str, where: str, variables: Mapping[str, str]) -> list[Command]:
     """The commands of a CMakeLists.txt. ``where`` names the file in errors; ``variables`` are set beforehand.
 
-    A variable that nobody set is empty, as in CMake. Raises BuildError where brackets or quotes do not close.
+    A variable that nobody set is empty, as in CMake; loops over words are unrolled. Raises BuildError where brackets,
+    quotes or loops do not close.
     """
-    known = dict(variables)
-    commands = []
-    for command in _commands(text, where):
-        arguments = tuple(word for argument in command.arguments for word in _expanded(argument, known))
-        commands.append(command._replace(arguments=arguments))
-        if command.name == "set" and arguments:
-            known[arguments[0]] = ";".join(
-                word for word in arguments[1:] if word not in ("CACHE", "PARENT_SCOPE")
-            )
-        elif command.name == "project" and arguments:
-            known["PROJECT_NAME"] = arguments[0]
-    return commands
+    return list(_evaluated(list(_commands(text, where)), where, dict(variables)))
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
@@ -68,6 +58,57 @@ def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> d
         else:
             found[current].append(word)
     return found
+
+
+def _evaluated(commands: list[Command], where: str, known: dict[str, str]) -> Iterator[Command]:
+    """The commands with their variables filled in. ``known`` grows by what they set."""
+    position = 0
+    while position < len(commands):
+        command = commands[position]
+        position += 1
+        arguments = tuple(word for argument in command.arguments for word in _expanded(argument, known))
+        if command.name == "foreach" and arguments:
+            end = _end_of_loop(commands, position, where)
+            for item in _loop_items(arguments[1:], known):
+                known[arguments[0]] = item
+                yield from _evaluated(commands[position:end], where, known)
+            position = end + 1
+            continue
+        _assign(command.name, arguments, known)
+        yield command._replace(arguments=arguments)
+
+
+def _end_of_loop(commands: list[Command], start: int, where: str) -> int:
+    depth = 1
+    for index in range(start, len(commands)):
+        depth += {"foreach": 1, "endforeach": -1}.get(commands[index].name, 0)
+        if not depth:
+            return index
+    raise BuildError(where, commands[start - 1].line, "foreach() without endforeach()")
+
+
+def _loop_items(words: tuple[str, ...], known: Mapping[str, str]) -> list[str]:
+    """What a loop runs over: words, or ``IN LISTS`` of variables and ``ITEMS``. A range of numbers is left out."""
+    if words[:1] == ("RANGE",):
+        return []
+    if words[:1] != ("IN",):
+        return list(words)
+    given = keyword_arguments(words[1:], frozenset(["LISTS", "ITEMS", "ZIP_LISTS"]))
+    lists = [word for name in given.get("LISTS", []) for word in known.get(name, "").split(";") if word]
+    return [*lists, *given.get("ITEMS", [])]
+
+
+def _assign(name: str, arguments: tuple[str, ...], known: dict[str, str]) -> None:
+    """What a command does to the variables."""
+    if name == "project" and arguments:
+        known["PROJECT_NAME"] = arguments[0]
+    elif name == "set" and arguments:
+        values = list(arguments[1:])
+        ends = [values.index(word) for word in ("CACHE", "PARENT_SCOPE") if word in values]
+        known[arguments[0]] = ";".join(values[: min(ends, default=len(values))])
+    elif name == "list" and arguments[:1] == ("APPEND",) and len(arguments) > 1:
+        before = [known[arguments[1]]] if known.get(arguments[1]) else []
+        known[arguments[1]] = ";".join([*before, *arguments[2:]])
 
 
 def _commands(text: str, where: str) -> Iterator[Command]:

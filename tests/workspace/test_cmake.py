@@ -46,6 +46,21 @@ def test_variables() -> None:
     assert read(text, P="lib")[-1] == ("f", ("a", "b", "c", "d", "a;b", "p_x", "lib/y"), 4)
 
 
+def test_lists_and_the_cache() -> None:
+    text = 'set(F a CACHE STRING "what for")\nlist(APPEND F b c)\nlist(APPEND G d)\nf(${F} ${G})'
+    assert read(text)[-1] == ("f", ("a", "b", "c", "d"), 4)
+
+
+def test_loops() -> None:
+    text = "set(L x y)\nforeach(T a b)\n f(${T})\n foreach(U IN LISTS L ITEMS z)\n  g(${T}${U})\n endforeach()\nendforeach(T)\nh()"
+    assert [(name, *arguments) for name, arguments, _ in read(text)] == [
+        ("set", "L", "x", "y"),
+        *(("f", "a"), ("g", "ax"), ("g", "ay"), ("g", "az")),
+        *(("f", "b"), ("g", "bx"), ("g", "by"), ("g", "bz")),
+        ("h",),
+    ]
+
+
 def test_keywords() -> None:
     found = keyword_arguments(("x", "FILES", "a", "b", "DIRECTORY", "d"), frozenset(["FILES", "DIRECTORY"]))
     assert found == {"": ["x"], "FILES": ["a", "b"], "DIRECTORY": ["d"]}
@@ -58,6 +73,7 @@ def test_keywords() -> None:
         ("x()\na(b\nc(d)\n", "f:2: a( is not closed"),
         ("a", "f:1: a( is not closed"),
         ("a b()", "f:1: [a] is not followed by ( ... )"),
+        ("x()\nforeach(T a)\nf()", "f:2: foreach() without endforeach()"),
         ("\n)", "f:2: a closing bracket without an opening one"),
         ("(a)", "f:1: a bracket without a command before it"),
         ('a(\n"b)', 'f:2: a quote or bracket is not closed: "b)'),
