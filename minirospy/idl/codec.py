@@ -84,9 +84,9 @@ def write_serialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None:
     """Add the method ``serialize``."""
     with source.function("def serialize(self, buff: Any) -> None:"):
         source.line('"""Write the message. Raises genpy.SerializationError."""')
-        if spec.fields:
+        if list(_leaves(spec.fields, "", lookup)):
             with source.block("try:"):
-                if len(list(_chunks(spec.fields, "self", lookup))) > 1 or not _is_fixed(spec, lookup):
+                if not _is_fixed(spec, lookup):
                     source.line("write = buff.write")
                     write = "write"
                 else:
@@ -133,8 +133,9 @@ def _chunks(fields: tuple[Field, ...], path: str, lookup: Lookup) -> Iterator[_C
 
 
 def _is_fixed(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Whether a message is one run, so that its size is known."""
-    return all(leaf.letters for leaf in _leaves(spec.fields, "", lookup))
+    """Whether a message is one run, so that its size is known, and is not nothing."""
+    leaves = list(_leaves(spec.fields, "", lookup))
+    return bool(leaves) and all(leaf.letters for leaf in leaves)
 
 
 def _size(letters: str) -> int:
@@ -307,7 +308,9 @@ class _Reader:
         lazy = {f"self.{name}": name for name in lazy_arrays(spec)}
         chunks = list(_chunks(spec.fields, "self", self._lookup))
         names = self._create(spec, "self")
-        if chunks == [_Chunk(chunks[0].run, None)]:
+        if not chunks:
+            return
+        if _is_fixed(spec, self._lookup):
             self._run(chunks[0], names, "data")
             return
         if not self._keeps_buffer:
@@ -443,7 +446,7 @@ class _Reader:
                 self._line(f"{values}.append({self._text(one)})")
             return
         each = self._source.local("each")
-        if spec is None or (spec.fields and _is_fixed(spec, self._lookup)):
+        if spec is None or _is_fixed(spec, self._lookup):
             self._fixed_elements(type_.base, spec, values, each, count)
             return
         with self._source.block(f"for _ in range({count}):"):
