@@ -22,9 +22,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from minirospy.aio import Node as Node
     from minirospy.client import *  # noqa: F403 - the names that __getattr__ finds, for mypy and editors
 
 __version__ = "0.1.0"
+
+_ELSEWHERE = {"Node": "minirospy.aio"}
+"""Public names that are not of the rospy API."""
 
 
 def __getattr__(name: str) -> Any:
@@ -35,7 +39,7 @@ def __getattr__(name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name != f"{__name__}.{name}":
             raise
-    client = importlib.import_module("minirospy.client")
+    client = importlib.import_module(_ELSEWHERE.get(name, "minirospy.client"))
     try:
         return getattr(client, name)
     except AttributeError:
@@ -43,4 +47,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *importlib.import_module("minirospy.client").__all__})
+    return sorted({*globals(), *_ELSEWHERE, *importlib.import_module("minirospy.client").__all__})

@@ -86,6 +86,6 @@ class SimulatedClock:
                 # A set stop does not notify: look again now and then.
                 self._changed.wait(0.1)
                 if self._now < before:
-                    raise ROSTimeMovedBackwardsException(self._now / 1e9)
+                    raise ROSTimeMovedBackwardsException((before - self._now) / 1e9)
                 before = self._now
             return not stop.is_set()

@@ -24,7 +24,9 @@ class Environment(NamedTuple):
     """Where the master is, how this process is reached, and where its files go.
 
     ``host`` is the name that peers are told; ``bind_host`` the address that servers listen on
-    (loopback when ``host`` is, else every interface).
+    (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
+    that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
+    the networks whose machines may connect ("": all).
     """
 
     master_uri: str
@@ -33,12 +35,16 @@ class Environment(NamedTuple):
     home: Path
     log_dir: Path
     package_path: tuple[Path, ...] = ()
+    ipv6: bool = False
+    ports: range | None = None
+    allow: str = ""
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """The record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
-        Raises UsageError on a ROS_MASTER_URI that is not http://host:port.
+        Raises UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
+        more than a name or address, and on MINIROSPY_PORTS that is not like 40000-40100.
         """
         environ = os.environ if environ is None else environ
         home = Path(environ.get("ROS_HOME") or Path.home() / ".ros")
@@ -50,14 +56,24 @@ class Environment(NamedTuple):
             home=home,
             log_dir=Path(environ.get("ROS_LOG_DIR") or home / "log"),
             package_path=tuple(Path(p) for p in environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p),
+            ipv6=environ.get("ROS_IPV6") == "on",
+            ports=_port_range(environ.get("MINIROSPY_PORTS", "")),
+            allow=environ.get("MINIROSPY_ALLOW", ""),
         )
 
     @property
     def bind_host(self) -> str:
         """The address to listen on, as rospy chooses it."""
-        if self.host == "localhost" or self.host.startswith("127."):
-            return "127.0.0.1"
-        return "0.0.0.0"
+        if self.host.startswith("127."):
+            return self.host
+        if self.host in {"localhost", "::1"}:
+            return "::1" if self.ipv6 else "127.0.0.1"
+        return "::" if self.ipv6 else "0.0.0.0"
+
+    @property
+    def uri_host(self) -> str:
+        """``host`` as it stands in a URI: an IPv6 address in brackets."""
+        return f"[{self.host}]" if ":" in self.host else self.host
 
     @property
     def master_address(self) -> tuple[str, int]:
@@ -96,11 +112,32 @@ def _checked_uri(uri: str) -> str:
     return uri
 
 
+def _checked_host(host: str, variable: str) -> str:
+    # A colon alone is a port; more of them are an IPv6 address.
+    if "/" in host or host.count(":") == 1 or host != host.strip() or "[" in host:
+        raise UsageError(f"{variable} [{host}] must be a name or an address alone, without http:// and port")
+    return host
+
+
+def _port_range(text: str) -> range | None:
+    if not text.strip():
+        return None
+    first, _, last = text.partition("-")
+    try:
+        ports = range(int(first), int(last or first) + 1)
+    except ValueError:
+        ports = range(0)
+    if not ports or ports[0] < 1 or ports[-1] > 65535:
+        raise UsageError(f"MINIROSPY_PORTS [{text}] is not a range of ports, as 40000-40100")
+    return ports
+
+
 def _advertised_host(environ: Mapping[str, str]) -> str:
     """ROS_HOSTNAME, else ROS_IP, else this machine's name where it resolves, else loopback."""
-    named = environ.get("ROS_HOSTNAME") or environ.get("ROS_IP")
-    if named:
-        return named
+    for variable in ("ROS_HOSTNAME", "ROS_IP"):
+        named = environ.get(variable)
+        if named:
+            return _checked_host(named, variable)
     name = socket.gethostname()
     try:
         socket.getaddrinfo(name, None, socket.AF_INET)

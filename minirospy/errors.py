@@ -15,6 +15,7 @@
     |   |   +-- RpcUnreachable          the peer could not be reached, or did not answer in time
     |   +-- WireError                   bytes that are not TCPROS
     |   |   +-- HandshakeRefused        the peer answered a connection header with ``error=``
+    |   |   +-- CallFailed              the service answered a call with an error
     |   +-- SourceError                 a text that a person wrote (file, line)
     |   |   +-- DefinitionError         a .msg, .srv or .action text that does not parse
     |   |   +-- ManifestError           a package.xml that does not read
@@ -45,6 +46,7 @@ from collections.abc import Iterable
 __all__ = [
     "BoardError",
     "BuildError",
+    "CallFailed",
     "DefinitionError",
     "DeserializationError",
     "HandshakeRefused",
@@ -192,6 +194,17 @@ class HandshakeRefused(WireError):
     """The peer answered our connection header with ``error=text``."""
 
 
+class CallFailed(WireError):
+    """The service answered a call with an error; ``text`` as its handler's stack encoded it."""
+
+    def __init__(self, text: bytes) -> None:
+        super().__init__(text)
+        self.text = text
+
+    def __str__(self) -> str:
+        return self.text.decode("utf-8", "replace")
+
+
 class SourceError(MinirospyError):
     """A text that a person wrote does not do: ``file`` (or what else names it), ``line`` (from 1; 0: the whole)."""
 
@@ -255,7 +268,7 @@ class ROSInterruptException(ROSException):
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
-    """Simulated time jumped back while somebody slept; ``time`` is the new time in seconds."""
+    """Simulated time jumped back while somebody slept, by ``time`` seconds."""
 
     def __init__(self, time: float) -> None:
         super().__init__("ROS time moved backwards")

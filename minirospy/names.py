@@ -28,7 +28,7 @@ __all__ = [
 
 _LEGAL = re.compile(r"^[~/A-Za-z][\w/]*$", re.ASCII)
 _LEGAL_BASE = re.compile(r"^[A-Za-z]\w*$", re.ASCII)
-_SPECIAL = {"__name", "__ns", "__log", "__master", "__ip", "__hostname"}
+_ASSIGNMENT = re.compile(r"^[~/A-Za-z_][\w/]*:=")
 
 
 def is_legal_name(name: str) -> bool:
@@ -103,13 +103,14 @@ class Arguments(NamedTuple):
 
     ``plain``: what is left for the program; ``remappings``: names as typed, unresolved;
     ``parameters``: private parameters as (name without the underscore, YAML text);
-    ``special``: ``__name``, ``__ns`` and their kin.
+    ``special``: ``__name``, ``__ns`` and their kin; ``wrong``: arguments with more than one ``:=``.
     """
 
     plain: list[str]
     remappings: dict[str, str]
     parameters: dict[str, str]
     special: dict[str, str]
+    wrong: list[str]
 
     def resolved_remappings(self, node_name: str) -> dict[str, str]:
         """The remappings with both sides as global names."""
@@ -117,18 +118,24 @@ class Arguments(NamedTuple):
 
 
 def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
-    """Take ``from:=to``, ``_param:=value`` and ``__special:=value`` out of a command line."""
-    parsed = Arguments([], {}, {}, {})
+    """Take ``from:=to``, ``_param:=value`` and ``__special:=value`` out of a command line.
+
+    What does not begin with a name, as ``--flag:=x``, is the program's own; without a value it says nothing.
+    """
+    parsed = Arguments([], {}, {}, {}, [])
     for argument in argv:
-        key, separator, value = argument.partition(":=")
-        key, value = key.strip(), value.strip()
-        if not separator or not key:
+        if not _ASSIGNMENT.match(argument):
             parsed.plain.append(argument)
-        elif key in _SPECIAL:
-            parsed.special[key] = value
+            continue
+        key, _, value = argument.partition(":=")
+        value = value.strip()
+        if ":=" in value:
+            parsed.wrong.append(argument)
+        elif not value:
+            continue
         elif key.startswith("__"):
-            continue  # reserved for clients of other languages, as rospy treats it
-        elif key.startswith("_"):
+            parsed.special[key] = value
+        elif key.startswith("_") and key != "_":
             parsed.parameters[key[1:]] = value
         else:
             parsed.remappings[key] = value

@@ -27,9 +27,10 @@ class TVal:
         if isinstance(secs, float):
             if nsecs:
                 raise ValueError("if secs is a float, nsecs cannot be set")
-            total = int(secs)
-            nsecs = round((secs - total) * 1e9)
-            secs = total
+            whole = int(secs)
+            # Cut off, as genpy does it, not rounded.
+            nsecs = int((secs - whole) * 1e9)
+            secs = whole
         self.secs = int(secs)
         self.nsecs = int(nsecs)
         self.canon()

@@ -63,3 +63,44 @@ def test_overrides_win() -> None:
 def test_a_bad_master_uri_is_refused_in_words(uri: str) -> None:
     with pytest.raises(UsageError, match="is not of the form http://host:port"):
         Environment.read({"ROS_MASTER_URI": uri})
+
+
+@pytest.mark.parametrize(
+    ("variables", "bind_host", "uri_host"),
+    [
+        ({"ROS_IP": "192.0.2.7"}, "0.0.0.0", "192.0.2.7"),
+        ({"ROS_HOSTNAME": "robot"}, "0.0.0.0", "robot"),
+        ({"ROS_HOSTNAME": "localhost"}, "127.0.0.1", "localhost"),
+        ({"ROS_IP": "127.0.1.1"}, "127.0.1.1", "127.0.1.1"),
+        ({"ROS_IP": "::1"}, "127.0.0.1", "[::1]"),
+        ({"ROS_IP": "::1", "ROS_IPV6": "on"}, "::1", "[::1]"),
+        ({"ROS_HOSTNAME": "localhost", "ROS_IPV6": "on"}, "::1", "localhost"),
+        ({"ROS_HOSTNAME": "robot", "ROS_IPV6": "on"}, "::", "robot"),
+        ({"ROS_IP": "fe80::1", "ROS_IPV6": "on"}, "::", "[fe80::1]"),
+        ({"ROS_HOSTNAME": "robot", "ROS_IPV6": "ON"}, "0.0.0.0", "robot"),
+    ],
+)
+def test_where_servers_listen_as_rosgraph_network_tells(
+    variables: dict[str, str], bind_host: str, uri_host: str
+) -> None:
+    environment = Environment.read(variables)
+    assert (environment.bind_host, environment.uri_host) == (bind_host, uri_host)
+
+
+@pytest.mark.parametrize("host", ["http://robot", "robot:11311", "robot/", " robot", "[::1]"])
+@pytest.mark.parametrize("variable", ["ROS_HOSTNAME", "ROS_IP"])
+def test_a_host_that_is_more_than_a_host_is_refused_in_words(variable: str, host: str) -> None:
+    with pytest.raises(UsageError, match="must be a name or an address alone"):
+        Environment.read({variable: host})
+
+
+def test_a_range_of_ports() -> None:
+    assert Environment.read({}).ports is None
+    assert Environment.read({"MINIROSPY_PORTS": "40000-40100"}).ports == range(40000, 40101)
+    assert Environment.read({"MINIROSPY_PORTS": "40000"}).ports == range(40000, 40001)
+
+
+@pytest.mark.parametrize("text", ["a-b", "40100-40000", "0-5", "1-70000", "-5"])
+def test_a_range_that_is_none_is_refused_in_words(text: str) -> None:
+    with pytest.raises(UsageError, match="is not a range of ports"):
+        Environment.read({"MINIROSPY_PORTS": text})

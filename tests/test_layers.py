@@ -11,9 +11,9 @@ PACKAGE = Path(__file__).parents[1] / "minirospy"
 
 LAYERS = [
     {"cli"},
-    {"introspect", "launch"},
+    {"introspect", "launch", "actionlib"},
     {"workspace"},
-    {"client"},
+    {"client", "aio"},
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
     {"clock", "environment", "names", "scanner", "times"},

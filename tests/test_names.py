@@ -38,9 +38,24 @@ def test_remapping_is_by_resolved_names() -> None:
 def test_arguments_are_taken_apart() -> None:
     arguments = names.parse_arguments(["p", "_rate:=5", "__name:=n", "__unknown:=x", "a:=b", "-v", ":=x"])
     assert arguments.parameters == {"rate": "5"}
-    assert arguments.special == {"__name": "n"}
+    assert arguments.special == {"__name": "n", "__unknown": "x"}
     assert arguments.remappings == {"a": "b"}
     assert arguments.plain == ["p", "-v", ":=x"]
+
+
+@pytest.mark.parametrize(
+    "argument", ["--flag:=x", "-x:=y", "1:=2", "x-y:=z", "a b:=c", "[x]:=y", ":=", "http://a:=b"]
+)
+def test_what_begins_with_no_name_is_the_programs_own(argument: str) -> None:
+    assert names.parse_arguments([argument]) == ([argument], {}, {}, {}, [])
+
+
+def test_arguments_without_a_value_say_nothing() -> None:
+    assert names.parse_arguments(["a:=", "_p:=", "__name:= "]) == ([], {}, {}, {}, [])
+
+
+def test_arguments_with_two_values_are_told() -> None:
+    assert names.parse_arguments(["a:=b:=c", "_:=x"]) == ([], {"_": "x"}, {}, {}, ["a:=b:=c"])
 
 
 @pytest.mark.parametrize(

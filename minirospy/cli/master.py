@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/roscore.
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import contextlib
 import logging
@@ -12,16 +13,18 @@ import os
 import signal
 import sys
 import uuid
-from collections.abc import Sequence
-from logging.handlers import RotatingFileHandler
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import minirospy
 from minirospy.cli.command import Parser, run
 from minirospy.environment import DEFAULT_MASTER_PORT, Environment
-from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
+from minirospy.runtime.access import Access, listening_lines
+from minirospy.runtime.log_file import LogFile
 from minirospy.runtime.loop import new_event_loop
 from minirospy.runtime.master import Master
+from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.rosout import RosoutNode
 from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import is_address_in_use
@@ -34,6 +37,13 @@ DISTRO = "noetic\n"
 ROS_VERSION = "1.17.0\n"
 
 _LOG_BYTES = 10 * 1024 * 1024
+_LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "error": logging.ERROR,
+    "fatal": logging.CRITICAL,
+}
 
 
 def roscore(argv: Sequence[str] | None = None) -> int:
@@ -54,15 +64,42 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
         "-p", "--port", type=int, help=f"port (default: of ROS_MASTER_URI, else {DEFAULT_MASTER_PORT})"
     )
     parser.add_argument("-v", "--verbose", action="store_true", help="print each registration")
-    parser.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
-    # Options of ROS's roscore that ask for nothing here: one loop serves every client.
-    parser.add_argument("--core", action="store_true", help="accepted for compatibility, without effect")
+    parser.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors and warnings")
+    parser.add_argument("--status", action="store_true", help="say how the running master is, and end")
     parser.add_argument(
-        "-w", "--numworkers", type=int, metavar="N", help="accepted for compatibility, without effect"
+        "--allow",
+        action="append",
+        default=[],
+        metavar="NETWORK",
+        help="only these may connect, as 192.168.65.0/24 (again for more; default: MINIROSPY_ALLOW, else all)",
     )
     parser.add_argument(
-        "-t", "--timeout", type=float, metavar="S", help="accepted for compatibility, without effect"
+        "--no-journal",
+        action="store_true",
+        help="keep no file of the graph: a master that is killed forgets it",
     )
+    parser.add_argument(
+        "--fresh", action="store_true", help="start empty, whatever a master that was killed has left"
+    )
+    parser.add_argument("--no-rosout", action="store_true", help="without the /rosout node, as rosmaster")
+    parser.add_argument(
+        "--master-logger-level",
+        choices=_LEVELS,
+        metavar="LEVEL",
+        help=f"what goes into master.log: {', '.join(_LEVELS)} (default: info)",
+    )
+    parser.add_argument(
+        "-t",
+        "--timeout",
+        type=float,
+        default=3.0,
+        metavar="S",
+        help="seconds that a node has to take a call (default: 3)",
+    )
+    # Options of ROS's roscore that ask for nothing here: one loop serves every client, in one process.
+    parser.add_argument("--core", action="store_true", help="accepted, without effect")
+    for words in (("-w", "--numworkers"), ("--sigint-timeout",), ("--sigterm-timeout",)):
+        parser.add_argument(*words, type=float, metavar="N", help="accepted, without effect")
 
     def body() -> int:
         arguments = [a for a in (sys.argv[1:] if argv is None else argv) if ":=" not in a]
@@ -71,51 +108,139 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
         port = environment.master_address[1] if options.port is None else options.port
         if not 0 <= port < 65536:
             parser.error(f"port {port} is not between 0 and 65535")
+        if options.status:
+            return _status(environment, port)
+        if options.timeout <= 0:
+            parser.error("the timeout is more than 0 seconds")
+        environment = environment._replace(allow=",".join(options.allow) or environment.allow)
         loop = new_event_loop()
         try:
-            return loop.run_until_complete(
-                _serve(name, environment, port, verbose=options.verbose, quiet=options.quiet)
-            )
+            return loop.run_until_complete(_serve(name, environment, port, options))
         finally:
             loop.close()
 
     return run(name, body)
 
 
-async def _serve(name: str, environment: Environment, port: int, *, verbose: bool, quiet: bool) -> int:
-    master = Master(host=environment.host, bind_host=environment.bind_host, port=port)
+async def _serve(name: str, environment: Environment, port: int, options: argparse.Namespace) -> int:
+    access = Access.parse(environment.allow)
+    journal = None if options.no_journal or not port else environment.home / "master" / f"journal-{port}"
+    master = Master(
+        host=environment.uri_host,
+        bind_host=environment.bind_host,
+        port=port,
+        journal=journal,
+        fresh=options.fresh,
+        access=access,
+        timeout=options.timeout,
+        most_clients=_most_clients(),
+    )
     stop = _stop_event()
     try:
         await master.start()
     except OSError as error:
         raise _port_error(name, environment.host, port, error) from error
-    run_id = str(uuid.uuid1())
-    log_file = _log_to_file(environment.log_dir / run_id, verbose=verbose)
-    for key, value in (("/run_id", run_id), ("/rosdistro", DISTRO), ("/rosversion", ROS_VERSION)):
-        master.parameters.set(key, value, "/roslaunch")
-    if not quiet:
-        print(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, log file {log_file}")
-        print(f"ROS_MASTER_URI={master.uri}", flush=True)
-    rosout = RosoutNode(Environment.read(master_uri=master.uri), log_file.parent / "rosout.log")
+    keep = True
     try:
-        await rosout.start()
-        if not quiet:
-            print(f"setting /run_id to {run_id}")
-            print("started core service [/rosout]; Ctrl-C stops the master", flush=True)
-        await _first(stop, master.stopped)
+        run_id = master.session or str(uuid.uuid1())
+        log_file, master.say = _log_to_file(
+            environment.log_dir / run_id, verbose=options.verbose, level=options.master_logger_level
+        )
+        for key, value in (("/run_id", run_id), ("/rosdistro", DISTRO), ("/rosversion", ROS_VERSION)):
+            master.set_param("/roslaunch", key, value)
+        where = listening_lines(environment.bind_host, master.port, access)
+        if not options.quiet:
+            print(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, log file {log_file}")
+            print("\n".join([where[0], *master.news]))
+            print(f"ROS_MASTER_URI={master.uri}", flush=True)
+        if where[1:]:
+            print("\n".join(where[1:]), file=sys.stderr, flush=True)
+        for line in (*where, *master.news):
+            logging.getLogger("minirospy.master").warning(line)
+        await _run(master, stop, environment, log_file.parent / "rosout.log", options)
+        keep = False
     finally:
-        await rosout.close()
-        await master.close()
-    if not quiet:
+        await master.close(keep_journal=keep)
+    if not options.quiet:
         print("master stopped", flush=True)
     return 0
 
 
+async def _run(
+    master: Master, stop: asyncio.Event, environment: Environment, log_file: Path, options: argparse.Namespace
+) -> None:
+    """Until somebody ends it."""
+    rosout = None
+    try:
+        if not options.no_rosout:
+            rosout = RosoutNode(environment._replace(master_uri=master.uri), log_file)
+            await rosout.start()
+        if not options.quiet:
+            print(f"setting /run_id to {log_file.parent.name}")
+            core = "" if options.no_rosout else "started core service [/rosout]; "
+            print(f"{core}Ctrl-C stops the master", flush=True)
+        await _first(stop, master.stopped)
+    finally:
+        if rosout:
+            await rosout.close()
+
+
+def _status(environment: Environment, port: int) -> int:
+    """One line about the master that runs; of real rosmaster what its API tells."""
+    host = environment.master_address[0]
+    uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+    master = MasterProxy(uri, "/master_status")
+    try:
+        found = master.call("minirospy.status")
+    except RpcFault:
+        state = master.get_system_state()
+        tables = (state.publishers, state.subscribers, state.services)
+        nodes = {node for table in tables for names in table.values() for node in names}
+        print(
+            f"{uri} (not minirospy's): pid {master.get_pid()}, {len(nodes)} nodes, "
+            f"{len(tables[0].keys() | tables[1].keys())} topics, {len(tables[2])} services, "
+            f"{len(master.get_param_names())} parameters"
+        )
+        return 0
+    finally:
+        master.close()
+    print(
+        f"{uri}: pid {found['pid']}, up {_span(found['uptime'])}, {found['nodes']} nodes, {found['topics']} topics, "
+        f"{found['services']} services, {found['parameters']} parameters, {found['clients']} clients, "
+        f"{found['calls']} calls, {found['refused']} refused; journal: {found['journal']}"
+    )
+    return 0
+
+
+def _span(seconds: float) -> str:
+    minutes, rest = divmod(int(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}"
+
+
+def _most_clients() -> int:
+    """How many clients may be connected: as many files as the system lets this process open, with some left."""
+    if sys.platform == "win32":
+        return 400
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = 16384 if hard == resource.RLIM_INFINITY else min(hard, 16384)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+            soft = wanted
+    return max(50, (wanted if soft == resource.RLIM_INFINITY else soft) - 400)
+
+
 def _stop_event() -> asyncio.Event:
-    """Set by SIGINT or SIGTERM."""
+    """Set by SIGINT, SIGTERM, or the end of the terminal (unless nohup said not to care)."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    for number in numbers:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
@@ -153,27 +278,38 @@ def _port_error(name: str, host: str, port: int, error: OSError) -> MinirospyErr
     )
 
 
-def _log_to_file(folder: Path, *, verbose: bool) -> Path:
-    """Log to ``folder``/master.log; ``latest`` beside the folder points to it where links are allowed."""
+def _quiet(line: str) -> None:
+    """Where nobody reads what is registered."""
+
+
+def _log_to_file(folder: Path, *, verbose: bool, level: str | None) -> tuple[Path, Callable[[str], object]]:
+    """Log to ``folder``/master.log; ``latest`` beside the folder points to it where links are allowed.
+
+    The file, and what takes a line about a registration.
+    """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")
-    logger.setLevel(logging.INFO)
+    logger.setLevel(_LEVELS[level or "info"])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handler: logging.Handler = RotatingFileHandler(
-            path, maxBytes=_LOG_BYTES, backupCount=3, encoding="utf-8", delay=True
-        )
+        handler = LogFile(path, _LOG_BYTES, "minirospy.master")
     except OSError as error:
         raise MinirospyError(f"cannot write logs to {folder}: {error}; set ROS_LOG_DIR") from error
-    handler.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))
     logger.addHandler(handler)
+    say: Callable[[str], object] = handler.line if logger.isEnabledFor(logging.INFO) else _quiet
     if verbose:
         logger.addHandler(logging.StreamHandler(sys.stdout))
+
+        def say_twice(line: str, note: Callable[[str], object] = say) -> None:
+            note(line)
+            print(line, flush=True)
+
+        say = say_twice
     latest = folder.parent / "latest"
     with contextlib.suppress(OSError):
         latest.unlink(missing_ok=True)
         latest.symlink_to(folder.name)
-    return path
+    return path, say
 
 
 if __name__ == "__main__":

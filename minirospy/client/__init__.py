@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from minirospy import names
+from minirospy.client.core import get_ros_root, parse_rosrpc_uri
 from minirospy.client.log import (
     DEBUG,
     ERROR,
@@ -37,6 +39,7 @@ from minirospy.client.log import (
     logwarn_throttle,
     logwarn_throttle_identical,
 )
+from minirospy.client.msproxy import MasterProxy, get_master
 from minirospy.client.params import (
     delete_param,
     get_param,
@@ -46,7 +49,7 @@ from minirospy.client.params import (
     search_param,
     set_param,
 )
-from minirospy.client.process import process
+from minirospy.client.process import private_parameters, process
 from minirospy.client.services import Service, ServiceProxy, wait_for_service
 from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, sleep
 from minirospy.client.topics import (
@@ -79,6 +82,7 @@ __all__ = [
     "WARN",
     "AnyMsg",
     "Duration",
+    "MasterProxy",
     "Message",
     "Publisher",
     "ROSException",
@@ -100,6 +104,7 @@ __all__ = [
     "TransportTerminated",
     "delete_param",
     "get_caller_id",
+    "get_master",
     "get_name",
     "get_namespace",
     "get_node_uri",
@@ -107,6 +112,7 @@ __all__ = [
     "get_param_cached",
     "get_param_names",
     "get_published_topics",
+    "get_ros_root",
     "get_rostime",
     "get_time",
     "has_param",
@@ -135,6 +141,7 @@ __all__ = [
     "logwarn_throttle_identical",
     "myargv",
     "on_shutdown",
+    "parse_rosrpc_uri",
     "remap_name",
     "resolve_name",
     "search_param",
@@ -162,7 +169,8 @@ def init_node(
 
     ``anonymous`` adds a number, so that many of a name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
     Raises ValueError on a name that is empty or has a namespace, ROSException when called again with other
-    arguments, ROSInitException where the node cannot be set up or is shut down while it waits.
+    arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut down while it
+    waits.
     """
     process.init_node(
         name,
@@ -195,6 +203,8 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; hooks run in this thread."""
     process.signal_shutdown(reason)
+    # Who asked for it knows of it: what the thread does now is its clean-up, and may sleep.
+    process.tell_shutdown()
 
 
 def get_name() -> str:
@@ -216,17 +226,20 @@ def get_node_uri() -> str | None:
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """The global name of ``name`` as this node, or the node ``caller_id``, sees it."""
-    if caller_id:
-        return names.resolve(name, caller_id)
-    return process.resolve(name)
+    """The global name of ``name`` as this node, or the node ``caller_id``, sees it, remapped."""
+    return process.resolve(name, caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """``name`` with this node's remappings applied."""
-    return process.resolve(name)
+    """What the command line has in place of ``name``, as a global name; ``name`` itself where it has nothing."""
+    return process.remap(name, caller_id)
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
     """The command line without remappings, private parameters and ROS's own arguments."""
-    return [arg for arg in (sys.argv if argv is None else argv) if ":=" not in arg]
+    return names.parse_arguments(sys.argv if argv is None else argv).plain
+
+
+def load_command_line_node_params(argv: Sequence[str]) -> dict[str, Any]:
+    """The private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raises ROSInitException."""
+    return private_parameters(names.parse_arguments(argv))

@@ -6,15 +6,21 @@ may add handlers of its own. Source: http://wiki.ros.org/rospy/Overview/Logging.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
+import re
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
 
+from minirospy import times
 from minirospy.client.process import process
+from minirospy.clock import SimulatedClock
 
 if TYPE_CHECKING:
     from minirospy.client.process import NodeProcess
@@ -26,6 +32,8 @@ __all__ = [
     "FATAL",
     "INFO",
     "WARN",
+    "RosOutHandler",
+    "RosStreamHandler",
     "configure",
     "logdebug",
     "logdebug_once",
@@ -48,8 +56,7 @@ __all__ = [
     "logwarn_once",
     "logwarn_throttle",
     "logwarn_throttle_identical",
-    "set_logger_level",
-    "start_rosout",
+    "start",
 ]
 
 DEBUG, INFO, WARN, ERROR, FATAL = 1, 2, 4, 8, 16
@@ -77,7 +84,13 @@ _COLOUR = {
     logging.CRITICAL: "\033[31m",
 }
 _DEFAULT_FORMAT = "[${severity}] [${time}]: ${message}"
+_FIELD = re.compile(r"\$\{(\w+)(?::([^}]*))?\}")
+_FILE_FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
+_FILE_BYTES = 50_000_000
+_FILE_BACKUPS = 4
 _rosout = logging.getLogger("rosout")
+_log = logging.getLogger(__name__)
+_text = logging.Formatter()
 _F = TypeVar("_F", bound=Callable[..., None])
 
 
@@ -92,206 +105,415 @@ class ThrottledLogFunction(Protocol):
     """``loginfo_throttle`` and its kin."""
 
     def __call__(
-        self, period: float, msg: object, *args: object, logger_name: str | None = None, **kwargs: Any
+        self,
+        period: float | times.Duration,
+        msg: object,
+        *args: object,
+        logger_name: str | None = None,
+        **kwargs: Any,
     ) -> None:
         """Log, but from this place in the code at most once in ``period`` seconds."""
 
 
 def configure(node: NodeProcess, log_level: int | None, log_file: str | None) -> None:
-    """Set up the handlers for the node: terminal, log file. ``log_file``: the ``__log:=`` argument."""
-    _rosout.setLevel(_PYTHON_LEVEL.get(log_level or INFO, logging.INFO))
-    _rosout.addHandler(TerminalHandler(node))
-    # Our own library speaks through the same lines, where something is wrong.
-    ours = logging.getLogger("minirospy")
-    ours.addHandler(TerminalHandler(node))
-    ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    path = Path(log_file) if log_file else node.environment.log_dir / _log_file_name(node.name)
+    """Set up the handlers for the node: terminal, log file. ``log_file``: the ``__log:=`` argument.
+
+    A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
+    ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
+    written or read is told of in one line. Raises ValueError on a log level that is none of rospy's.
+    """
+    if log_level is not None and log_level not in _PYTHON_LEVEL:
+        raise ValueError(
+            f"log_level [{log_level}] is none of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
+        )
+    path = Path(log_file).absolute() if log_file else node.environment.log_dir / _log_file_name(node.name)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = logging.FileHandler(path, encoding="utf-8", delay=True)
-    except OSError as error:
-        print(f"no log file: {error}", file=sys.stderr)
-        return
-    file.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))
-    _rosout.addHandler(file)
-    ours.addHandler(file)
+    except OSError:
+        _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
+    # For a configuration file of the user's, and for programs that look for their log.
+    os.environ["ROS_LOG_FILENAME"] = str(path)
+    if not _configured_by_file(node):
+        _rosout.setLevel(logging.INFO)
+        _rosout.addHandler(RosStreamHandler())
+        _log_to_file(path)
+    if log_level is not None:
+        _rosout.setLevel(_PYTHON_LEVEL[log_level])
+    # Our own library speaks through the same lines, where something is wrong.
+    ours = logging.getLogger("minirospy")
+    ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
+    terminal = RosStreamHandler()
+    terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
+    ours.addHandler(terminal)
+    if path.parent.parent == node.environment.log_dir:
+        _link_latest(path.parent)
 
 
-def start_rosout(node: NodeProcess) -> None:
-    """Publish log lines to /rosout, and offer the services that list and set logger levels."""
-    from roscpp.msg import Logger
-    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
+def start(node: NodeProcess, *, rosout: bool) -> None:
+    """The node is in the graph: offer its logger services, and publish to ``/rosout`` where that is wanted."""
+    _offer_logger_services()
+    if rosout:
+        _start_rosout(node)
+    _log.debug("init_node, name[%s], pid[%s]", node.name, os.getpid())
+
+
+def _start_rosout(node: NodeProcess) -> None:
+    """Publish log lines to /rosout."""
     from rosgraph_msgs.msg import Log
 
-    from minirospy.client.services import Service
+    from minirospy.client.params import get_param
     from minirospy.client.topics import Publisher
 
+    tell_topics = not get_param("/rosout_disable_topics_generation", False)
     publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
-    _rosout.addHandler(RosoutHandler(node, publisher))
+    _rosout.addHandler(RosOutHandler(node, publisher, tell_topics=tell_topics))
+
+
+def _offer_logger_services() -> None:
+    """Offer the node's services that list and set the levels of its loggers."""
+    from roscpp.msg import Logger
+    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
+
+    from minirospy.client.services import Service
 
     def get_loggers(request: object) -> Any:
-        found = [_rosout, *(logging.getLogger(n) for n in logging.root.manager.loggerDict)]
-        return GetLoggersResponse(
-            [
-                Logger(logger.name, _LEVEL_NAME.get(logger.getEffectiveLevel(), "INFO").lower())
-                for logger in found
-            ]
-        )
+        levels = {
+            name: logging.getLogger(name).getEffectiveLevel()
+            for name in sorted(logging.root.manager.loggerDict)
+        }
+        found = [Logger(name, _LEVEL_NAME[_known_level(level)]) for name, level in levels.items()]
+        return GetLoggersResponse(found)
 
     def set_level(request: Any) -> Any:
-        set_logger_level(request.logger, request.level)
+        level = {name.lower(): number for number, name in _LEVEL_NAME.items()}.get(request.level.lower())
+        if level is None:
+            _log.error(
+                "log level [%s] of logger [%s] is none of debug, info, warn, error, fatal",
+                request.level,
+                request.logger,
+            )
+        else:
+            logging.getLogger(request.logger).setLevel(level)
         return SetLoggerLevelResponse()
 
     Service("~get_loggers", GetLoggers, get_loggers)
     Service("~set_logger_level", SetLoggerLevel, set_level)
 
 
-def set_logger_level(logger: str, level: str) -> None:
-    """Set a logger's level by name (debug, info, warn, error, fatal). Raises ValueError."""
-    python_level = {name.lower(): number for number, name in _LEVEL_NAME.items()}.get(level.lower())
-    if python_level is None:
-        raise ValueError(f"log level [{level}] is not one of debug, info, warn, error, fatal")
-    logging.getLogger(logger).setLevel(python_level)
-
-
-class TerminalHandler(logging.Handler):
+class RosStreamHandler(logging.Handler):
     """Lines as rospy prints them: debug and info to stdout, the rest to stderr, coloured on a terminal.
 
     ROSCONSOLE_FORMAT chooses the form (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
     """
 
-    def __init__(self, node: NodeProcess) -> None:
+    def __init__(
+        self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
+    ) -> None:
+        """``stdout``, ``stderr``: where to write; None: what ``sys`` has while a line is written."""
         super().__init__()
-        self._node = node
-        self._template = os.environ.get("ROSCONSOLE_FORMAT") or _DEFAULT_FORMAT
+        self._colorize = colorize
+        self._stdout = stdout
+        self._stderr = stderr
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one line."""
+        """Write one line. A message that does not take its arguments raises TypeError, as rospy's does."""
+        line = _line(record)
+        is_fine = record.levelno < logging.WARNING
+        stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
         try:
-            stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
-            line = self._line(record)
-            colour = _COLOUR.get(record.levelno)
+            colour = _COLOUR.get(record.levelno) if self._colorize else None
             if colour and stream.isatty():
                 line = f"{colour}{line}\033[0m"
-            stream.write(line + "\n")
+            try:
+                stream.write(line + "\n")
+            except UnicodeEncodeError:
+                # A terminal that has not every letter, as on Windows.
+                encoding = stream.encoding or "ascii"
+                stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
-        except (OSError, ValueError):
-            # The terminal is gone; the program has better things to do.
+        except RuntimeError:
+            # A signal handler logs while the line that it interrupted is being written.
+            with contextlib.suppress(OSError, ValueError):
+                os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
+        except (OSError, ValueError, AttributeError):
+            # The terminal is gone, or there never was one; the program has better things to do.
             pass
 
-    def _line(self, record: logging.LogRecord) -> str:
-        message = record.getMessage()
-        if record.exc_info:
-            message += "\n" + logging.Formatter().formatException(record.exc_info)
-        severity, stamp = _LEVEL_NAME.get(record.levelno, record.levelname), self._stamp(record)
-        if self._template == _DEFAULT_FORMAT:
-            return f"[{severity}] [{stamp}]: {message}"
-        fields = {
-            "severity": severity,
-            "time": stamp,
-            "message": message,
-            "walltime": f"{record.created:f}",
-            "logger": record.name,
-            "thread": str(record.thread),
-            "pid": str(record.process),
-            "node": self._node.name,
-            "file": record.pathname,
-            "line": str(record.lineno),
-            "function": record.funcName or "",
-        }
-        line = self._template
-        for field, value in fields.items():
-            line = line.replace("${" + field + "}", value)
-        return line
 
-    def _stamp(self, record: logging.LogRecord) -> str:
-        from minirospy.clock import SimulatedClock
+class RosOutHandler(logging.Handler):
+    """Log records to /rosout (http://wiki.ros.org/rosout)."""
 
-        stamp = f"{record.created:f}"
-        if isinstance(self._node.clock, SimulatedClock):
-            stamp += f", {self._node.clock.now() / 1e9:f}"
-        return stamp
-
-
-class RosoutHandler(logging.Handler):
-    """Log records to /rosout."""
-
-    def __init__(self, node: NodeProcess, publisher: Publisher[Any]) -> None:
+    def __init__(self, node: NodeProcess, publisher: Publisher[Any], *, tell_topics: bool = True) -> None:
         super().__init__()
         self._node = node
         self._publisher = publisher
+        self._tell_topics = tell_topics
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Publish one record, unless publishing itself is what logs."""
         if getattr(self._busy, "yes", False) or self._node.is_shutdown():
             return
-        from rosgraph_msgs.msg import Log
-
         self._busy.yes = True
         try:
-            message = Log()
-            seconds, message.header.stamp.nsecs = divmod(self._node.clock.now(), 10**9)
-            message.header.stamp.secs = seconds
-            message.level = _ROS_LEVEL.get(record.levelno, INFO)
+            message = self._publisher.data_class()
+            stamp = message.header.stamp
+            stamp.secs, stamp.nsecs = divmod(self._node.clock.now(), 10**9)
+            message.level = _ROS_LEVEL[_known_level(record.levelno)]
             message.name = self._node.name
-            message.msg = record.getMessage()
-            message.file = record.pathname
+            message.msg = _message(record)
+            message.file = record.filename
             message.function = record.funcName or ""
             message.line = record.lineno
-            message.topics = list(self._node.node.publications) if self._node.node else []
+            if self._tell_topics and self._node.node:
+                message.topics = list(self._node.node.publications)
             self._publisher.publish(message)
-        except Exception:  # noqa: BLE001 - a log line must never stop the program that logs
-            self.handleError(record)
+        except Exception as error:  # noqa: BLE001 - a log line must never stop the program that logs
+            print(f"Unable to report rosout: {error}", file=sys.stderr)
         finally:
             self._busy.yes = False
 
 
+def _configured_by_file(node: NodeProcess) -> bool:
+    """Follow the user's own configuration of ``logging``, where there is one."""
+    named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
+    folder = node.environment.home / "config"
+    found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
+    for path in [Path(named)] if named else [path for path in found if path.is_file()]:
+        import logging.config
+
+        try:
+            if not path.is_file():
+                raise FileNotFoundError("there is no such file")
+            if path.suffix in (".yaml", ".yml"):
+                import yaml
+
+                with path.open(encoding="utf-8") as file:
+                    logging.config.dictConfig({"disable_existing_loggers": False, **yaml.safe_load(file)})
+            else:
+                logging.config.fileConfig(path, disable_existing_loggers=False)
+        except Exception as error:  # noqa: BLE001 - a file that a person wrote; logging raises all sorts
+            why = " ".join(str(error).split()) or type(error).__name__
+            _warn(f"cannot load logging configuration file [{path}], the usual one is used: {why}")
+            continue
+        return True
+    return False
+
+
+def _log_to_file(path: Path) -> None:
+    """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
+    from logging.handlers import RotatingFileHandler
+
+    try:
+        file = RotatingFileHandler(
+            path, maxBytes=_FILE_BYTES, backupCount=_FILE_BACKUPS, encoding="utf-8", delay=False
+        )
+    except OSError as error:
+        if path.parent.is_dir():
+            _warn(f"cannot write the log file [{path}]: {error.strerror}")
+        return
+    file.setFormatter(logging.Formatter(_FILE_FORMAT))
+    root = logging.root
+    if not root.handlers:
+        root.setLevel(logging.INFO)
+    # Handlers that the program itself gave the root before (basicConfig) stay, where rospy takes them
+    # away; but what rosout has written to the terminal is not written there again.
+    for handler in root.handlers:
+        if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
+            handler.addFilter(_is_not_ours)
+    root.addHandler(file)
+
+
+def _is_not_ours(record: logging.LogRecord) -> bool:
+    return record.name.partition(".")[0] not in ("rosout", "minirospy")
+
+
+def _link_latest(folder: Path) -> None:
+    """``latest`` beside the folder of a run is a link to it."""
+    link = folder.parent / "latest"
+    # No links on this file system, or another node was faster.
+    with contextlib.suppress(OSError, NotImplementedError):
+        if link.is_symlink():
+            if link.resolve() == folder.resolve():
+                return
+            link.unlink()
+        link.symlink_to(folder, target_is_directory=True)
+
+
 def _log_file_name(node_name: str) -> str:
-    return node_name.strip("/").replace("/", "-") + ".log"
+    return node_name.strip("/").replace("/", "_") + ".log"
+
+
+def _warn(text: str) -> None:
+    print(f"WARNING: {text}", file=sys.stderr)
+
+
+def _known_level(level: int) -> int:
+    """The nearest of the five levels at or below a level of Python's."""
+    return max((known for known in _LEVEL_NAME if known <= level), default=logging.DEBUG)
+
+
+def _message(record: logging.LogRecord) -> str:
+    text = record.getMessage()
+    if record.exc_info and not record.exc_text:
+        record.exc_text = _text.formatException(record.exc_info)
+    return f"{text}\n{record.exc_text}" if record.exc_text else text
+
+
+def _line(record: logging.LogRecord) -> str:
+    message = _message(record)
+    severity = _LEVEL_NAME.get(record.levelno, record.levelname)
+    template = os.environ.get("ROSCONSOLE_FORMAT")
+    if not template or template == _DEFAULT_FORMAT:
+        return f"[{severity}] [{_stamp(record)}]: {message}"
+    fields: dict[str, Callable[[str | None], object]] = {
+        "severity": lambda _: severity,
+        "message": lambda _: message,
+        "time": lambda form: _stamp(record, form),
+        "walltime": lambda form: _wall_time(record, form),
+        "thread": lambda _: record.thread,
+        "logger": lambda _: record.name,
+        "file": lambda _: record.pathname,
+        "line": lambda _: record.lineno,
+        "function": lambda _: record.funcName,
+        "node": lambda _: process.name,
+    }
+
+    def field(found: re.Match[str]) -> str:
+        name, form = found.groups()
+        if name not in fields or (form is not None and name not in ("time", "walltime")):
+            return found[0]
+        return str(fields[name](form))
+
+    return _FIELD.sub(field, template)
+
+
+def _wall_time(record: logging.LogRecord, form: str | None = None) -> str:
+    return f"{record.created:f}" if form is None else time.strftime(form, time.localtime(record.created))
+
+
+def _stamp(record: logging.LogRecord, form: str | None = None) -> str:
+    """Wall time, and behind it the simulated time where that is used."""
+    wall = _wall_time(record, form)
+    clock = process.clock
+    return f"{wall}, {clock.now() / 1e9:f}" if isinstance(clock, SimulatedClock) else wall
 
 
 def _logger(name: str | None) -> logging.Logger:
     return logging.getLogger(f"rosout.{name}") if name else _rosout
 
 
+def _write(
+    logger: logging.Logger,
+    level: int,
+    frame: FrameType,
+    msg: object,
+    args: tuple[object, ...],
+    *,
+    exc_info: Any = None,
+    extra: dict[str, object] | None = None,
+    stack_info: bool = False,
+    stacklevel: int = 1,
+) -> None:
+    """Log for the caller at ``frame``. A method is named with its class, as rospy does it."""
+    at = frame
+    while stacklevel > 1 and at.f_back is not None:
+        stacklevel, at = stacklevel - 1, at.f_back
+    function = at.f_code.co_name
+    if "self" in at.f_code.co_varnames or "self" in at.f_code.co_freevars:
+        with contextlib.suppress(KeyError):
+            function = f"{type(at.f_locals['self']).__name__}.{function}"
+    if isinstance(exc_info, BaseException):
+        exc_info = (type(exc_info), exc_info, exc_info.__traceback__)
+    elif exc_info and not isinstance(exc_info, tuple):
+        exc_info = sys.exc_info()
+    stack = None
+    if stack_info:
+        import traceback
+
+        stack = "Stack (most recent call last):\n" + "".join(traceback.format_stack(at)).rstrip("\n")
+    place = at.f_code.co_filename, at.f_lineno
+    record = logger.makeRecord(logger.name, level, *place, msg, args, exc_info, function, extra, stack)
+    logger.handle(record)
+
+
 def _log_function(level: int, name: str) -> LogFunction:
     def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
         logger = _logger(logger_name)
         if logger.isEnabledFor(level):
-            logger.log(level, msg, *args, stacklevel=2, **kwargs)
+            _write(logger, level, sys._getframe(1), msg, args, **kwargs)
 
     return _named(log, name, f"Log ``msg % args`` at level {_LEVEL_NAME[level]}.")
 
 
-def _once_function(level: int, name: str) -> LogFunction:
-    seen: set[tuple[str, int]] = set()
+class _Places:
+    """Which places in the code have logged: when, and what. A place is one call, whatever function it calls."""
 
+    def __init__(self) -> None:
+        self._once: set[tuple[str, int, int]] = set()
+        self._times: dict[tuple[str, int, int], int] = {}
+        self._texts: dict[tuple[str, int, int], object] = {}
+
+    def is_first(self, frame: FrameType) -> bool:
+        """Whether the call at ``frame`` has not logged before."""
+        place = _place(frame)
+        if place in self._once:
+            return False
+        self._once.add(place)
+        return True
+
+    def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
+        """Whether the call at ``frame`` was last due more than ``period`` seconds ago."""
+        place, now = _place(frame), process.clock.now()
+        before = self._times.get(place)
+        pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
+        # Simulated time that jumped back starts anew.
+        due = before is None or now - before > pause or now < before
+        if due:
+            self._times[place] = now
+        return due
+
+    def is_new(self, frame: FrameType, text: object) -> bool:
+        """Whether the call at ``frame`` logged another text before, or none."""
+        place = _place(frame)
+        if place in self._texts and self._texts[place] == text:
+            return False
+        self._texts[place] = text
+        return True
+
+
+_places = _Places()
+
+
+def _once_function(level: int, name: str) -> LogFunction:
     def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
-        place = _caller()
-        if place not in seen:
-            seen.add(place)
-            _logger(logger_name).log(level, msg, *args, stacklevel=2, **kwargs)
+        logger = _logger(logger_name)
+        if logger.isEnabledFor(level):
+            frame = sys._getframe(1)
+            if _places.is_first(frame):
+                _write(logger, level, frame, msg, args, **kwargs)
 
     return _named(log, name, f"Log at level {_LEVEL_NAME[level]}, from this place in the code only once.")
 
 
 def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLogFunction:
-    last: dict[tuple[str, int], tuple[int, object]] = {}
-
-    def log(period: float, msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
-        place, now = _caller(), process.clock.now()
-        before = last.get(place)
-        due = (
-            before is None
-            or now - before[0] >= period * 1e9
-            # Simulated time that jumped back starts anew.
-            or now < before[0]
-            or (identical and before[1] != msg)
-        )
+    def log(
+        period: float | times.Duration,
+        msg: object,
+        *args: object,
+        logger_name: str | None = None,
+        **kwargs: Any,
+    ) -> None:
+        logger = _logger(logger_name)
+        if not logger.isEnabledFor(level):
+            return
+        frame = sys._getframe(1)
+        # A period of 0 is none: then the text alone decides, or nothing.
+        due = _places.is_due(frame, period) if period else not identical
+        if identical:
+            due = _places.is_new(frame, msg) or due
         if due:
-            last[place] = (now, msg)
-            _logger(logger_name).log(level, msg, *args, stacklevel=2, **kwargs)
+            _write(logger, level, frame, msg, args, **kwargs)
 
     what = "the same text " if identical else ""
     return _named(log, name, f"Log at level {_LEVEL_NAME[level]}, {what}at most once in ``period`` seconds.")
@@ -303,9 +525,9 @@ def _named(function: _F, name: str, doc: str) -> _F:
     return function
 
 
-def _caller() -> tuple[str, int]:
-    frame = sys._getframe(2)
-    return frame.f_code.co_filename, frame.f_lineno
+def _place(frame: FrameType) -> tuple[str, int, int]:
+    """The place of a call in the code: two calls on one line are two places."""
+    return frame.f_code.co_filename, frame.f_lineno, frame.f_lasti
 
 
 logdebug = _log_function(logging.DEBUG, "logdebug")

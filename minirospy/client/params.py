@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+import datetime
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar
 
-from minirospy import names
-from minirospy.client.process import process
+from minirospy.client.process import process, warn_of_illegal_name
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 
 __all__ = [
@@ -18,6 +21,9 @@ __all__ = [
     "set_param",
 ]
 
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_T = TypeVar("_T")
+
 
 class _Unspecified:
     """The default of ``default``: None is a value that a caller may want back."""
@@ -26,82 +32,163 @@ class _Unspecified:
 _UNSPECIFIED = _Unspecified()
 
 
+class MasterGoneError(ROSException, ConnectionRefusedError):
+    """No master answers: rospy lets the socket's error through, and programs catch either."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 def get_param(param_name: str, default: Any = _UNSPECIFIED) -> Any:
     """A parameter's value, or ``default`` where it is not set.
 
+    Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
     Raises KeyError where it is not set and there is no default, ROSException where the master fails.
     """
+    value = _get(process.resolve(param_name))
+    if value is not KeyError:
+        return _as_rospy(value)
+    if default is _UNSPECIFIED:
+        raise KeyError(param_name)
+    return default
+
+
+def get_param_cached(param_name: str, default: Any = _UNSPECIFIED) -> Any:
+    """The same, without asking the master each time: it tells of changes. Before init_node, no different."""
     name = process.resolve(param_name)
+    cache, node = process.parameters, process.node
+    if node is None or process.is_shutdown():
+        return get_param(param_name, default)
     try:
-        return process.master.get_param(name)
-    except RpcRefused as error:
-        if default is _UNSPECIFIED:
-            raise KeyError(param_name) from error
-        return default
-    except (MasterUnreachableError, RpcError) as error:
-        raise _failed("get", name, error) from error
-
-
-get_param_cached = get_param
+        value = cache.get(name)
+    except LookupError:
+        changes = cache.changes
+        if name not in node.parameters:
+            _ask("get", name, lambda: process.master.subscribe_param(node.uri, name))
+            node.parameters.add(name)
+        value = _get(name)
+        with process.lock:
+            cache.store(name, value, changes)
+    if value is not KeyError:
+        return _as_rospy(copy.deepcopy(value))
+    if default is _UNSPECIFIED:
+        raise KeyError(param_name)
+    return default
 
 
 def set_param(param_name: str, param_value: Any) -> None:
-    """Set a parameter; a dictionary sets a whole namespace. Raises ROSException."""
+    """Set a parameter; a dictionary sets a whole namespace.
+
+    Raises TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
+    fails.
+    """
     name = process.resolve(param_name)
-    _checked(param_name)
+    warn_of_illegal_name(param_name)
     try:
-        process.master.set_param(name, param_value)
-    except (MasterUnreachableError, RpcError) as error:
-        raise _failed("set", name, error) from error
+        _ask("set", name, lambda: process.master.set_param(name, param_value))
+    except ROSException:
+        _check_sendable(param_value)
+        raise
+    # The master does not tell who has set it.
+    process.parameter_changed(name)
 
 
 def has_param(param_name: str) -> bool:
     """Whether a parameter, or a namespace of that name, is set. Raises ROSException."""
     name = process.resolve(param_name)
-    try:
-        return process.master.has_param(name)
-    except (MasterUnreachableError, RpcError) as error:
-        raise _failed("look for", name, error) from error
+    return _ask("look for", name, lambda: process.master.has_param(name))
 
 
 def delete_param(param_name: str) -> None:
     """Delete a parameter. Raises KeyError where it is not set, ROSException where the master fails."""
     name = process.resolve(param_name)
     try:
-        process.master.delete_param(name)
-    except RpcRefused as error:
-        raise KeyError(param_name) from error
-    except (MasterUnreachableError, RpcError) as error:
-        raise _failed("delete", name, error) from error
+        _ask("delete", name, lambda: process.master.delete_param(name))
+    except ROSException as error:
+        if isinstance(error.__cause__, RpcRefused):
+            raise KeyError(param_name) from error
+        raise
+    process.parameter_changed(name)
 
 
 def search_param(param_name: str) -> str | None:
-    """The nearest parameter of this name, upwards from this node's namespace; None where there is none."""
-    if not param_name:
-        raise ROSException("search_param: param_name cannot be empty")
+    """The nearest parameter of this name, upwards from this node's namespace; None where there is none.
+
+    Raises ROSException where the master fails, or the name is a private one.
+    """
+    name = process.arguments.remappings.get(param_name, param_name)
     try:
-        return process.master.search_param(param_name)
-    except (MasterUnreachableError, RpcError) as error:
-        raise _failed("search", param_name, error) from error
+        return str(_ask("search", name, lambda: process.master.call("searchParam", name)))
+    except ROSException as error:
+        why = error.__cause__
+        if isinstance(why, RpcRefused):
+            if why.code == -1:
+                return None
+            raise ROSException(f"cannot search for parameter: {why.text}") from why
+        raise
 
 
 def get_param_names() -> list[str]:
     """The names of all parameters. Raises ROSException."""
+    return _ask("list", "/", process.master.get_param_names)
+
+
+def _get(name: str) -> Any:
+    """The value, or KeyError (the class) where it is not set."""
     try:
-        return process.master.get_param_names()
-    except (MasterUnreachableError, RpcError) as error:
-        raise ROSException(f"unable to get parameter names: {error}") from error
+        return _ask("get", name, lambda: process.master.get_param(name))
+    except ROSException as error:
+        if isinstance(error.__cause__, RpcRefused):
+            return KeyError
+        raise
 
 
-def _checked(name: str) -> None:
-    if not names.is_legal_name(name):
-        import warnings
+def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
+    try:
+        return call()
+    except MasterUnreachableError as error:
+        raise MasterGoneError(f"unable to {verb} parameter [{name}]: {error}") from error
+    except RpcError as error:
+        raise ROSException(f"unable to {verb} parameter [{name}]: {error}") from error
 
-        warnings.warn(
-            f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",
-            stacklevel=3,
-        )
+
+def _as_rospy(value: Any) -> Any:
+    """``value`` with bytes and dates in xmlrpc.client's wrappers, where rospy has them."""
+    if isinstance(value, dict):
+        return {key: _as_rospy(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_as_rospy(item) for item in value]
+    if isinstance(value, bytes | datetime.datetime):
+        # Imported here: http.client and its kin cost more than all else of this module.
+        import xmlrpc.client
+
+        return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)
+    return value
 
 
-def _failed(verb: str, name: str, error: Exception) -> ROSException:
-    return ROSException(f"unable to {verb} parameter [{name}]: {error}")
+def _check_sendable(value: Any) -> None:
+    """Raise what rospy raises on a value that XML-RPC has no type for."""
+    if value is None:
+        raise TypeError("cannot marshal None unless allow_none is enabled")
+    if isinstance(value, int):
+        if not -(2**31) <= value < 2**31:
+            raise OverflowError("int exceeds XML-RPC limits")
+    elif isinstance(value, str):
+        found = _NOT_XML.search(value)
+        if found:
+            raise ValueError(f"{value!r} cannot be sent: XML has no character {found[0]!r}")
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            if not isinstance(key, str):
+                raise TypeError("dictionary key must be string")
+            _check_sendable(key)
+            _check_sendable(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _check_sendable(item)
+    elif not (isinstance(value, float | bytes | bytearray | datetime.datetime) or _is_wrapper(value)):
+        raise TypeError(f"cannot marshal {type(value)} objects")
+
+
+def _is_wrapper(value: object) -> bool:
+    return type(value).__module__ == "xmlrpc.client"

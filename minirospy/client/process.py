@@ -10,12 +10,14 @@ import atexit
 import contextlib
 import logging
 import os
+import re
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -28,20 +30,28 @@ from minirospy.errors import (
     ROSInitException,
     ROSInterruptException,
     RpcError,
+    UsageError,
 )
+from minirospy.graph.parameter_cache import ParameterCache
 from minirospy.runtime import tcp
 from minirospy.runtime.loop import LoopClosedError, LoopThread
 from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.node import Node
+from minirospy.wire.xmlrpc import serialize_call
 
 if TYPE_CHECKING:
+    from minirospy.client.services import Service
     from minirospy.client.topics import _Published, _Subscribed
 
-__all__ = ["NodeProcess", "process"]
+__all__ = ["NodeProcess", "private_parameters", "process", "warn_of_illegal_name"]
 
 _T = TypeVar("_T")
-_UNNAMED = "/unnamed"
+_UNNAMED = "unnamed"
 _LEAVE_SECONDS = 3.0
+_HEAR_SECONDS, _ROUND_SECONDS = 0.4, 3.0
+"""How long the main thread may take to hear of a shutdown, without and with a loop that asks for it."""
+_REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
+_TOO_LATE = "already shutdown"
 _log = logging.getLogger(__name__)
 
 
@@ -50,27 +60,40 @@ class NodeProcess:
 
     def __init__(self) -> None:
         self.node: Node | None = None
-        self.name = _UNNAMED
         self.remappings: dict[str, str] = {}
+        """By resolved names; empty before init_node."""
         self.clock: Clock = WallClock()
+        self.has_time = False
+        """Whether the time may be asked for: from init_node on, or once a program without a node has said so."""
         self.shutting_down = threading.Event()
         """Set once the shutdown hooks have run: every blocking call ends."""
+        self.parameters = ParameterCache()
         self.published: dict[str, _Published] = {}
         self.subscribed: dict[str, _Subscribed] = {}
+        self.offered: dict[str, Service[Any]] = {}
         self.lock = threading.RLock()
         """Guards the tables above while they change."""
+        self._name: str | None = None
         self._arguments: names.Arguments | None = None
         self._environment: Environment | None = None
         self._init_arguments: tuple[object, ...] | None = None
         self._loop: LoopThread | None = None
         self._master: MasterProxy | None = None
         self._hooks: list[Callable[[], object]] = []
+        self._hooks_before: list[Callable[[object], object]] = []
+        self._hooks_after: list[Callable[[object], object]] = []
         self._interrupts: list[Callable[[], object]] = []
         self._waiting_for_node: list[Callable[[], object]] = []
         self._shutdown_begun = False
         self._gone = threading.Event()
         self._signals = 0
         self._thread = threading.local()
+        self._others_ask = False
+        self._main_told = threading.Event()
+        self._watches_forks = False
+        self._is_forked = False
+        self.insisted = False
+        """Whether the main thread was interrupted, because it did not end at a signal."""
         self._previous_handlers: dict[int, Any] = {}
         self.late_signal = 0
         """A signal that came while the main thread was sending; who has sent takes it."""
@@ -82,8 +105,22 @@ class NodeProcess:
     def environment(self) -> Environment:
         """The environment that the process started in."""
         if self._environment is None:
-            self._environment = Environment.read()
+            self._environment = self._read_environment()
         return self._environment
+
+    @property
+    def arguments(self) -> names.Arguments:
+        """The command line: that of init_node, before it that of the process."""
+        if self._arguments is None:
+            self._arguments = names.parse_arguments(sys.argv)
+        return self._arguments
+
+    @property
+    def name(self) -> str:
+        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        if self._name is None:
+            self._name = names.join(self.environment.namespace, _UNNAMED)
+        return self._name
 
     @property
     def master(self) -> MasterProxy:
@@ -97,12 +134,37 @@ class NodeProcess:
         """Whether init_node has been called."""
         return self.node is not None
 
-    def resolve(self, name: str) -> str:
-        """The global name of ``name`` as this node sees it."""
-        if self.node is None and not self.remappings:
-            arguments = self._parsed_arguments()
-            self.remappings = arguments.resolved_remappings(self.name)
-        return names.resolve(name, self.name, self.remappings)
+    def resolve(self, name: str, caller_id: str | None = None) -> str:
+        """The global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        node_name = caller_id or self.name
+        if name and names.is_private(name):
+            # As rospy reads it: `~` keeps a slash behind it, and `~/x` is `/x`.
+            resolved = names.join(node_name, names.canonicalize(name)[1:])
+        else:
+            resolved = names.resolve(name, node_name)
+        return self.remappings.get(resolved, resolved)
+
+    def resolve_topic(self, name: str) -> str:
+        """The same for a topic, which keeps the name that it was made with.
+
+        Before init_node it has the remappings of the process's command line, but cannot be private:
+        raises ValueError.
+        """
+        if self._init_arguments is not None:
+            return self.resolve(name)
+        if names.is_private(name):
+            raise ValueError("~name topics cannot be created before init_node() has been called")
+        return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
+
+    def remap(self, name: str, caller_id: str | None = None) -> str:
+        """What the command line says in place of ``name``, as it is spelt there; else ``name`` itself."""
+        mapped = self.arguments.remappings.get(name)
+        return name if mapped is None else names.resolve(mapped, caller_id or self.name)
+
+    def parameter_changed(self, key: str) -> None:
+        """Somebody has set or deleted the parameter ``key``."""
+        with self.lock:
+            self.parameters.changed(key)
 
     def run(self, coroutine: Coroutine[Any, Any, _T]) -> _T:
         """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
@@ -111,7 +173,7 @@ class NodeProcess:
             return self._loop.run(coroutine)
         except LoopClosedError as error:
             self.tell_shutdown()
-            raise ROSInterruptException("rospy shutdown") from error
+            raise self.interrupted("rospy shutdown") from error
 
     def post(self, function: Callable[..., object], *args: object) -> None:
         """Call ``function`` on the node's loop soon."""
@@ -147,8 +209,13 @@ class NodeProcess:
         """Make this process the node ``name``; waits for a master.
 
         Raises ValueError on a name that is empty or has a namespace, ROSException when called again with
-        other arguments, ROSInitException where the node cannot be set up.
+        other arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut
+        down while it waits.
         """
+        if not name:
+            raise ValueError("name must not be empty")
+        if "/" in name:
+            raise ValueError("namespaces are not allowed in node names")
         argv = list(sys.argv if argv is None else argv)
         given = (name, argv, anonymous, log_level, disable_rostime, disable_signals)
         if self._init_arguments is not None:
@@ -158,10 +225,6 @@ class NodeProcess:
                     + str(self._init_arguments)
                 )
             return
-        if not name:
-            raise ValueError("name must not be empty")
-        if "/" in name:
-            raise ValueError("namespaces are not allowed in node names")
         if not names.is_legal_base_name(name):
             warnings.warn(
                 f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
@@ -169,17 +232,9 @@ class NodeProcess:
             )
         self._init_arguments = given
         arguments = self._arguments = names.parse_arguments(argv)
+        parameters = private_parameters(arguments)
         special = arguments.special
-        self._environment = Environment.read(
-            master_uri=special.get("__master", ""),
-            host=special.get("__hostname") or special.get("__ip", ""),
-            namespace=special.get("__ns", ""),
-        )
-        if "__name" in special:
-            name = special["__name"]
-        elif anonymous:
-            name = names.anonymous_name(name)
-        self.name = names.canonicalize(self.environment.namespace + "/" + name)
+        self._take_name(name, anonymous, special)
         self.remappings = arguments.resolved_remappings(self.name)
 
         # Imported here: a tool that needs no log lines need not pay for them.
@@ -187,43 +242,64 @@ class NodeProcess:
 
         log.configure(self, log_level, special.get("__log"))
         if not disable_signals:
-            self._take_signals()
+            self.take_signals()
         self._loop = LoopThread()
         node = Node(
             self.name,
             self.environment,
-            on_shutdown=self.signal_shutdown,
+            on_shutdown=self._asked_to_shut_down,
+            on_parameter=lambda key, _: self.parameter_changed(key),
         )
+        node.when_registered_again.append(self._subscribe_parameters)
         try:
             self._loop.run(node.start(xmlrpc_port, tcpros_port))
         except OSError as error:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
         atexit.register(self._at_exit)
+        self._watch_forks()
         sys.excepthook = _EndOfInterrupted(sys.excepthook)
         self._wait_for_master()
-        self._set_private_parameters(arguments)
+        for key, value in parameters.items():
+            self.master.set_param(names.resolve("~" + key, self.name), value)
         if not disable_rostime:
             self._start_clock()
+        self.has_time = True
         with self.lock:
             self.node = node
             waiting, self._waiting_for_node = self._waiting_for_node, []
         for function in waiting:
             function()
-        if not disable_rosout:
-            log.start_rosout(self)
-        _log.debug("init_node, name[%s], pid[%s]", self.name, os.getpid())
+        log.start(self, rosout=not disable_rosout)
+
+    def _take_name(self, name: str, anonymous: bool, special: Mapping[str, str]) -> None:
+        """Read the environment, and be the node ``name`` in its namespace."""
+        try:
+            self._environment = self._read_environment()
+        except UsageError as error:
+            raise ROSInitException(str(error)) from error
+        if "__name" in special:
+            name = special["__name"]
+        elif anonymous:
+            name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
+        self._name = names.resolve(name, names.join(self.environment.namespace, _UNNAMED))
+
+    def reload_arguments(self, argv: Sequence[str]) -> None:
+        """Take ``argv`` for the command line."""
+        self._arguments = names.parse_arguments(argv)
 
     # --- ending
 
     def on_shutdown(self, hook: Callable[[], object]) -> None:
         """Call ``hook`` when the node shuts down, before it leaves the graph. Raises TypeError."""
-        if not callable(hook):
-            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        with self.lock:
-            if not self._shutdown_begun:
-                self._hooks.append(hook)
-                return
-        hook()
+        self._add_hook(self._hooks, hook, ())
+
+    def before_shutdown(self, hook: Callable[[object], object]) -> None:
+        """Call ``hook(reason)`` after the hooks of :meth:`on_shutdown`, still before is_shutdown() is true."""
+        self._add_hook(self._hooks_before, hook, (_TOO_LATE,))
+
+    def after_shutdown(self, hook: Callable[[object], object]) -> None:
+        """Call ``hook(reason)`` once is_shutdown() is true, before the node leaves the graph."""
+        self._add_hook(self._hooks_after, hook, (_TOO_LATE,))
 
     def signal_shutdown(self, reason: object) -> None:
         """Shut the node down: hooks run in this thread, blocking calls end, the node leaves the graph."""
@@ -231,14 +307,21 @@ class NodeProcess:
             if self._shutdown_begun:
                 return
             self._shutdown_begun = True
-            hooks = list(self._hooks)
         _log.debug("signal_shutdown [%s]", reason)
-        for hook in hooks:
-            try:
-                hook()
-            except Exception:  # noqa: BLE001 - the user's hook: the others have to run all the same
-                traceback.print_exc()
-        self.shutting_down.set()
+        try:
+            self._run_hooks(self._hooks, ())
+            self._run_hooks(self._hooks_before, (reason,))
+            with self.lock:
+                # A hook that comes from now on is called at once.
+                self.shutting_down.set()
+            self._run_hooks(self._hooks_after, (reason,))
+        finally:
+            # Also where a second Ctrl-C ends a hook.
+            self.shutting_down.set()
+            self._leave()
+
+    def _leave(self) -> None:
+        """End what blocks, and leave the graph."""
         for interrupt in list(self._interrupts):
             with contextlib.suppress(Exception):
                 interrupt()
@@ -252,6 +335,11 @@ class NodeProcess:
             self._master.close()
         self._gone.set()
 
+    @property
+    def is_shutdown_requested(self) -> bool:
+        """Whether a shutdown has begun: its hooks may still be running."""
+        return self._shutdown_begun
+
     def is_shutdown(self) -> bool:
         """Whether the node has shut down."""
         return self.shutting_down.is_set()
@@ -260,8 +348,9 @@ class NodeProcess:
         """The same, for user code: the calling thread counts as one that asks, and then as one that was told."""
         if not self.shutting_down.is_set():
             self._thread.asks = True
+            self._others_ask = self._others_ask or threading.current_thread() is not threading.main_thread()
             return False
-        self._thread.knows = True
+        self._told()
         return True
 
     def knows_of_shutdown(self) -> bool:
@@ -278,12 +367,16 @@ class NodeProcess:
         if getattr(self._thread, "asks", False):
             self._thread.asks = False
             return
-        self._thread.knows = True
-        raise ROSInterruptException("ROS shutdown request")
+        raise self.interrupted("ROS shutdown request")
+
+    def interrupted(self, text: str) -> ROSInterruptException:
+        """The error that tells the calling thread of the shutdown, for it to raise."""
+        self._told()
+        return ROSInterruptException(text)
 
     def spin(self) -> None:
         """Wait until the node shuts down. Raises ROSInitException before init_node."""
-        if not self.initialized and not self.is_shutdown():
+        if not self.initialized and not self.is_shutdown() and not self._is_forked:
             raise ROSInitException("client code must call rospy.init_node() first")
         try:
             wait_for_event(self.shutting_down, None)
@@ -293,17 +386,87 @@ class NodeProcess:
 
     # --- helpers
 
+    def _watch_forks(self) -> None:
+        """See to what a fork needs, once; a fork inherits it."""
+        if sys.platform == "win32" or self._watches_forks:
+            return
+        self._watches_forks = True
+        mask: list[set[signal.Signals | int]] = []
+
+        # Python throws away a signal that comes to the child before it is set up: Pool.terminate() would wait forever.
+        def hold_signals() -> None:
+            mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
+
+        def release_signals() -> None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask.pop())
+
+        def begin_child() -> None:
+            self._after_fork()
+            release_signals()
+
+        os.register_at_fork(before=hold_signals, after_in_parent=release_signals, after_in_child=begin_child)
+
+    def _after_fork(self) -> None:
+        """This process is a copy of the node's, without its threads: the node stays the parent's.
+
+        The name, the time and log lines go on; topics of the parent's connect nobody here; the child may become a
+        node of its own by init_node. Locks that another thread held are free, sockets are not shared.
+        """
+        for publication in self.node.publications.values() if self.node else ():
+            publication.links = ()
+        self.node = self._loop = self._master = self._init_arguments = None
+        self._is_forked = True
+        self.published, self.subscribed = {}, {}
+        self.lock = threading.RLock()
+        self._thread = threading.local()
+        self._others_ask = False
+        was_down, self.shutting_down = self.shutting_down.is_set(), threading.Event()
+        if was_down:
+            self.shutting_down.set()
+        self._main_told, self._gone = threading.Event(), threading.Event()
+        self._signals = self.late_signal = 0
+        # The parent's hooks are for the parent's end.
+        self._hooks, self._hooks_before, self._hooks_after = [], [], []
+        self._interrupts, self._waiting_for_node = [], []
+
+    def _add_hook(self, hooks: list[Any], hook: Callable[..., object], given: tuple[object, ...]) -> None:
+        if not callable(hook):
+            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
+        with self.lock:
+            if not self.is_shutdown():
+                hooks.append(hook)
+                return
+        hook(*given)
+
+    @staticmethod
+    def _run_hooks(hooks: list[Any], given: tuple[object, ...]) -> None:
+        # A hook may add another: it comes last.
+        for hook in hooks:
+            try:
+                hook(*given)
+            except (Exception, SystemExit):  # noqa: BLE001 - the user's hook: the others have to run all the same
+                traceback.print_exc()
+
     def _at_exit(self) -> None:
         """The program has ended. Where another thread shuts down, let it take the node out of the graph first."""
+        self._main_told.set()
         self.signal_shutdown("atexit")
         self._gone.wait(_LEAVE_SECONDS)
 
-    def _parsed_arguments(self) -> names.Arguments:
-        if self._arguments is None:
-            self._arguments = names.parse_arguments(sys.argv)
-        return self._arguments
+    def _read_environment(self) -> Environment:
+        """The environment, and what the process's own command line says in place of it.
 
-    def _take_signals(self) -> None:
+        As in rospy, the ``argv`` that a program hands to init_node has no say in this, but for ``__name``.
+        """
+        special = names.parse_arguments(sys.argv).special
+        hosts = [value for key, value in special.items() if key in {"__ip", "__hostname"}]
+        return Environment.read(
+            master_uri=special.get("__master", ""),
+            host=hosts[0] if hosts else "",
+            namespace=special.get("__ns", ""),
+        )
+
+    def take_signals(self) -> None:
         """SIGINT and SIGTERM shut down; only the main thread may take signals."""
         if threading.current_thread() is not threading.main_thread():
             return
@@ -325,6 +488,11 @@ class NodeProcess:
             return
         self.late_signal = 0
         self._signals += 1
+        if self._is_forked and self.node is None and not getattr(self._thread, "asks", False):
+            # A worker of the program, which never asks is_shutdown(), ends as any child process does.
+            signal.signal(number, self._previous_handlers[number])
+            signal.raise_signal(number)
+            return
         if self._shutdown_begun:
             if self._signals > 1:
                 # The program did not end at the first: now it is interrupted as any Python program.
@@ -335,6 +503,43 @@ class NodeProcess:
         if callable(previous):
             with contextlib.suppress(KeyboardInterrupt):
                 previous(number, frame)
+        self._see_to_the_end(number)
+
+    def _see_to_the_end(self, number: int) -> None:
+        """A signal has shut the node down: the program has to end, also where its main thread never hears of it.
+
+        That thread may be in time.sleep(), in input() or in a loop that does not ask is_shutdown(). A loop that
+        asks gets the time to come round, since its clean-up often stands behind it.
+        """
+        seconds = _ROUND_SECONDS if getattr(self._thread, "asks", False) else _HEAR_SECONDS
+        watch = threading.Thread(
+            target=self._insist, args=(number, seconds), name="minirospy-end", daemon=True
+        )
+        watch.start()
+
+    def _insist(self, number: int, seconds: float) -> None:
+        main = threading.main_thread()
+        if self._main_told.wait(seconds) or not main.ident:
+            return
+        if not main.is_alive() and self._others_ask:
+            # The program waits for its other threads, and those will see.
+            return
+        self.insisted = True
+        # A second signal interrupts whatever the main thread does, as in any Python program.
+        if sys.platform == "win32":
+            signal.raise_signal(number)
+        else:
+            signal.pthread_kill(main.ident, number)
+
+    def _told(self) -> None:
+        self._thread.knows = True
+        if threading.current_thread() is threading.main_thread():
+            self._main_told.set()
+
+    def _asked_to_shut_down(self, reason: str) -> None:
+        """Somebody outside ends this node: as rospy does, say on stdout who and why."""
+        print("shutdown request" + (f": {asked[1]}" if (asked := _REQUEST.match(reason)) else ""), flush=True)
+        self.signal_shutdown(reason)
 
     def take_late_signal(self) -> None:
         """Act on a signal that came while the main thread was sending."""
@@ -363,17 +568,19 @@ class NodeProcess:
                     told = True
                 if wait_for_event(self.shutting_down, 0.25):
                     break
+            except RpcError as error:
+                uri = self.environment.master_uri
+                raise ROSInitException(f"what answers at {uri} is no ROS master: {error}") from error
             else:
                 return
-        raise ROSInitException(f"shut down while waiting for the master at {self.environment.master_uri}")
+        raise self.interrupted(f"shut down while waiting for the master at {self.environment.master_uri}")
 
-    def _set_private_parameters(self, arguments: names.Arguments) -> None:
-        if not arguments.parameters:
-            return
-        import yaml
-
-        for key, text in arguments.parameters.items():
-            self.master.set_param(names.resolve("~" + key, self.name), yaml.safe_load(text) if text else "")
+    def _subscribe_parameters(self) -> None:
+        """A master that has restarted: what was known of its parameters is old, and it has to be told again."""
+        if self.node:
+            keys, self.node.parameters = self.node.parameters, set()
+            for key in keys:
+                self.parameter_changed(key)
 
     def _start_clock(self) -> None:
         try:
@@ -385,6 +592,36 @@ class NodeProcess:
             from minirospy.client.time import follow_clock_topic
 
             self.when_ready(lambda: follow_clock_topic(clock))
+
+
+def private_parameters(arguments: names.Arguments) -> dict[str, Any]:
+    """The values of ``_param:=value``, read as YAML. Raises ROSInitException on what is none."""
+    if arguments.wrong:
+        raise ROSInitException(
+            f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="
+        )
+    if not arguments.parameters:
+        return {}
+    import yaml
+
+    values = {}
+    for key, text in arguments.parameters.items():
+        try:
+            values[key] = yaml.safe_load(text)
+            serialize_call("setParam", (key, values[key]))
+        except (yaml.YAMLError, RpcError) as error:
+            why = " ".join(str(error).split())
+            raise ROSInitException(f"invalid command-line parameters: [_{key}:={text}]: {why}") from error
+    return values
+
+
+def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
+    """Warn, as rospy does, of a name that is not one of the graph; the master refuses it later, or does not."""
+    if not names.is_legal_name(name):
+        warnings.warn(
+            f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",
+            stacklevel=stacklevel,
+        )
 
 
 class _Interrupting:
@@ -414,6 +651,8 @@ class _EndOfInterrupted:
 
     def __call__(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if issubclass(kind, ROSInterruptException) and process.is_shutdown():
+            raise SystemExit(0)
+        if issubclass(kind, KeyboardInterrupt) and process.insisted:
             raise SystemExit(0)
         self._before(kind, error, trace)
 

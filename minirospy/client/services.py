@@ -10,22 +10,22 @@ from collections.abc import Callable, Mapping
 from io import BytesIO
 from typing import Any, Generic, TypeVar
 
-from minirospy.client.process import process
+from minirospy.client.process import process, warn_of_illegal_name
 from minirospy.clock import wait_for_event
 from minirospy.errors import (
+    CallFailed,
     DeserializationError,
     HandshakeRefused,
     MasterUnreachableError,
     ROSException,
-    ROSInterruptException,
     RpcError,
     RpcRefused,
     SerializationError,
     ServiceException,
-    TransportException,
     WireError,
 )
 from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.service import to_response
 from minirospy.runtime.services import ServiceClient, ServiceServer
 from minirospy.times import Duration
 from minirospy.wire.header import Header
@@ -36,14 +36,19 @@ __all__ = ["Service", "ServiceProxy", "wait_for_service"]
 _log = logging.getLogger("rosout")
 _S = TypeVar("_S", bound=Any)
 _POLL_SECONDS = 0.1
+_PROBE_SECONDS = 5.0
+_SILENT_SECONDS = 5.0
+_NO_CONTACT = "failed to contact, will keep trying"
 
 
 class Service(Generic[_S]):
     """Offers a service: ``handler(request)`` returns the response.
 
-    The handler may return a response, a dictionary of its fields, or a list or tuple of all their values.
-    What it raises goes to the client as the call's error; ``error_handler`` is told too.
-    Raises ServiceException where this node offers the service already.
+    The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
+    values, or the value of its only field. What it raises goes to the client as the call's error;
+    ``error_handler(error, type, error, traceback)`` is told too, in place of a log line. Each connection has
+    a thread of its own, so a handler may run several times at once. ``buff_size`` is accepted and not needed.
+    Raises ValueError on an empty name, ServiceException where this node offers the service already.
     """
 
     def __init__(
@@ -54,22 +59,42 @@ class Service(Generic[_S]):
         buff_size: int = 65536,
         error_handler: Callable[[Exception, type[Exception], Exception, Any], object] | None = None,
     ) -> None:
+        if not name or not isinstance(name, str):
+            raise ValueError("service name is not a non-empty string")
+        warn_of_illegal_name(name)
         self.resolved_name = process.resolve(name)
         self.service_class = service_class
         self.request_class: type[Any] = service_class._request_class
         self.response_class: type[Any] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum
+        self.buff_size = buff_size
         self.handler = handler
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
         self._server: ServiceServer | None = None
         self._ended = threading.Event()
+        with process.lock:
+            if process.offered.setdefault(self.resolved_name, self) is not self:
+                raise ServiceException(f"service [{self.resolved_name}] already registered")
         process.when_ready(self._register)
 
+    @property
+    def uri(self) -> str | None:
+        """Where the service is called, ``rosrpc://host:port``; None before init_node."""
+        return process.node.service_uri if process.node else None
+
+    @property
+    def done(self) -> bool:
+        """Whether the service has been shut down."""
+        return self._ended.is_set()
+
     def shutdown(self, reason: str = "") -> None:
-        """Stop offering the service."""
+        """Stop offering the service; a call under way gets its answer."""
         self._ended.set()
+        with process.lock:
+            if process.offered.get(self.resolved_name) is self:
+                del process.offered[self.resolved_name]
         server, self._server = self._server, None
         if server and process.node and not process.is_shutdown():
             try:
@@ -87,10 +112,8 @@ class Service(Generic[_S]):
 
     def _register(self) -> None:
         node = process.node
-        if node is None or process.is_shutdown():
+        if node is None or self.done or process.is_shutdown():
             return
-        if self.resolved_name in node.services:
-            raise ServiceException(f"service [{self.resolved_name}] already registered")
         self._server = node.make_service(
             self.resolved_name,
             InterfaceType(self.type, self.md5sum),
@@ -109,33 +132,15 @@ class Service(Generic[_S]):
             request = self.request_class()
             request.deserialize(body if self._takes_memoryview else bytes(body))
             request._connection_header = header
-            response = self._to_response(self.handler(request))
+            response = to_response(self.response_class, self.handler(request))
             buffer = BytesIO()
             response.serialize(buffer)
             return buffer.getvalue()
         except ServiceException as error:
-            _log.error("Error processing request: %s", error)
             raise ServiceException(f"service cannot process request: {error}") from error
         except Exception as error:  # the user's handler: its error is the client's answer
             self.error_handler(error, type(error), error, error.__traceback__)
             raise ServiceException(f"error processing request: {error}") from error
-
-    def _to_response(self, returned: Any) -> Any:
-        """A handler's return value as a response. Raises ServiceException."""
-        if isinstance(returned, self.response_class) or (
-            getattr(returned, "_type", None) == self.response_class._type
-        ):
-            return returned
-        if returned is None:
-            raise ServiceException("service handler returned None")
-        try:
-            if isinstance(returned, dict):
-                return self.response_class(**returned)
-            values = returned if isinstance(returned, list | tuple) else [returned]
-            return args_kwds_to_message(self.response_class, values, {})
-        except (TypeError, AttributeError) as error:
-            what = "wrong number of values" if isinstance(returned, list | tuple) else "invalid value"
-            raise ServiceException(f"handler returned {what}: {error}") from error
 
     @staticmethod
     def _log_error(error: Exception, _: type[Exception], __: Exception, tb: Any) -> None:
@@ -146,8 +151,9 @@ class Service(Generic[_S]):
 class ServiceProxy(Generic[_S]):
     """Calls a service: ``proxy(request)``, or with the request's fields as arguments.
 
-    ``persistent`` keeps one connection for all calls; it is made again when it breaks. A proxy may be used
-    by several threads; with ``persistent`` they wait for each other.
+    ``persistent`` keeps one connection for all calls; it is made again when the server has ended it. A proxy
+    may be used by several threads; with ``persistent`` they wait for each other. ``headers`` are added to the
+    connection header, which the handler finds in ``request._connection_header``.
     """
 
     def __init__(
@@ -157,13 +163,17 @@ class ServiceProxy(Generic[_S]):
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        self.resolved_name = process.resolve(name)
+        # A name that was never set (None) is an error only when it is called.
+        self.resolved_name = process.resolve(str(name) if name else "")
         self.service_class = service_class
         self.request_class: type[Any] = service_class._request_class
         self.response_class: type[Any] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum
+        self.buff_size = 65536
         self.persistent = persistent
+        self.uri: str | None = None
+        """Where the service was found last, ``rosrpc://host:port``."""
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
@@ -180,11 +190,15 @@ class ServiceProxy(Generic[_S]):
     def call(self, *args: Any, **kwds: Any) -> Any:
         """The same as calling the proxy itself."""
         request = args_kwds_to_message(self.request_class, args, kwds)
+        if not hasattr(type(request), "_type"):
+            raise TypeError("request object is not a valid request message instance")
         buffer = BytesIO()
         request.serialize(buffer)
         if not self.persistent:
             return self._exchange(self._connect(), buffer.getvalue(), keep=False)
         with self._lock:
+            if self._client and self._client.has_ended():
+                self.close()
             if self._client is None:
                 self._client = self._connect()
             return self._exchange(self._client, buffer.getvalue(), keep=True)
@@ -201,7 +215,7 @@ class ServiceProxy(Generic[_S]):
 
     def _connect(self) -> ServiceClient:
         try:
-            uri = process.master.lookup_service(self.resolved_name)
+            self.uri = uri = process.master.lookup_service(self.resolved_name)
         except RpcRefused as error:
             raise ServiceException(f"service [{self.resolved_name}] unavailable") from error
         except (MasterUnreachableError, RpcError) as error:
@@ -226,14 +240,14 @@ class ServiceProxy(Generic[_S]):
             with process.interrupting(client.hang_up):
                 body = client.call(request)
             keeping = keep
-        except HandshakeRefused as error:
+        except CallFailed as error:
             keeping = keep
             raise ServiceException(
-                f"service [{self.resolved_name}] responded with an error: {str(error).encode()!r}"
+                f"service [{self.resolved_name}] responded with an error: {error.text!r}"
             ) from error
         except (OSError, WireError) as error:
             if process.is_shutdown():
-                raise ROSInterruptException("node shutdown interrupted service call") from error
+                raise process.interrupted("node shutdown interrupted service call") from error
             raise ServiceException(f"transport error completing service call: {error}") from error
         finally:
             if not keeping:
@@ -244,36 +258,47 @@ class ServiceProxy(Generic[_S]):
         try:
             response.deserialize(memoryview(body) if self._takes_memoryview else body)
         except (DeserializationError, SerializationError) as error:
-            raise TransportException(f"unable to deserialize the response: {error}") from error
+            raise ServiceException(
+                f"transport error completing service call: receive_once[{self.resolved_name}]: "
+                f"DeserializationError cannot deserialize: {error}"
+            ) from error
+        response._connection_header = client.header
         return response
 
 
 def wait_for_service(service: str, timeout: float | Duration | None = None) -> None:
     """Wait until a service is registered and answers.
 
-    Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down.
+    Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down, ValueError
+    on a timeout of 0.
     """
-    name = process.resolve(service)
+    name = process.resolve(str(service) if service else "")
     seconds = timeout.to_sec() if isinstance(timeout, Duration) else timeout
     if seconds == 0:
         raise ValueError("timeout must be non-zero")
-    end = None if seconds is None else time.monotonic() + seconds
-    told = False
+    begin = time.monotonic()
+    end = None if seconds is None else begin + seconds
+    told: set[str] = set()
     while not process.is_shutdown():
-        why = _probe(name)
+        rest = _PROBE_SECONDS if end is None else end - time.monotonic()
+        if rest <= 0:
+            raise ROSException(f"timeout exceeded while waiting for service {name}")
+        why = _probe(name, min(rest, _PROBE_SECONDS))
         if why is None:
             return
-        if end is not None and time.monotonic() >= end:
-            raise ROSException(f"timeout exceeded while waiting for service {name}")
-        if not told:
+        if why is _NO_CONTACT and why not in told:
+            _log.warning("wait_for_service(%s): %s", name, why)
+            told.add(why)
+        elif not told and time.monotonic() - begin > _SILENT_SECONDS:
+            # rospy says nothing here, ever: a misspelt name is looked for in vain.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
-            told = True
+            told.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
         wait_for_event(process.shutting_down, pause)
-    raise ROSInterruptException("rospy shutdown")
+    raise process.interrupted("rospy shutdown")
 
 
-def _probe(name: str) -> str | None:
+def _probe(name: str, timeout: float) -> str | None:
     """Why the service cannot be called yet; None where it can."""
     try:
         uri = process.master.lookup_service(name)
@@ -282,7 +307,7 @@ def _probe(name: str) -> str | None:
     except (MasterUnreachableError, RpcError) as error:
         return f"the master does not answer ({error})"
     try:
-        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=5.0).close()
+        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=timeout).close()
     except (OSError, WireError):
-        return f"failed to contact [{uri}], will keep trying"
+        return _NO_CONTACT
     return None

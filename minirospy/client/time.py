@@ -6,13 +6,14 @@ Source: http://wiki.ros.org/rospy/Overview/Time.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 from minirospy import times
 from minirospy.client.process import process
 from minirospy.clock import SimulatedClock
-from minirospy.errors import ROSInitException, ROSInterruptException, ROSTimeMovedBackwardsException
+from minirospy.errors import ROSInitException, ROSTimeMovedBackwardsException
 
 __all__ = ["Duration", "Rate", "Time", "Timer", "TimerEvent", "get_rostime", "get_time", "sleep"]
 
@@ -49,15 +50,14 @@ class Time(times.Time):
 
 def get_rostime() -> Time:
     """The current time. Raises ROSInitException before init_node."""
-    if not process.initialized:
+    if not process.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
-    seconds, nanoseconds = divmod(process.clock.now(), 1_000_000_000)
-    return Time(seconds, nanoseconds)
+    return _time(process.clock.now())
 
 
 def get_time() -> float:
     """The current time in seconds. Raises ROSInitException before init_node."""
-    if not process.initialized:
+    if not process.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
     return process.clock.now() / 1e9
 
@@ -75,44 +75,49 @@ def sleep(duration: float | times.Duration) -> None:
 
 
 class Rate:
-    """Keeps a loop at ``hz`` turns a second: ``sleep()`` makes up for what the loop's own work took."""
+    """Keeps a loop at ``hz`` turns a second: ``sleep()`` makes up for what the loop's own work took.
+
+    ``last_time`` is when this turn began, ``sleep_dur`` how long a turn is; a program may change either.
+    """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        """``reset``: begin anew where simulated time jumps back, instead of raising."""
+        """``reset``: begin anew where simulated time jumps back, instead of raising.
+
+        Raises ZeroDivisionError on a rate of 0, ROSInitException before init_node.
+        """
         self.last_time = get_rostime()
-        self.sleep_dur = times.Duration(0, int(1e9 / hz))
-        self._period = self.sleep_dur.to_nsec()
-        self._last = process.clock.now()
+        self.sleep_dur = Duration(0, int(1e9 / hz))
         self._reset = reset
 
-    def remaining(self) -> times.Duration:
+    def remaining(self) -> Duration:
         """What is left of this turn."""
-        return times.Duration(0, self._remaining(process.clock.now()))
+        return Duration(0, self._remaining(process.clock.now()))
 
     def sleep(self) -> None:
         """Sleep until the turn is over. Raises as :func:`sleep` does."""
+        self._sleep(None)
+
+    def _sleep(self, stop: threading.Event | None) -> None:
+        """The same, and ``stop`` ends it early."""
+        now = process.clock.now()
         try:
-            _sleep(self._remaining(process.clock.now()))
+            _sleep(self._remaining(now), stop)
         except ROSTimeMovedBackwardsException:
             if not self._reset:
                 raise
-            self._set_last(process.clock.now())
+            self.last_time = get_rostime()
             return
-        self._set_last(self._last + self._period)
+        period = self.sleep_dur.to_nsec()
+        began = self.last_time.to_nsec() + period
         # Far behind, as after a pause: do not rush through the turns that were missed.
         now = process.clock.now()
-        if now - self._last > 2 * self._period:
-            self._set_last(now)
-
-    def _set_last(self, now: int) -> None:
-        self._last = now
-        self.last_time = Time(*divmod(now, 1_000_000_000))
+        self.last_time = _time(now if now - began > 2 * period else began)
 
     def _remaining(self, now: int) -> int:
-        if self._last > now:
+        if self.last_time.to_nsec() > now:
             # Time jumped back.
-            self._set_last(now)
-        return self._period - (now - self._last)
+            self.last_time = _time(now)
+        return self.sleep_dur.to_nsec() - (now - self.last_time.to_nsec())
 
 
 class TimerEvent:
@@ -137,7 +142,11 @@ class TimerEvent:
 
 
 class Timer(threading.Thread):
-    """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``."""
+    """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
+
+    ``reset``: begin anew where simulated time jumps back; else that ends the timer with
+    ROSTimeMovedBackwardsException. An error of the callback ends it, too.
+    """
 
     def __init__(
         self,
@@ -151,12 +160,12 @@ class Timer(threading.Thread):
         self._callback = callback
         self._oneshot = oneshot
         self._reset = reset
-        self._stop_requested = threading.Event()
+        self._shutdown = threading.Event()
         self.start()
 
     def shutdown(self) -> None:
         """Call back no more."""
-        self._stop_requested.set()
+        self._shutdown.set()
 
     def run(self) -> None:
         """The timer's thread."""
@@ -165,21 +174,22 @@ class Timer(threading.Thread):
         last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
-        while not process.is_shutdown() and not self._stop_requested.is_set():
-            try:
-                rate.sleep()
-            except ROSInterruptException:
-                return
-            if self._stop_requested.is_set():
-                return
-            real = get_rostime()
-            start = process.clock.now()
-            self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
-            if self._oneshot:
-                return
-            last_duration = (process.clock.now() - start) / 1e9
-            last_expected, last_real = expected, real
-            expected = expected + self._period
+        with process.interrupting(self._shutdown.set):
+            while not self._is_over():
+                rate._sleep(self._shutdown)
+                if self._is_over():
+                    return
+                real = get_rostime()
+                start = time.perf_counter()
+                self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
+                if self._oneshot:
+                    return
+                last_duration = time.perf_counter() - start
+                last_expected, last_real = expected, real
+                expected = expected + self._period
+
+    def _is_over(self) -> bool:
+        return self._shutdown.is_set() or process.is_shutdown()
 
 
 def follow_clock_topic(clock: SimulatedClock) -> None:
@@ -194,7 +204,16 @@ def follow_clock_topic(clock: SimulatedClock) -> None:
     Subscriber("/clock", Clock, on_clock, queue_size=1)
 
 
-def _sleep(nanoseconds: int) -> None:
-    stop = threading.Event() if process.knows_of_shutdown() else process.shutting_down
-    if nanoseconds > 0 and not process.clock.sleep(nanoseconds, stop):
+def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
+    """Sleep until ``stop`` is set, quietly; without it, until the node shuts down."""
+    if stop is not None:
+        if nanoseconds > 0:
+            process.clock.sleep(nanoseconds, stop)
+        return
+    down = threading.Event() if process.knows_of_shutdown() else process.shutting_down
+    if nanoseconds > 0 and not process.clock.sleep(nanoseconds, down):
         process.check_interrupted_sleep()
+
+
+def _time(nanoseconds: int) -> Time:
+    return Time(*divmod(nanoseconds, 1_000_000_000))

@@ -6,16 +6,21 @@ http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster where that 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from minirospy.names import namespace_of
 
-__all__ = ["ParameterTree", "ParameterUpdate"]
+__all__ = ["ParameterTree", "ParameterUpdate", "check_value"]
+
+_MAX_DEPTH = 56
+"""Namespaces and dictionaries inside each other: XML-RPC's 64 levels hold it and the answer around it."""
+
+_MAX_INT = 2**31
 
 
-@dataclass(frozen=True)
-class ParameterUpdate:
+class ParameterUpdate(NamedTuple):
     """Tell the node at ``uri`` that ``key`` (which ends in a slash) is ``value``; {} where it was deleted."""
 
     uri: str
@@ -127,13 +132,23 @@ class ParameterTree:
         if _Subscriber(caller_id, uri) not in subscribers:
             return False
         del subscribers[_Subscriber(caller_id, uri)]
+        if not subscribers:
+            del self._subscribers[_with_slash(_split(key))]
         return True
 
-    def unsubscribe_all(self, uri: str) -> None:
+    def unsubscribe_node(self, caller_id: str, uri: str) -> None:
         """Forget a node that has gone."""
-        for subscribers in self._subscribers.values():
-            for subscriber in [s for s in subscribers if s.uri == uri]:
-                del subscribers[subscriber]
+        gone = _Subscriber(caller_id, uri)
+        for key in [key for key, subscribers in self._subscribers.items() if gone in subscribers]:
+            del self._subscribers[key][gone]
+            if not self._subscribers[key]:
+                del self._subscribers[key]
+
+    def subscriptions(self) -> Iterator[tuple[str, str, str]]:
+        """(node, URI, key) of each subscription; keys end in a slash."""
+        return (
+            (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
+        )
 
     def _updates(self, path: list[str], value: Any, caller_id: str) -> list[ParameterUpdate]:
         changed = _with_slash(path)
@@ -148,6 +163,25 @@ class ParameterTree:
             # Who set it knows it.
             updates += [ParameterUpdate(s.uri, told, what) for s in subscribers if s.caller_id != caller_id]
         return updates
+
+
+def check_value(key: str, value: Any) -> None:
+    """Raise ValueError on a value that no answer could hold: it would make the namespaces above unreadable."""
+    _check(value, len(_split(key)))
+
+
+def _check(value: Any, depth: int) -> None:
+    if depth > _MAX_DEPTH:
+        raise ValueError(f"a parameter is nested deeper than {_MAX_DEPTH} levels")
+    if type(value) is int:
+        if not -_MAX_INT <= value < _MAX_INT:
+            raise ValueError(f"the integer {value} does not fit XML-RPC's 32 bits")
+    elif type(value) is dict:
+        for item in value.values():
+            _check(item, depth + 1)
+    elif type(value) is list:
+        for item in value:
+            _check(item, depth + 1)
 
 
 def _split(key: str) -> list[str]:

@@ -6,25 +6,24 @@ rosmaster where that is silent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from sys import intern
 from typing import NamedTuple
 
 __all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry"]
 
 _ANY = "*"
+_PUBLISHES, _SUBSCRIBES, _SERVES, _PARAMETER = 1, 2, 4, 8
 
 
-@dataclass(frozen=True)
-class PublisherUpdate:
-    """Tell the subscriber at ``uri`` the full list of a topic's publishers."""
+class PublisherUpdate(NamedTuple):
+    """Tell the subscriber at ``uri`` the full list of a topic's publishers, as it is when it is told."""
 
     uri: str
     topic: str
-    publishers: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class NodeShutdown:
+class NodeShutdown(NamedTuple):
     """Stop the node at ``uri``: another one has taken its name."""
 
     uri: str
@@ -42,16 +41,28 @@ class Registered(NamedTuple):
     actions: list[Action]
 
 
-@dataclass
 class _Node:
-    uri: str
-    publications: set[str] = field(default_factory=set)
-    subscriptions: set[str] = field(default_factory=set)
-    services: set[str] = field(default_factory=set)
+    """A node's name and URI, and what it has registered: name -> what it is there, as bits."""
 
-    @property
-    def is_empty(self) -> bool:
-        return not (self.publications or self.subscriptions or self.services)
+    __slots__ = ("entries", "name", "uri")
+
+    def __init__(self, name: str, uri: str) -> None:
+        self.name = name
+        self.uri = uri
+        self.entries: dict[str, int] = {}
+
+    def add(self, name: str, kind: int) -> None:
+        self.entries[name] = self.entries.get(name, 0) | kind
+
+    def discard(self, name: str, kind: int) -> None:
+        left = self.entries.get(name, 0) & ~kind
+        if left:
+            self.entries[name] = left
+        else:
+            self.entries.pop(name, None)
+
+    def names(self, kind: int) -> list[str]:
+        return [name for name, kinds in self.entries.items() if kinds & kind]
 
 
 class _Service(NamedTuple):
@@ -74,38 +85,38 @@ class Registry:
     def register_publisher(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node``, whose Slave API is at ``uri``, publishes ``topic``."""
         actions = self._claim(node, uri)
-        self._publishers.setdefault(topic, {})[node] = uri
-        self._nodes[node].publications.add(topic)
+        entry = self._enter(node, topic, _PUBLISHES)
+        _row(self._publishers, topic)[entry.name] = entry.uri
         if type_ != _ANY or topic not in self._types:
-            self._types[topic] = type_
+            self._types[topic] = intern(type_)
+        subscribers = self._subscribers.get(topic)
+        if subscribers is None:
+            return Registered([], actions)
         actions += self._tell_subscribers(topic)
-        return Registered(list(self._subscribers.get(topic, {}).values()), actions)
+        return Registered(list(subscribers.values()), actions)
 
-    def unregister_publisher(self, node: str, topic: str, uri: str) -> Registered | None:
+    def unregister_publisher(self, node: str, topic: str, uri: str) -> list[Action] | None:
         """``node`` publishes ``topic`` no more; None where that was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
-        self._drop(self._publishers, topic, node)
-        self._nodes[node].publications.discard(topic)
-        self._forget_if_empty(node)
-        return Registered([], list(self._tell_subscribers(topic)))
+        self._drop(self._publishers, topic, node, _PUBLISHES)
+        return self._tell_subscribers(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node`` subscribes to ``topic``; type "*" takes any and does not become the topic's."""
         actions = self._claim(node, uri)
-        self._subscribers.setdefault(topic, {})[node] = uri
-        self._nodes[node].subscriptions.add(topic)
+        entry = self._enter(node, topic, _SUBSCRIBES)
+        _row(self._subscribers, topic)[entry.name] = entry.uri
         if type_ != _ANY:
-            self._types.setdefault(topic, type_)
-        return Registered(list(self._publishers.get(topic, {}).values()), actions)
+            self._types.setdefault(topic, intern(type_))
+        publishers = self._publishers.get(topic)
+        return Registered(list(publishers.values()) if publishers else [], actions)
 
     def unregister_subscriber(self, node: str, topic: str, uri: str) -> bool:
         """``node`` subscribes no more; whether that was registered from ``uri``."""
         if self._subscribers.get(topic, {}).get(node) != uri:
             return False
-        self._drop(self._subscribers, topic, node)
-        self._nodes[node].subscriptions.discard(topic)
-        self._forget_if_empty(node)
+        self._drop(self._subscribers, topic, node, _SUBSCRIBES)
         return True
 
     def register_service(self, node: str, service: str, service_uri: str, uri: str) -> list[Action]:
@@ -113,10 +124,9 @@ class Registry:
         actions = self._claim(node, uri)
         before = self._services.get(service)
         if before and before.node != node:
-            self._nodes[before.node].services.discard(service)
-            self._forget_if_empty(before.node)
-        self._services[service] = _Service(node, service_uri)
-        self._nodes[node].services.add(service)
+            self._leave(before.node, service, _SERVES)
+        entry = self._enter(node, service, _SERVES)
+        self._services[service] = _Service(entry.name, service_uri)
         return actions
 
     def unregister_service(self, node: str, service: str, service_uri: str) -> bool:
@@ -124,9 +134,33 @@ class Registry:
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
-        self._nodes[node].services.discard(service)
-        self._forget_if_empty(node)
+        self._leave(node, service, _SERVES)
         return True
+
+    def register_parameter(self, node: str, key: str, uri: str) -> list[Action]:
+        """``node`` is to be told of a parameter: who that is stands in the tree, here that the node is there."""
+        actions = self._claim(node, uri)
+        self._enter(node, key, _PARAMETER)
+        return actions
+
+    def unregister_parameter(self, node: str, key: str, uri: str) -> None:
+        """``node`` is told no more."""
+        entry = self._nodes.get(node)
+        if entry and entry.uri == uri:
+            self._leave(node, key, _PARAMETER)
+
+    def forget(self, node: str, uri: str) -> list[Action]:
+        """Drop all that ``node`` has registered from ``uri``: it is not there any more."""
+        entry = self._nodes.get(node)
+        if entry is None or entry.uri != uri:
+            return []
+        published = self._clear(entry)
+        del self._nodes[node]
+        return [action for topic in published for action in self._tell_subscribers(topic)]
+
+    def set_type(self, topic: str, type_: str) -> None:
+        """Remember the type of a topic that nobody has registered."""
+        self._types[topic] = intern(type_)
 
     # --- asking
 
@@ -135,10 +169,23 @@ class Registry:
         entry = self._nodes.get(node)
         return entry.uri if entry else None
 
+    def nodes(self) -> dict[str, str]:
+        """Node -> the URI of its Slave API."""
+        return {name: entry.uri for name, entry in self._nodes.items()}
+
     def service_uri(self, service: str) -> str | None:
         """Where a service is called."""
         entry = self._services.get(service)
         return entry.uri if entry else None
+
+    def publisher_uris(self, topic: str) -> list[str]:
+        """The URIs of a topic's publishers."""
+        return list(self._publishers.get(topic, {}).values())
+
+    def subscriptions(self, node: str) -> list[str]:
+        """The topics that a node subscribes to."""
+        entry = self._nodes.get(node)
+        return entry.names(_SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
         """The type of each topic that was ever registered with one."""
@@ -165,38 +212,77 @@ class Registry:
         """Service -> the node that offers it."""
         return {service: [entry.node] for service, entry in self._services.items()}
 
+    def publications(self) -> Iterator[tuple[str, str]]:
+        """(node, topic) of each publication, in the order of the tables."""
+        return _pairs(self._publishers)
+
+    def all_subscriptions(self) -> Iterator[tuple[str, str]]:
+        """(node, topic) of each subscription."""
+        return _pairs(self._subscribers)
+
+    def offers(self) -> Iterator[tuple[str, str, str]]:
+        """(node, service, URI) of each service."""
+        return ((entry.node, service, entry.uri) for service, entry in self._services.items())
+
     # --- helpers
 
     def _claim(self, node: str, uri: str) -> list[Action]:
         """Make ``node`` known at ``uri``; what stood under its name at another address is dropped and stopped."""
         entry = self._nodes.get(node)
         if entry is None:
-            self._nodes[node] = _Node(uri)
+            self._nodes[node] = _Node(node, uri)
             return []
         if entry.uri == uri:
             return []
-        changed = set(entry.publications)
-        for topic in entry.publications:
-            self._drop(self._publishers, topic, node)
-        for topic in entry.subscriptions:
-            self._drop(self._subscribers, topic, node)
-        for service in entry.services:
-            del self._services[service]
-        self._nodes[node] = _Node(uri)
+        published = self._clear(entry)
+        self._nodes[node] = _Node(node, uri)
         actions: list[Action] = [NodeShutdown(entry.uri, node, "new node registered with same name")]
-        for topic in sorted(changed):
+        for topic in published:
             actions += self._tell_subscribers(topic)
         return actions
 
-    def _tell_subscribers(self, topic: str) -> list[Action]:
-        publishers = tuple(self._publishers.get(topic, {}).values())
-        return [PublisherUpdate(uri, topic, publishers) for uri in self._subscribers.get(topic, {}).values()]
+    def _clear(self, entry: _Node) -> list[str]:
+        """Take a node out of every table; the topics that it published."""
+        published = entry.names(_PUBLISHES)
+        for topic in published:
+            _remove(self._publishers, topic, entry.name)
+        for topic in entry.names(_SUBSCRIBES):
+            _remove(self._subscribers, topic, entry.name)
+        for service in entry.names(_SERVES):
+            del self._services[service]
+        return published
 
-    def _drop(self, table: dict[str, dict[str, str]], topic: str, node: str) -> None:
-        del table[topic][node]
-        if not table[topic]:
-            del table[topic]
+    def _enter(self, node: str, name: str, kind: int) -> _Node:
+        entry = self._nodes[node]
+        entry.add(intern(name), kind)
+        return entry
 
-    def _forget_if_empty(self, node: str) -> None:
-        if self._nodes[node].is_empty:
+    def _leave(self, node: str, name: str, kind: int) -> None:
+        entry = self._nodes[node]
+        entry.discard(name, kind)
+        if not entry.entries:
             del self._nodes[node]
+
+    def _drop(self, table: dict[str, dict[str, str]], topic: str, node: str, kind: int) -> None:
+        _remove(table, topic, node)
+        self._leave(node, topic, kind)
+
+    def _tell_subscribers(self, topic: str) -> list[Action]:
+        return [PublisherUpdate(uri, topic) for uri in self._subscribers.get(topic, {}).values()]
+
+
+def _row(table: dict[str, dict[str, str]], topic: str) -> dict[str, str]:
+    row = table.get(topic)
+    if row is None:
+        row = table[intern(topic)] = {}
+    return row
+
+
+def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
+    del table[topic][node]
+    if not table[topic]:
+        del table[topic]
+
+
+def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
+    return ((node, topic) for topic, nodes in table.items() for node in nodes)

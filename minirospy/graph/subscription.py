@@ -33,29 +33,43 @@ class SubscriptionPlan:
     """The publishers that the master named, and how often each has failed.
 
     A link that ends while the master still names its publisher is tried again, with pauses that double:
-    the master tells of a publisher that left, not of a cable that was pulled.
+    the master tells of a publisher that left, not of a cable that was pulled. One that refused is asked
+    again when the master next tells of the topic: it may publish another type by then.
     """
 
     def __init__(self) -> None:
         self._failures: dict[str, int] = {}
+        self._refusals: set[str] = set()
 
     @property
     def publishers(self) -> tuple[str, ...]:
         """The URIs that the master named last, in its order."""
         return tuple(self._failures)
 
-    def publishers_changed(self, uris: Iterable[str]) -> list[Connect | Disconnect]:
-        """The master's full list has come."""
+    def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
+        """The master's list has come: the full one, or with ``keep`` one that lacks some who are still there."""
         wanted = dict.fromkeys(uris)
+        if keep:
+            wanted.update(dict.fromkeys(self._failures))
         gone = [uri for uri in self._failures if uri not in wanted]
-        new = [uri for uri in wanted if uri not in self._failures]
+        new = [uri for uri in wanted if uri not in self._failures or uri in self._refusals]
+        self._refusals.clear()
         self._failures = {uri: self._failures.get(uri, 0) for uri in wanted}
         return [*map(Disconnect, gone), *map(Connect, new)]
 
-    def connected(self, uri: str) -> None:
-        """The link to ``uri`` is up: the next failure counts as its first."""
+    def failures(self, uri: str) -> int:
+        """How often in a row the link to ``uri`` has failed."""
+        return self._failures.get(uri, 0)
+
+    def worked(self, uri: str) -> None:
+        """The link to ``uri`` has done its work: its next failure counts as the first."""
         if uri in self._failures:
             self._failures[uri] = 0
+
+    def refused(self, uri: str) -> None:
+        """The publisher at ``uri`` does not want us: the same answer would come again."""
+        if uri in self._failures:
+            self._refusals.add(uri)
 
     def lost(self, uri: str) -> Connect | None:
         """The link to ``uri`` could not be made, or ended; None where its publisher has left."""

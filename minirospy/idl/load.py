@@ -7,6 +7,7 @@ a full text at run time.
 from __future__ import annotations
 
 import contextlib
+import difflib
 import importlib
 import linecache
 import sys
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from minirospy.errors import DefinitionError, NotFoundError
-from minirospy.idl.spec import ActionSpec, MessageSpec, ServiceSpec
+from minirospy.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
 
 __all__ = [
     "Catalogue",
@@ -116,6 +117,9 @@ class Catalogue:
         self.actions(package)
         if full_name in self._specs:
             return self._specs[full_name]
+        near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
+        if near and near[0] in PRIMITIVES:
+            raise NotFoundError("message type", full_name, hint=f"did you mean {near[0]}?")
         raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
 
 

@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.errors import (
+    CallFailed,
     HandshakeRefused,
     NodeUnreachableError,
     RpcRefused,
@@ -143,7 +144,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Any) -> Any:
         raise NodeUnreachableError(service, uri, str(error)) from error
     try:
         body = client.call(serialize(request))
-    except HandshakeRefused as error:
+    except CallFailed as error:
         raise ServiceException(f"service [{service}] responded with an error: {error}") from error
     except (OSError, WireError) as error:
         raise ServiceException(

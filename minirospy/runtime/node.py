@@ -14,8 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable
+from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable, WireError
 from minirospy.runtime import tcp
+from minirospy.runtime.access import Access
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.services import Handler, ServiceServer
@@ -29,6 +30,8 @@ __all__ = ["Node"]
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
 _UNREGISTER_SECONDS = 1.0
+_MOST_IDLE = 200
+"""Clients of the Slave API that are connected and ask nothing; a graph has about as many as this node has peers."""
 
 
 class Node:
@@ -47,20 +50,31 @@ class Node:
         *,
         on_shutdown: Callable[[str], None] | None = None,
         on_parameter: Callable[[str, Any], None] | None = None,
+        watch_seconds: float = 2.0,
     ) -> None:
-        """``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker."""
+        """``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
+
+        ``watch_seconds`` lie between two looks at whether the master still knows this node.
+        """
         self.name = name
         self.environment = environment
         self.workers = Workers()
         self.publications: dict[str, Publication] = {}
         self.subscriptions: dict[str, Subscription] = {}
         self.services: dict[str, ServiceServer] = {}
+        self.parameters: set[str] = set()
+        """The parameters of whose changes the master tells this node: subscribed to by whoever put them here."""
         self.uri = ""
         self._on_shutdown = on_shutdown
         self._on_parameter = on_parameter
+        self._watch_seconds = watch_seconds
+        self.when_registered_again: list[Callable[[], object]] = []
+        """Called in workers when the master had forgotten this node: for what else it has to be told."""
         self._rpc = AsyncRpcClient()
         self._server: RpcServer | None = None
-        self._listener = tcp.Listener(self._accept)
+        self._access = Access.parse(environment.allow) if environment.allow else None
+        self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
+        self._watching: asyncio.Task[None] | None = None
         self._closed = False
 
     @property
@@ -71,20 +85,36 @@ class Node:
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
         """Open the node's servers; port 0 takes a free one. Raises OSError."""
         host = self.environment.bind_host
-        self._listener.open(host, tcpros_port)
-        self._server = RpcServer(SlaveApi(self).dispatch, bind_host=host, port=xmlrpc_port)
+        ports = self.environment.ports
+        self._listener.open(host, tcpros_port, ports)
+        self._server = RpcServer(
+            SlaveApi(self).dispatch,
+            bind_host=host,
+            port=xmlrpc_port,
+            ports=ports,
+            most_idle=_MOST_IDLE,
+            access=self._access,
+        )
         await self._server.start()
-        self.uri = f"http://{self.environment.host}:{self._server.port}/"
+        self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
+        self._watching = asyncio.ensure_future(self._watch_master())
+        if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
+            # Looking for the address of a name may wait for a server.
+            await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
     async def close(self) -> None:
         """Leave the graph: what is written goes out, the master is told, links end. Idempotent."""
         if self._closed:
             return
         self._closed = True
+        watching = [self._watching] if self._watching else []
+        for task in watching:
+            task.cancel()
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
             asyncio.wait_for(self._unregister_all(), _UNREGISTER_SECONDS),
             *(link.drain(_FLUSH_SECONDS) for link in links),
+            *watching,
             return_exceptions=True,
         )
         await self._listener.close()
@@ -117,7 +147,7 @@ class Node:
         """Publish a topic from now on. One publication a topic: a second is a ValueError."""
         if self.publications.setdefault(publication.topic, publication) is not publication:
             raise ValueError(f"{self.name} publishes {publication.topic} already")
-        await self.master("registerPublisher", publication.topic, publication.type.name, self.uri)
+        publication.expected = len(await self.master(*self._registration(publication)))
 
     async def unadvertise(self, publication: Publication) -> None:
         """Stop publishing."""
@@ -156,8 +186,7 @@ class Node:
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
-        uris = await self.master("registerSubscriber", topic, subscription.type.name, self.uri)
-        subscription.publishers_changed(uris)
+        subscription.publishers_changed(await self.master(*self._registration(subscription)))
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """Stop listening."""
@@ -184,7 +213,7 @@ class Node:
         """Offer a service from now on. One of a name: a second is a ValueError."""
         if self.services.setdefault(server.name, server) is not server:
             raise ValueError(f"service [{server.name}] already registered")
-        await self.master("registerService", server.name, self.service_uri, self.uri)
+        await self.master(*self._registration(server))
 
     async def unserve(self, server: ServiceServer) -> None:
         """Stop offering a service; calls under way are ended."""
@@ -196,7 +225,7 @@ class Node:
     @property
     def service_uri(self) -> str:
         """Where this node's services are called: ``rosrpc://host:port``."""
-        return f"rosrpc://{self.environment.host}:{self.tcpros_port}"
+        return f"rosrpc://{self.environment.uri_host}:{self.tcpros_port}"
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
         """The master's list of a topic's publishers has come."""
@@ -216,34 +245,117 @@ class Node:
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
         """A peer has connected: its header says which topic or service it wants."""
-        fields = await tcp.receive_header(sock)
+        try:
+            fields = await tcp.receive_header(sock)
+        except (OSError, WireError):
+            if not self._closed:
+                raise
+            sock.close()  # the master has told the peer that this node leaves
+            return
         if "service" in fields:
             server = self.services.get(fields["service"])
             if server:
                 why = await server.accept(sock, fields)
             else:
-                why = f"[{fields['service']}] is not a provided service"
+                why = f"[{self.name}] is not a provider of  [{fields['service']}]"
         elif "topic" in fields:
             publication = self.publications.get(fields["topic"])
             if publication:
                 why = await publication.accept(sock, fields, self.name, address)
             else:
-                why = f"[{fields['topic']}] is not a published topic of {self.name}"
+                topics = [[each.topic, each.type.name] for each in self.publications.values()]
+                why = f"[{self.name}] is not a publisher of [{fields['topic']}]. Topics are {topics}"
         else:
             why = "no topic or service name detected"
         if why:
-            _log.warning("connection from %s refused: %s", fields.get("callerid", address), why)
+            self._listener.tell_refusal(f"Could not process inbound connection: {why}{fields}")
             await tcp.send_header(sock, {"error": why})
             sock.close()
+
+    def _check_own_address(self) -> None:
+        environment = self.environment
+        if not environment.master_is_local:
+            _log.warning(
+                "this node tells everybody that it is at '%s', but the master is on another machine (%s): set ROS_IP "
+                "to the address by which that one reaches this one",
+                environment.host,
+                environment.master_uri,
+            )
+
+    def _registration(self, part: Publication | Subscription | ServiceServer) -> tuple[str, ...]:
+        """The call that tells the master of a part of this node."""
+        if isinstance(part, Publication):
+            return "registerPublisher", part.topic, part.type.name, self.uri
+        if isinstance(part, Subscription):
+            return "registerSubscriber", part.topic, part.type.name, self.uri
+        return "registerService", part.name, self.service_uri, self.uri
+
+    async def _watch_master(self) -> None:
+        """Notice a master that has restarted and forgotten this node, and register again.
+
+        The master is asked for this node's own name: its process id tells nothing in a container, where each
+        has the same, nor of a master that kept its tables.
+        """
+        failures, is_known = 0, True
+        while True:
+            await asyncio.sleep(self._watch_seconds)
+            if not (self.publications or self.subscriptions or self.services):
+                continue
+            try:
+                await self.master("lookupNode", self.name)
+            except MasterUnreachableError as error:
+                failures += 1
+                if failures == 2:
+                    _log.warning("%s. What is connected goes on; will keep trying.", error)
+            except RpcRefused:
+                failures = 0
+                # A node that the master never accepted is not told of each time.
+                was_known, is_known = is_known, await self._register_all()
+                if is_known:
+                    _log.warning(
+                        "the master at %s has restarted: registered again", self.environment.master_uri
+                    )
+                    for function in self.when_registered_again:
+                        self.workers.start(function)
+                elif was_known:
+                    _log.warning("the master does not know this node, and refuses to")
+            except RpcError as error:
+                _log.debug("asking the master for this node: %s", error)
+            else:
+                failures, is_known = 0, True
+
+    async def _register_all(self) -> bool:
+        """Tell the master of everything; whether it took any of it."""
+        parts: list[Publication | Subscription | ServiceServer] = [
+            *self.publications.values(),
+            *self.subscriptions.values(),
+            *self.services.values(),
+        ]
+        is_known = False
+        for part in parts:
+            try:
+                value = await self.master(*self._registration(part))
+            except (MasterUnreachableError, RpcError) as error:
+                _log.debug("registering again: %s", error)
+                continue
+            is_known = True
+            if isinstance(part, Subscription):
+                part.registered_again(value)
+        return is_known
 
     async def _unregister_all(self) -> None:
         calls = [
             *(("unregisterPublisher", topic, self.uri) for topic in self.publications),
             *(("unregisterSubscriber", topic, self.uri) for topic in self.subscriptions),
             *(("unregisterService", name, self.service_uri) for name in self.services),
+            *(("unsubscribeParam", self.uri, key) for key in list(self.parameters)),
         ]
         with contextlib.suppress(MasterUnreachableError):
             for call in calls:
                 # One that the master never accepted must not keep the others registered.
                 with contextlib.suppress(RpcError):
                     await self.master(*call)
+
+
+def _is_loopback(host: str) -> bool:
+    return host in {"localhost", "::1"} or host.startswith("127.")

@@ -64,7 +64,14 @@ class RpcClient:
             raise RpcUnreachable(self.uri, str(error) or "the connection was closed") from error
 
     def _connect(self) -> socket.socket:
-        sock = socket.create_connection((self._host, self._port), self._timeout)
+        try:
+            # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
+            host = "127.0.0.1" if self._host == "localhost" else self._host
+            sock = socket.create_connection((host, self._port), self._timeout)
+        except ConnectionRefusedError:
+            if self._host != "localhost" or not socket.has_ipv6:
+                raise
+            sock = socket.create_connection(("::1", self._port), self._timeout)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return sock
 
@@ -98,5 +105,4 @@ def parse_http_uri(uri: str) -> tuple[str, int, str]:
         host = port = None
     if not host or not port:
         raise RpcUnreachable(uri, "not a URI of the form http://host:port")
-    # "localhost" may name IPv6 first, where no server of ROS 1 listens.
-    return ("127.0.0.1" if host == "localhost" else host), port, parts.path or "/"
+    return host, port, parts.path or "/"

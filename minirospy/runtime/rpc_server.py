@@ -1,15 +1,25 @@
-"""An XML-RPC server on the event loop."""
+"""An XML-RPC server on the event loop.
+
+Its connections are plain sockets that the loop watches: a master serves thousands of short ones, and an asyncio
+transport for each would cost more than all that is done with it.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import logging
-import sys
+import socket
+from collections import OrderedDict, deque
 from collections.abc import Awaitable, Callable, Sequence
+from enum import Enum
+from itertools import islice
 from typing import Any
 
 from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.runtime import tcp
+from minirospy.runtime.access import Access
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
 from minirospy.wire.xmlrpc import parse_call, serialize_fault
 from minirospy.wire.xmlrpc import serialize_response as serialize_value
@@ -19,92 +29,248 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 _log = logging.getLogger(__name__)
 
 _REQUEST_SECONDS = 30.0
-"""A request that has begun must be whole after this."""
+"""A request that has begun must be whole after this, and an answer taken."""
+
+_LINGER_SECONDS = 2.0
+"""Who is refused may still be sending: so long it is heard out, or the answer would be lost with the connection."""
+
+_MOST_HELD = 256 * 1024 * 1024
+_LARGE = 1024 * 1024
+"""Of requests that are not whole yet, a server holds so much; beyond that the large ones are refused."""
+
+_MOST_UNREAD = 256 * 1024
+"""Bytes of answers that wait for a client to read them, before it gets no more."""
+
+_RECEIVE = 65536
+_ACCEPTS_AT_ONCE = 32
+_REFUSALS_TOLD = 10
 
 Dispatch = Callable[[str, Sequence[Any]], Any]
 """Method name and arguments in, value out, or an awaitable of it; raises RpcFault."""
 
 
+class _State(Enum):
+    OPEN = "it is served"
+    FULL = "it does not read its answers: nothing is read from it"
+    CLOSING = "it ends once it has read its answers"
+    REFUSED = "it is heard out, without an answer"
+    ENDED = "the socket is closed"
+
+
+_OPEN, _FULL, _CLOSING, _REFUSED, _ENDED = _State
+
+
 class RpcServer:
     """Serves ``dispatch`` over HTTP at any path, with keep-alive and pipelining."""
 
-    def __init__(self, dispatch: Dispatch, *, bind_host: str = "127.0.0.1", port: int = 0) -> None:
-        self._dispatch = dispatch
-        self._bind_host = bind_host
+    def __init__(
+        self,
+        dispatch: Dispatch,
+        *,
+        bind_host: str = "127.0.0.1",
+        port: int = 0,
+        ports: range | None = None,
+        most_idle: int | None = None,
+        access: Access | None = None,
+    ) -> None:
+        """Port 0 takes a free one, out of ``ports`` where these are given.
+
+        ``most_idle`` clients are kept, those that spoke last (None: all). Clients that ``access`` does not
+        allow are hung up on.
+        """
+        self.dispatch = dispatch
         self.port = port
-        self._server: asyncio.Server | None = None
-        self._connections: set[_Connection] = set()
+        self.refused = 0
+        """How many connections were not allowed."""
+        self.held = 0
+        """Bytes of requests that are not whole yet."""
+        self.connections: OrderedDict[_Connection, None] = OrderedDict()
+        """Those that spoke last stand at the end."""
+        self._bind_host = bind_host
+        self._ports = ports
+        self._most = most_idle
+        self._access = access
+        self._sock: socket.socket | None = None
+
+    @property
+    def clients(self) -> int:
+        """How many clients are connected."""
+        return len(self.connections)
 
     async def start(self) -> None:
         """Listen; with port 0 ``port`` tells the one that was free. Raises OSError."""
-        loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(
-            lambda: _Connection(self._dispatch, self._connections),
-            self._bind_host,
-            self.port,
-            backlog=1000,
-            # On Windows the option would let two servers share a port.
-            reuse_address=sys.platform != "win32",
-        )
-        self.port = self._server.sockets[0].getsockname()[1]
+        sock = tcp.bind(self._bind_host, self.port, self._ports)
+        try:
+            sock.listen(1000)
+        except BaseException:
+            sock.close()
+            raise
+        self._sock = sock
+        self.port = sock.getsockname()[1]
+        self._watch()
 
     async def close(self) -> None:
         """Stop listening and end all connections. Idempotent."""
-        if self._server is None:
+        if self._sock is None:
             return
-        self._server.close()
-        for connection in list(self._connections):
-            connection.close()
-        self._server = None
+        asyncio.get_running_loop().remove_reader(self._sock)
+        self._sock.close()
+        self._sock = None
+        for connection in list(self.connections):
+            connection.end()
+
+    def _watch(self) -> None:
+        if self._sock is not None:
+            asyncio.get_running_loop().add_reader(self._sock, self._accept, self._sock)
+
+    def _accept(self, sock: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        for _ in range(_ACCEPTS_AT_ONCE):
+            try:
+                peer, address = sock.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                # Out of file descriptors: the longest silent one makes room, a moment later.
+                _log.warning("a connection could not be accepted: %s", error)
+                self._end_longest_silent()
+                loop.remove_reader(sock)
+                loop.call_later(0.05, self._watch)
+                return
+            if self._allows(peer, address[0]):
+                self._serve(peer, loop)
+            else:
+                peer.close()
+
+    def _serve(self, peer: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
+        try:
+            peer.setblocking(False)
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except OSError:
+            # It has gone already.
+            peer.close()
+            return
+        if self._most is not None and len(self.connections) >= self._most:
+            self._end_longest_silent()
+        self.connections[_Connection(self, peer, loop)] = None
+
+    def _end_longest_silent(self) -> None:
+        """One goes that asks nothing, or else the one that was silent longest."""
+        longest_silent = list(islice(self.connections, 20))
+        if longest_silent:
+            next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()
+
+    def _allows(self, peer: socket.socket, address: str) -> bool:
+        if self._access is None or not self._access.networks:
+            return True
+        with contextlib.suppress(OSError):
+            if self._access.allows(address, peer.getsockname()[0]):
+                return True
+        self.refused += 1
+        if self.refused <= _REFUSALS_TOLD:
+            _log.warning("a connection from %s was refused: only %s may connect", address, self._access)
+        return False
 
 
-class _Connection(asyncio.Protocol):
+class _Connection:
     """One client: feed, take messages, answer them in order."""
 
-    def __init__(self, dispatch: Dispatch, connections: set[_Connection]) -> None:
-        self._dispatch = dispatch
-        self._connections = connections
+    __slots__ = (
+        "_deadline",
+        "_fd",
+        "_held",
+        "_loop",
+        "_out",
+        "_reader",
+        "_server",
+        "_sock",
+        "_state",
+        "_task",
+        "_waiting",
+    )
+
+    def __init__(self, server: RpcServer, sock: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
+        self._server = server
+        self._sock = sock
+        self._fd = sock.fileno()
+        self._loop = loop
         self._reader = HttpReader()
-        self._transport: asyncio.Transport | None = None
+        self._state: _State = _OPEN
+        self._out = bytearray()
+        self._waiting: deque[HttpMessage] = deque()
         self._deadline: asyncio.TimerHandle | None = None
-        self._waiting: list[HttpMessage] = []
         self._task: asyncio.Task[None] | None = None
+        self._held = 0
+        loop.add_reader(self._fd, self._readable)
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-        self._connections.add(self)
+    @property
+    def is_idle(self) -> bool:
+        """Whether no request is under way."""
+        return self._state is _OPEN and self._reader.is_idle and self._task is None and not self._out
 
-    def connection_lost(self, exc: Exception | None) -> None:
-        self._connections.discard(self)
-        self._cancel_deadline()
+    def end(self) -> None:
+        """Hang up. Idempotent."""
+        if self._state is _ENDED:
+            return
+        self._state = _ENDED
+        self._loop.remove_reader(self._fd)
+        if self._out:
+            self._loop.remove_writer(self._fd)
+        self._sock.close()
+        self._server.connections.pop(self, None)
+        self._hold(0)
+        self._waiting.clear()
+        if self._deadline:
+            self._deadline.cancel()
         if self._task:
             self._task.cancel()
 
-    def close(self) -> None:
-        if self._transport:
-            self._transport.close()
-
-    def data_received(self, data: bytes) -> None:
-        assert self._transport
+    def received(self, data: bytes) -> None:
+        """Bytes of requests have come."""
         try:
             messages = self._reader.feed(data)
         except RpcProtocolError as error:
-            status = 413 if "over the limit" in str(error) else 400
-            self._transport.write(serialize_error(status, str(error)))
-            self._transport.close()
+            self._refuse(413 if "over the limit" in str(error) else 400, str(error))
             return
-        if self._reader.wants_continue:
-            self._transport.write(self._reader.continue_line())
+        if self._held or not messages:
+            self._hold(self._reader.held)
+            if self._server.held > _MOST_HELD and self._held > _LARGE:
+                self._refuse(503, "too much is being sent at once: try again later")
+                return
+            if self._reader.wants_continue:
+                self._write(self._reader.continue_line())
+        if messages and self._deadline:
+            self._deadline.cancel()
+            self._deadline = None
+        self._waiting.extend(messages)
+        self._answer_waiting()
         self._set_deadline()
-        for message in messages:
-            if self._task:
-                self._waiting.append(message)
-            else:
-                self._answer(message)
 
-    def eof_received(self) -> bool:
-        return False
+    def _readable(self) -> None:
+        try:
+            data = self._sock.recv(_RECEIVE)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            data = b""
+        if self._state is _REFUSED:
+            # Whatever it still says.
+            if not data:
+                self.end()
+            return
+        if data:
+            self._server.connections.move_to_end(self)
+            self.received(data)
+        elif self._out and self._state is _OPEN:
+            # It asks no more, but waits for what it asked.
+            self._state = _CLOSING
+            self._loop.remove_reader(self._fd)
+        else:
+            self.end()
+
+    def _answer_waiting(self) -> None:
+        while self._waiting and self._task is None and self._state is _OPEN:
+            self._answer(self._waiting.popleft())
 
     def _answer(self, message: HttpMessage) -> None:
         """Answer at once, or start a task for a method that has to wait."""
@@ -116,10 +282,9 @@ class _Connection(asyncio.Protocol):
         except RpcProtocolError as error:
             self._refuse(400, str(error))
             return
-        body: bytes | None = None
         try:
-            value = self._dispatch(call.method, call.args)
-            if isinstance(value, Awaitable):
+            value = self._server.dispatch(call.method, call.args)
+            if type(value) is not list and isinstance(value, Awaitable):
                 self._task = asyncio.ensure_future(self._answer_later(value, message.keep_alive))
                 return
             body = serialize_value(value)
@@ -140,31 +305,104 @@ class _Connection(asyncio.Protocol):
             body = serialize_fault(1, f"{type(error).__name__}: {error}")
         self._task = None
         self._send(body, keep_alive)
-        while self._waiting and self._task is None:
-            self._answer(self._waiting.pop(0))
+        self._answer_waiting()
 
     def _send(self, body: bytes, keep_alive: bool) -> None:
-        assert self._transport
-        self._transport.write(serialize_response(body, keep_alive=keep_alive))
+        self._write(serialize_response(body, keep_alive=keep_alive))
         if not keep_alive:
-            self._transport.close()
+            self._close()
 
     def _refuse(self, status: int, text: str) -> None:
-        assert self._transport
-        self._transport.write(serialize_error(status, text))
-        self._transport.close()
+        """Answer with an error, and take nothing more."""
+        self._waiting.clear()
+        self._hold(0)
+        self._write(serialize_error(status, text))
+        if self._state is _FULL:
+            self._loop.add_reader(self._fd, self._readable)
+        if self._state in (_OPEN, _FULL):
+            self._state = _REFUSED
+            if not self._out:
+                self._say_end()
+            self._limit(_LINGER_SECONDS)
+
+    def _close(self) -> None:
+        """Hang up once what is written has been taken."""
+        self._waiting.clear()
+        if not self._out:
+            self.end()
+        elif self._state in (_OPEN, _FULL):
+            if self._state is _OPEN:
+                self._loop.remove_reader(self._fd)
+            self._state = _CLOSING
+
+    def _write(self, data: bytes) -> None:
+        if self._state is _ENDED:
+            return
+        sent = 0
+        if not self._out:
+            try:
+                sent = self._sock.send(data)
+            except (BlockingIOError, InterruptedError):
+                pass
+            except OSError:
+                self.end()
+                return
+            if sent == len(data):
+                return
+            self._loop.add_writer(self._fd, self._writable)
+        self._out += memoryview(data)[sent:]
+        self._set_deadline()
+        if self._state is _OPEN and len(self._out) > _MOST_UNREAD:
+            # The client does not read its answers: it gets no more of them, and is not read from.
+            self._state = _FULL
+            self._loop.remove_reader(self._fd)
+
+    def _writable(self) -> None:
+        try:
+            sent = self._sock.send(memoryview(self._out)[:_MOST_UNREAD])
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            self.end()
+            return
+        del self._out[:sent]
+        if self._out:
+            return
+        self._loop.remove_writer(self._fd)
+        if self._state is _CLOSING:
+            self.end()
+        elif self._state is _REFUSED:
+            self._say_end()
+        else:
+            if self._state is _FULL:
+                self._state = _OPEN
+                self._loop.add_reader(self._fd, self._readable)
+            self._answer_waiting()
+            self._set_deadline()
+
+    def _say_end(self) -> None:
+        with contextlib.suppress(OSError):
+            self._sock.shutdown(socket.SHUT_WR)
+
+    def _hold(self, count: int) -> None:
+        self._server.held += count - self._held
+        self._held = count
 
     def _set_deadline(self) -> None:
-        """A request that has begun has a time limit; an idle connection has none."""
-        if self._reader.is_idle:
-            self._cancel_deadline()
+        """A request that has begun, or an answer that waits, has a time limit; an idle connection has none."""
+        if self._state is _ENDED or self._state is _REFUSED:
+            return
+        if self._reader.is_idle and not self._out:
+            if self._deadline:
+                self._deadline.cancel()
+                self._deadline = None
         elif self._deadline is None:
-            self._deadline = asyncio.get_running_loop().call_later(_REQUEST_SECONDS, self.close)
+            self._limit(_REQUEST_SECONDS)
 
-    def _cancel_deadline(self) -> None:
+    def _limit(self, seconds: float) -> None:
         if self._deadline:
             self._deadline.cancel()
-            self._deadline = None
+        self._deadline = self._loop.call_later(seconds, self.end)
 
 
 def is_address_in_use(error: OSError) -> bool:

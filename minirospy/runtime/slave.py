@@ -19,23 +19,29 @@ __all__ = ["SlaveApi"]
 _SUCCESS, _FAILURE, _ERROR = 1, 0, -1
 
 
+class _Refusal(Exception):
+    """An argument is not acceptable; the text is the answer's."""
+
+
 class SlaveApi:
     """One method per call of the API; ``dispatch`` is what the XML-RPC server calls (on the loop)."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._methods: dict[str, Callable[..., list[Any]]] = {
-            "getBusStats": self.get_bus_stats,
-            "getBusInfo": self.get_bus_info,
-            "getMasterUri": self.get_master_uri,
-            "getName": self.get_name,
-            "getPid": self.get_pid,
-            "getPublications": self.get_publications,
-            "getSubscriptions": self.get_subscriptions,
-            "paramUpdate": self.param_update,
-            "publisherUpdate": self.publisher_update,
-            "requestTopic": self.request_topic,
-            "shutdown": self.shutdown,
+        self._methods: dict[str, tuple[Callable[..., list[Any]], Any]] = {
+            # Name on the wire -> (method, the value of an answer that refuses).
+            "getBusStats": (self.get_bus_stats, []),
+            "getBusInfo": (self.get_bus_info, []),
+            "getMasterUri": (self.get_master_uri, ""),
+            "getName": (self.get_name, ""),
+            "getPid": (self.get_pid, -1),
+            "getPublications": (self.get_publications, []),
+            "getSubscriptions": (self.get_subscriptions, []),
+            "getUri": (self.get_uri, ""),
+            "paramUpdate": (self.param_update, -1),
+            "publisherUpdate": (self.publisher_update, -1),
+            "requestTopic": (self.request_topic, []),
+            "shutdown": (self.shutdown, 0),
         }
 
     def dispatch(self, method: str, args: Sequence[Any]) -> Any:
@@ -44,14 +50,22 @@ class SlaveApi:
             return sorted(self._methods)
         if method == "system.multicall":
             # A list of structs in, a list of one-element lists (or fault structs) out.
-            return [self._one_of_many(call) for call in args[0]]
-        function = self._methods.get(method)
-        if function is None:
-            raise RpcFault(1, f"method [{method}] is not supported")
+            return [self._one_of_many(call) for call in (args[0] if args else [])]
+        entry = self._methods.get(method)
+        if entry is None:
+            raise RpcFault(1, f'method "{method}" is not supported')
+        function, refused = entry
+        if not args:
+            return [_ERROR, "missing required caller_id parameter", refused]
+        if not isinstance(args[0], str):
+            return [_ERROR, "caller_id must be a string", refused]
+        most = function.__code__.co_argcount - 1
+        if not most - len(function.__defaults__ or ()) <= len(args) <= most:
+            return [_ERROR, "Error: bad call arity", refused]
         try:
             return function(*args)
-        except TypeError:
-            return [_ERROR, f"{method} called with wrong arguments", 0]
+        except _Refusal as refusal:
+            return [_ERROR, str(refusal), refused]
 
     def get_bus_stats(self, caller_id: str) -> list[Any]:
         """Transferred bytes and messages, by topic and connection."""
@@ -59,18 +73,19 @@ class SlaveApi:
             [
                 publication.topic,
                 sum(link.sent_bytes for link in publication.links),
-                [[number, link.sent_bytes, link.sent, 1] for number, link in enumerate(publication.links)],
+                [[link.number, link.sent_bytes, link.sent, True] for link in publication.links],
             ]
             for publication in self._node.publications.values()
         ]
         subscriptions = [
             [
                 subscription.topic,
-                [[number, link.received_bytes, -1, 1] for number, link in enumerate(subscription.links)],
+                # How many were lost on the way, nobody knows: -1.
+                [[link.number, link.received_bytes, link.received, -1, True] for link in subscription.links],
             ]
             for subscription in self._node.subscriptions.values()
         ]
-        return [_SUCCESS, "", [publications, subscriptions, [0, 0, 0]]]
+        return [_SUCCESS, "", [publications, subscriptions, []]]
 
     def get_bus_info(self, caller_id: str) -> list[Any]:
         """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
@@ -78,12 +93,14 @@ class SlaveApi:
         port = self._node.tcpros_port
         for publication in self._node.publications.values():
             for out in publication.links:
-                what = f"TCPROS connection on port {port} to [{out.address}]"
-                rows.append([len(rows), out.peer, "o", "TCPROS", publication.topic, True, what])
+                what = f"TCPROS connection on port {port} to [{out.address} on socket {out.number}]"
+                rows.append([out.number, out.peer, "o", "TCPROS", publication.topic, True, what])
         for subscription in self._node.subscriptions.values():
             for link in subscription.links:
-                what = f"TCPROS connection to [{link.address}]"
-                rows.append([len(rows), link.uri, "i", "TCPROS", subscription.topic, True, what])
+                what = (
+                    f"TCPROS connection on port {link.local_port} to [{link.address} on socket {link.number}]"
+                )
+                rows.append([link.number, link.uri, "i", "TCPROS", subscription.topic, True, what])
         return [_SUCCESS, "bus info", rows]
 
     def get_master_uri(self, caller_id: str) -> list[Any]:
@@ -92,7 +109,11 @@ class SlaveApi:
 
     def get_name(self, caller_id: str) -> list[Any]:
         """This node's name."""
-        return [_SUCCESS, "node name", self._node.name]
+        return [_SUCCESS, "", self._node.name]
+
+    def get_uri(self, caller_id: str) -> list[Any]:
+        """Where this API is served."""
+        return [_SUCCESS, "", self._node.uri]
 
     def get_pid(self, caller_id: str) -> list[Any]:
         """This process's id."""
@@ -110,19 +131,23 @@ class SlaveApi:
 
     def param_update(self, caller_id: str, key: str, value: Any) -> list[Any]:
         """A parameter that this node subscribed to has changed."""
-        self._node.parameter_changed(key, value)
+        self._node.parameter_changed(_text(key, "parameter_key"), value)
         return [_SUCCESS, "", 0]
 
     def publisher_update(self, caller_id: str, topic: str, publishers: Any) -> list[Any]:
         """The master's full list of a topic's publishers."""
-        if not isinstance(publishers, list) or not all(isinstance(uri, str) for uri in publishers):
-            return [_ERROR, "publishers must be a list of URIs", 0]
-        self._node.publishers_changed(topic, publishers)
+        if not isinstance(publishers, list):
+            raise _Refusal("ERROR: param [publishers] must be a list")
+        if not all(isinstance(uri, str) for uri in publishers):
+            raise _Refusal("ERROR: param [publishers] must be a list of strings")
+        self._node.publishers_changed(_text(topic, "topic"), publishers)
         return [_SUCCESS, "", 0]
 
     def request_topic(self, caller_id: str, topic: str, protocols: Any) -> list[Any]:
         """Where a subscriber finds the topic, by the first protocol that both sides speak."""
-        if topic not in self._node.publications:
+        if not protocols:
+            raise _Refusal("ERROR: parameter [protocols] must be specified and non-empty")
+        if _text(topic, "topic") not in self._node.publications:
             return [_ERROR, f"Not a publisher of [{topic}]", []]
         offered = protocols if isinstance(protocols, list) else []
         if not any(isinstance(entry, list) and entry[:1] == ["TCPROS"] for entry in offered):
@@ -132,7 +157,7 @@ class SlaveApi:
 
     def shutdown(self, caller_id: str, reason: str = "") -> list[Any]:
         """Stop the node."""
-        self._node.request_shutdown(f"external shutdown request from [{caller_id}]: {reason}")
+        self._node.request_shutdown(f"external shutdown request from [{caller_id}]: [{reason}]")
         return [_SUCCESS, "shutdown", 0]
 
     def _one_of_many(self, call: Any) -> Any:
@@ -142,3 +167,9 @@ class SlaveApi:
             return {"faultCode": fault.code, "faultString": fault.text}
         except (KeyError, TypeError):
             return {"faultCode": 1, "faultString": "a call is a struct of methodName and params"}
+
+
+def _text(value: object, what: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
+    return value

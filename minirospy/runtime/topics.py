@@ -10,14 +10,17 @@ import contextlib
 import logging
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from urllib.parse import urlsplit
 
-from minirospy.errors import HandshakeRefused, RpcError, WireError
+from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime import tcp
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
+from minirospy.wire.framing import CHUNK
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import (
     InterfaceType,
@@ -30,6 +33,15 @@ from minirospy.wire.tcpros import (
 __all__ = ["Deliver", "InLink", "Publication", "Subscription"]
 
 _log = logging.getLogger(__name__)
+
+_SETTLE_SECONDS = 10.0
+"""A master that has forgotten everything hears of all nodes again within this."""
+
+_TELL_AFTER = 3
+"""A publisher that cannot be reached is told of at this failure: one that just leaves has left by then."""
+
+_WORKED_SECONDS = 5.0
+"""A link that lived so long, or brought a message, was a good one."""
 
 Deliver = Callable[[memoryview, Header], None]
 """What is called with each message's bytes and its publisher's connection header."""
@@ -60,7 +72,10 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[tcp.OutLink, ...] = ()
+        self.expected = 0
+        """How many subscribers the master knew when this was registered."""
         self._on_link = on_link
+        self._closed = False
         self._latched: bytes | None = None
         self._latch_lock = threading.Lock()
 
@@ -86,6 +101,9 @@ class Publication:
             return why
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         await tcp.send_header(sock, answer)
+        if self._closed:
+            sock.close()
+            return None
         tcp.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
         link = tcp.OutLink(
             sock,
@@ -95,6 +113,10 @@ class Publication:
             self._link_closed,
         )
         link.open()
+        for other in self.links:
+            if other.peer == link.peer and other.waiting:
+                # A node connects but once: it lost the old link, where frames wait for a peer that is not there.
+                other.close()
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched
@@ -105,7 +127,8 @@ class Publication:
         return None
 
     def close(self) -> None:
-        """End all links (on the loop)."""
+        """End all links, and take no more (on the loop)."""
+        self._closed = True
         for link in self.links:
             link.close()
 
@@ -126,6 +149,23 @@ class InLink:
     received: int = 0
     received_bytes: int = 0
     closed: bool = field(default=False)
+    latched: bytes | memoryview | None = None
+    """The last message of a publisher that latches."""
+    since: float = field(default_factory=time.monotonic)
+    fault: Exception | None = None
+
+    @property
+    def number(self) -> int:
+        """What tells this link from the node's others: its file descriptor."""
+        return self.sock.fileno()
+
+    @property
+    def local_port(self) -> int:
+        """The port at this end; 0 once it is closed."""
+        try:
+            return int(self.sock.getsockname()[1])
+        except OSError:
+            return 0
 
     def close(self) -> None:
         """Have the reader end; it closes the socket."""
@@ -138,7 +178,8 @@ class Subscription:
 
     Each connection is read by a worker of its own that calls ``deliver``: one publisher's messages stay in
     order, and neither topics nor publishers wait for each other. With ``on_loop``, ``deliver`` is called
-    on the loop instead and must be quick.
+    on the loop instead and must be quick. ``newest`` may be changed at any time: of the messages that came
+    while a delivery lasted, only so many are delivered, the newest (0: all).
     """
 
     def __init__(
@@ -165,26 +206,54 @@ class Subscription:
         self._workers = workers
         self._on_loop = on_loop
         self._plan = SubscriptionPlan()
+        self._named: list[str] = []
+        self._settling: asyncio.TimerHandle | None = None
+        self._told: set[str] = set()
         self._connecting: dict[str, asyncio.Task[None]] = {}
+        self.on_connected: list[Callable[[], object]] = []
+        """Called on the loop when a publisher is connected."""
         self._closed = False
 
     def publishers_changed(self, uris: Iterable[str]) -> None:
         """The master's list of publishers has come (on the loop)."""
         if self._closed:
             return
-        for action in self._plan.publishers_changed(uris):
+        self._named = list(uris)
+        for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
             if isinstance(action, Disconnect):
                 self._disconnect(action.uri)
             else:
                 self._start_connecting(action)
 
+    def registered_again(self, uris: Iterable[str]) -> None:
+        """The master had forgotten everything; its first list has come (on the loop).
+
+        Its lists lack whom it has not heard of yet, so for a while they leave no publisher out.
+        """
+        if self._settling:
+            self._settling.cancel()
+        self._settling = asyncio.get_running_loop().call_later(_SETTLE_SECONDS, self._settle)
+        self.publishers_changed(uris)
+
     def close(self) -> None:
         """End all links (on the loop)."""
         self._closed = True
+        if self._settling:
+            self._settling.cancel()
         for task in self._connecting.values():
             task.cancel()
         for link in self.links:
             link.close()
+
+    def _settle(self) -> None:
+        """Forget whom the master does not name, unless the link is up: nodes of rospy never register again."""
+        self._settling = None
+        linked = {link.uri for link in self.links}
+        for action in self._plan.publishers_changed(self._named):
+            if isinstance(action, Connect):
+                self._start_connecting(action)
+            elif action.uri not in linked:
+                self._disconnect(action.uri)
 
     def _disconnect(self, uri: str) -> None:
         task = self._connecting.pop(uri, None)
@@ -195,6 +264,8 @@ class Subscription:
                 link.close()
 
     def _start_connecting(self, action: Connect) -> None:
+        if any(link.uri == action.uri and not link.closed for link in self.links):
+            return
         task = asyncio.ensure_future(self._connect(action.uri, action.delay))
         self._connecting[action.uri] = task
 
@@ -210,14 +281,20 @@ class Subscription:
         try:
             link = await self._open_link(uri)
         except HandshakeRefused as error:
-            # The same answer would come again: wait until the master tells of a change.
             _log.warning("publisher %s of %s refused the connection: %s", uri, self.topic, error)
+            self._plan.refused(uri)
+        except _NoPublisher as error:
+            _log.warning("no connection for %s: %s", self.topic, error)
         except (RpcError, WireError, OSError) as error:
-            _log.debug("connecting to %s for %s: %s", uri, self.topic, error)
-            self._retry(uri)
+            self._retry(uri, error)
         else:
-            self._plan.connected(uri)
+            if self._closed or uri not in self._plan.publishers:
+                # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the last byte.
+                link.sock.close()
+                return
             self.links += (link,)
+            for tell in self.on_connected:
+                tell()
             if self._on_loop:
                 tcp.watch_frames(
                     asyncio.get_running_loop(),
@@ -255,24 +332,82 @@ class Subscription:
             link.received_bytes += len(frame)
             deliver(frame, header)
 
+        def on_latched_frame(frame: memoryview) -> None:
+            # A small frame lies in a buffer that the next receive reuses.
+            link.latched = frame if len(frame) > CHUNK else bytes(frame)
+            on_frame(frame)
+
         try:
-            tcp.read_frames(link.sock, on_frame, self.newest)
+            tcp.read_frames(
+                link.sock,
+                on_latched_frame if header.get("latching") == "1" else on_frame,
+                self,
+            )
         except (OSError, WireError) as error:
-            if not link.closed:
-                _log.debug("connection to %s for %s ended: %s", link.uri, self.topic, error)
+            link.fault = error
         finally:
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(self._link_ended, link)
 
     def _link_ended(self, link: InLink) -> None:
         self.links = tuple(other for other in self.links if other is not link)
-        if not link.closed:
-            self._retry(link.uri)
+        if link.closed:
+            return
+        fault = link.fault or EOFError("the publisher closed the connection")
+        if isinstance(fault, WireError):
+            # Once is enough to tell: what follows in such a stream is garbage too.
+            _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
+        elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
+            self._plan.worked(link.uri)
+            self._told.discard(link.uri)
+        self._retry(link.uri, fault)
 
-    def _retry(self, uri: str) -> None:
+    def _retry(self, uri: str, error: Exception) -> None:
         action = None if self._closed else self._plan.lost(uri)
-        if action:
-            self._start_connecting(action)
+        if not action:
+            return
+        _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
+        nameless = isinstance(error, socket.gaierror) or isinstance(error.__cause__, socket.gaierror)
+        if (nameless or self._plan.failures(uri) >= _TELL_AFTER) and uri not in self._told:
+            self._told.add(uri)
+            _log.warning(
+                "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
+                self.topic,
+                uri,
+                error,
+                _advice(uri, error, nameless=nameless),
+            )
+        self._start_connecting(action)
+
+
+def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
+    """Whose address is wrong, and which variable sets it."""
+    if not isinstance(error, OSError | RpcUnreachable):
+        return "Its address is right, since it answered"
+    host = urlsplit(uri).hostname or ""
+    if nameless:
+        return (
+            f"This machine does not know the name '{host}': on the publisher's machine set ROS_IP to its address, "
+            "or add the name to the hosts file of this one"
+        )
+    if host == "localhost" or host.startswith("127."):
+        return (
+            f"'{host}' is this machine: if the publisher runs on another one, set ROS_IP to its address there; "
+            "if it was killed, `rosnode cleanup` makes the master forget it"
+        )
+    if isinstance(error, ConnectionRefusedError) or isinstance(error.__cause__, ConnectionRefusedError):
+        return (
+            "Nothing listens there: if the publisher was killed, `rosnode cleanup` makes the master forget it; "
+            "if it runs, set ROS_IP to its address on its machine"
+        )
+    return (
+        f"If this machine cannot `ping {host}`, set ROS_IP on the publisher's machine to the address by which "
+        "this one reaches it; if it can, a firewall is in the way"
+    )
+
+
+class _NoPublisher(WireError):
+    """What a publisher never answers: to ask again would bring the same, as rospy holds it too."""
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
@@ -280,7 +415,7 @@ def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
     match answer:
         case [1, _, ["TCPROS", str(host), int(port), *_]]:
             return host, port
-        case [int(), text, *_]:
+        case [0 | -1, text, *_]:
             raise WireError(f"{uri} does not serve {topic}: {text}")
         case _:
-            raise WireError(f"{uri} answered requestTopic for {topic} with {answer!r}")
+            raise _NoPublisher(f"{uri} answered requestTopic for {topic} with {answer!r}")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import logging
 import queue
 import threading
+from collections import deque
 from collections.abc import Callable
 
-__all__ = ["Workers"]
+__all__ = ["InOrder", "Workers"]
 
 _IDLE_SECONDS = 10.0
 _log = logging.getLogger(__name__)
@@ -55,3 +56,34 @@ class Workers:
                         return
                 # Claimed in the moment of leaving: the entry is on its way.
                 function, args = self._work.get()
+
+
+class InOrder:
+    """Runs functions in workers, one after the other, in the order in which they were started."""
+
+    def __init__(self, workers: Workers) -> None:
+        self._workers = workers
+        self._waiting: deque[tuple[Callable[..., object], tuple[object, ...]]] = deque()
+        self._lock = threading.Lock()
+        self._is_running = False
+
+    def start(self, function: Callable[..., object], *args: object) -> None:
+        """Run ``function(*args)`` when those before it are done; an exception that it lets out is logged."""
+        with self._lock:
+            self._waiting.append((function, args))
+            if self._is_running:
+                return
+            self._is_running = True
+        self._workers.start(self._run)
+
+    def _run(self) -> None:
+        while True:
+            with self._lock:
+                if not self._waiting:
+                    self._is_running = False
+                    return
+                function, args = self._waiting.popleft()
+            try:
+                function(*args)
+            except Exception:  # noqa: BLE001 - the edge to user code: the others have to run all the same
+                _log.exception("fault in a worker")

@@ -5,6 +5,7 @@ Pure: bytes in, messages out. Source: RFC 9112.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ _REASONS = {
     405: "Method Not Allowed",
     413: "Content Too Large",
     500: "Internal Server Error",
+    503: "Service Unavailable",
 }
 
 
@@ -56,7 +58,7 @@ class HttpMessage(NamedTuple):
     def status(self) -> int:
         """An answer's status code; 0 where there is none."""
         parts = self.start.split(" ", 2)
-        return int(parts[1]) if len(parts) > 1 and parts[1].isdigit() else 0
+        return int(parts[1]) if len(parts) > 1 and re.fullmatch(r"[0-9]{3}", parts[1]) else 0
 
 
 class HttpReader:
@@ -77,11 +79,21 @@ class HttpReader:
         """Whether no message has begun."""
         return not self._buffer and not self._in_body
 
+    @property
+    def held(self) -> int:
+        """Bytes of a message that is not whole yet."""
+        return len(self._buffer)
+
     def feed(self, data: bytes) -> list[HttpMessage]:
         """The messages that are complete with ``data``; b"" means that the peer has ended.
 
         Raises RpcProtocolError.
         """
+        if self.is_idle:
+            # Nearly always a request comes in one piece, and alone.
+            message = self._whole(data)
+            if message:
+                return [message]
         if data:
             self._buffer += data
         else:
@@ -102,20 +114,23 @@ class HttpReader:
         yield None
         while True:
             head = yield from self._until(b"\r\n\r\n")
-            start, *lines = head.decode("latin-1").split("\r\n")
-            if not _is_start_line(start):
-                raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
-            headers = {}
-            for line in lines:
-                name, separator, value = line.partition(":")
-                if not separator:
-                    raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
-                headers[name.strip().lower()] = value.strip()
+            start, headers = _parse_head(head)
             self.wants_continue = headers.get("expect", "").lower() == "100-continue"
             self._in_body = True
             body = yield from self._body(start, headers)
             self._in_body = self.wants_continue = False
             yield HttpMessage(start, headers, body)
+
+    def _whole(self, data: bytes) -> HttpMessage | None:
+        end = data.find(b"\r\n\r\n")
+        if not 0 < end <= _MAX_HEAD:
+            return None
+        start, headers = _parse_head(data[:end])
+        if "transfer-encoding" in headers or "expect" in headers or "content-length" not in headers:
+            return None
+        length = _length(headers["content-length"])
+        self._check(length)
+        return HttpMessage(start, headers, data[end + 4 :]) if len(data) - end - 4 == length else None
 
     def _body(self, start: str, headers: dict[str, str]) -> Generator[None, None, bytes]:
         if "chunked" in headers.get("transfer-encoding", "").lower():
@@ -129,21 +144,17 @@ class HttpReader:
                     yield None
                 return self._take(len(self._buffer))
             return b""
-        if not length.isdigit():
-            raise RpcProtocolError(f"bad Content-Length {length[:20]!r}")
-        self._check(int(length))
-        return (yield from self._exactly(int(length)))
+        count = _length(length)
+        self._check(count)
+        return (yield from self._exactly(count))
 
     def _chunks(self) -> Generator[None, None, bytes]:
         body = bytearray()
         while True:
             line = (yield from self._until(b"\r\n")).partition(b";")[0].strip()
-            try:
-                size = int(line, 16)
-            except ValueError:
-                raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}") from None
-            if size < 0:
-                raise RpcProtocolError("negative chunk size")
+            if not re.fullmatch(rb"[0-9A-Fa-f]{1,12}", line):
+                raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}")
+            size = int(line, 16)
             self._check(len(body) + size)
             if not size:
                 while (yield from self._until(b"\r\n")):
@@ -206,6 +217,29 @@ def serialize_error(status: int, text: str) -> bytes:
         f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: text/plain; charset=utf-8\r\n"
         f"Connection: close\r\nContent-Length: {len(body)}\r\n\r\n"
     ).encode() + body
+
+
+def _parse_head(head: bytes) -> tuple[str, dict[str, str]]:
+    start, *lines = head.decode("latin-1").split("\r\n")
+    if not _is_start_line(start):
+        raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
+    headers: dict[str, str] = {}
+    for line in lines:
+        name, separator, value = line.partition(":")
+        # Who reads a space in front of the colon in another way than we may be told another story.
+        if not separator or not name or name[-1] in " \t" or name[0] in " \t":
+            raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
+        name, value = name.lower(), value.strip()
+        if name == "content-length" and headers.get(name, value) != value:
+            raise RpcProtocolError("two Content-Lengths")
+        headers[name] = value
+    return start, headers
+
+
+def _length(text: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,18}", text):
+        raise RpcProtocolError(f"bad Content-Length {text[:20]!r}")
+    return int(text)
 
 
 def _is_start_line(line: str) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from minirospy.errors import HandshakeRefused
+from minirospy.errors import HandshakeRefused, WireError
 from minirospy.wire.header import Header
 
 __all__ = [
@@ -54,24 +54,35 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """What a publisher answers with; ``extra`` are the fields that the user added."""
+    """What a publisher answers with; ``extra`` are the user's fields.
+
+    They win, as with rospy: a relay of AnyMsg tells the type of what it relays.
+    """
     return {
-        **(extra or {}),
         "callerid": caller_id,
         "latching": "1" if latch else "0",
         "md5sum": type_.md5sum,
         "message_definition": type_.definition,
         "topic": topic,
         "type": type_.name,
+        **{name: str(value) for name, value in (extra or {}).items()},
     }
 
 
 def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
     """Why a publisher of ``type_`` refuses the subscriber with these fields; None accepts it."""
-    for name in ("topic", "md5sum"):
+    for name in ("md5sum", "callerid"):
         if name not in fields:
-            return f"Missing required '{name}' field in connection header"
-    return _mismatch(fields, type_, f"topic [{topic}]")
+            return f"Missing required '{name}' field"
+    theirs, their_type = fields["md5sum"], fields.get("type", ANY)
+    if _fits(theirs, type_):
+        return None
+    if their_type not in (ANY, type_.name):
+        return f"topic types do not match: [{their_type}] vs. [{type_.name}]"
+    return (
+        f"Client [{fields['callerid']}] wants topic [{topic}] to have datatype/md5sum [{their_type}/{theirs}], "
+        f"but our version has [{type_.name}/{type_.md5sum}] Dropping connection."
+    )
 
 
 def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
@@ -80,9 +91,15 @@ def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
     for name in ("md5sum", "type"):
         if name not in fields:
             raise HandshakeRefused(f"publisher of [{topic}] sent a connection header without [{name}]")
-    why = _mismatch(fields, type_, f"topic [{topic}]")
-    if why:
-        raise HandshakeRefused(why)
+    theirs, their_type = fields["md5sum"], fields["type"]
+    if _fits(theirs, type_):
+        return
+    if their_type not in (ANY, type_.name):
+        raise HandshakeRefused(f"topic types do not match: [{their_type}] vs. [{type_.name}]")
+    raise HandshakeRefused(
+        f"topic [{topic}]: md5sums do not match: [{theirs}] vs. [{type_.md5sum}]: "
+        f"the definitions of [{type_.name}] differ, build both sides from the same one"
+    )
 
 
 def service_client_header(
@@ -95,21 +112,25 @@ def service_client_header(
     extra: Mapping[str, str] | None = None,
 ) -> Header:
     """What a service client opens with; ``probe`` only asks whether the service is alive."""
-    fields = {**(extra or {}), "callerid": caller_id, "md5sum": md5sum, "service": service}
+    fields = {"callerid": caller_id, "md5sum": md5sum, "service": service}
     if persistent:
         fields["persistent"] = "1"
     if probe:
         fields["probe"] = "1"
-    return fields
+    # What the user adds goes over our own, as in rospy.
+    return {**fields, **{name: str(value) for name, value in (extra or {}).items()}}
 
 
-def service_header(type_: InterfaceType, caller_id: str, request_type: str, response_type: str) -> Header:
-    """What a service answers with."""
+def service_header(
+    service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
+) -> Header:
+    """What a service answers with: rospy's fields, and roscpp's types of request and response."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,
         "request_type": request_type,
         "response_type": response_type,
+        "service": service,
         "type": type_.name,
     }
 
@@ -118,7 +139,7 @@ def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
     """Why a service of ``type_`` refuses the client with these fields; None accepts it."""
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
-            return f"Missing required '{name}' field in connection header"
+            return f"Missing required '{name}' field"
     if fields["md5sum"] not in (ANY, type_.md5sum):
         return (
             f"request from [{fields['callerid']}]: md5sums do not match: "
@@ -128,8 +149,10 @@ def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
 
 
 def check_service(fields: Header) -> None:
-    """Raise HandshakeRefused where a service answered with an error."""
+    """Raise HandshakeRefused where a service answered with an error, WireError without an md5sum."""
     _raise_error_field(fields)
+    if "md5sum" not in fields:
+        raise WireError("header missing required field [md5sum]")
 
 
 def _raise_error_field(fields: Header) -> None:
@@ -137,15 +160,6 @@ def _raise_error_field(fields: Header) -> None:
         raise HandshakeRefused(fields["error"])
 
 
-def _mismatch(fields: Header, type_: InterfaceType, what: str) -> str | None:
-    theirs = fields["md5sum"]
-    # Types are compared only once the md5sums differ: a renamed type with the same fields is compatible.
-    if ANY in (theirs, type_.md5sum) or theirs == type_.md5sum:
-        return None
-    their_type = fields.get("type", ANY)
-    if their_type not in (ANY, type_.name):
-        return f"topic types do not match: [{their_type}] vs. [{type_.name}]"
-    return (
-        f"{what}: md5sums do not match: [{theirs}] vs. [{type_.md5sum}]: "
-        f"the definitions of [{type_.name}] differ, build both sides from the same one"
-    )
+def _fits(md5sum: str, type_: InterfaceType) -> bool:
+    """Types are compared only once the md5sums differ: a renamed type with the same fields is compatible."""
+    return md5sum == type_.md5sum or ANY in (md5sum, type_.md5sum)

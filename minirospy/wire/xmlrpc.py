@@ -1,12 +1,13 @@
 """XML-RPC: calls and answers as bytes, and back.
 
 Pure; parses with expat and refuses what a caller could hurt with: document types (and so entities), nesting
-beyond 64 levels. Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that
+beyond 64 levels, a million elements. Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that
 ROS uses.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 from xml.parsers import expat
@@ -15,6 +16,7 @@ from minirospy.errors import RpcFault, RpcProtocolError
 
 __all__ = [
     "Call",
+    "DateTime",
     "parse_call",
     "parse_response",
     "serialize_call",
@@ -23,7 +25,16 @@ __all__ = [
 ]
 
 _MAX_DEPTH = 64
+_MAX_ELEMENTS = 1_000_000
+"""In one document: some seconds of work."""
+
 _HEAD = "<?xml version='1.0'?>\n"
+
+
+class DateTime(NamedTuple):
+    """A date in another form than XML-RPC's, as it came: others take any text for one."""
+
+    value: str
 
 
 class Call(NamedTuple):
@@ -62,6 +73,9 @@ def serialize_fault(code: int, text: str) -> bytes:
 
 def parse_call(body: bytes) -> Call:
     """The call in ``body``. Raises RpcProtocolError."""
+    plain = _PLAIN_CALL.fullmatch(body)
+    if plain:
+        return Call(plain[1].decode(), [text.decode() for text in _PLAIN_VALUE.findall(plain[2])])
     reader = _Reader(body)
     if reader.root != "methodCall" or reader.method is None:
         raise RpcProtocolError("not an XML-RPC method call")
@@ -82,6 +96,44 @@ def parse_response(body: bytes) -> Any:
     if len(reader.params) != 1:
         raise RpcProtocolError("an XML-RPC answer without a value")
     return reader.params[0]
+
+
+# --- calls of nothing but plain strings, as nearly all that a master gets: read without a parser, the same
+
+_SPACE = rb"[ \t\r\n]*"
+# No references, nor "]]>", and no characters that XML changes or forbids.
+_TEXT = rb"[\t\n !-%'-;=?-~]*"
+_PLAIN_VALUE = re.compile(rb"<value>(?:<string>)?(" + _TEXT + rb")(?:</string>)?</value>")
+_PLAIN_PARAM = (
+    rb"<param>"
+    + _SPACE
+    + rb"<value>(?:<string>"
+    + _TEXT
+    + rb"</string>|"
+    + _TEXT
+    + rb")</value>"
+    + _SPACE
+    + rb"</param>"
+)
+_PLAIN_CALL = re.compile(
+    rb"(?:<\?xml version=(?:'1\.0'|\"1\.0\")(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))? ?\?>)?"
+    + _SPACE
+    + rb"<methodCall>"
+    + _SPACE
+    + rb"<methodName>("
+    + _TEXT
+    + rb")</methodName>"
+    + _SPACE
+    + rb"<params>("
+    + _SPACE
+    + rb"(?:"
+    + _PLAIN_PARAM
+    + _SPACE
+    + rb"){0,20})</params>"
+    + _SPACE
+    + rb"</methodCall>"
+    + _SPACE
+)
 
 
 # --- values to XML
@@ -121,7 +173,11 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
 def _write_list(value: Sequence[Any], parts: list[str], depth: int) -> None:
     parts.append("<value><array><data>\n")
     for item in value:
-        _write(item, parts, depth)
+        # Most lists are of strings.
+        if type(item) is str:
+            parts.append(f"<value><string>{_escape(item)}</string></value>")
+        else:
+            _write(item, parts, depth)
     parts.append("</data></array></value>")
 
 
@@ -150,7 +206,11 @@ _WRITERS: dict[type, Callable[[Any, list[str], int], None]] = {
     list: _write_list,
     tuple: _write_list,
     dict: _write_dict,
+    DateTime: lambda value, parts, _: parts.append(
+        f"<value><dateTime.iso8601>{_escape(value.value)}</dateTime.iso8601></value>"
+    ),
     bytes: _write_bytes,
+    bytearray: _write_bytes,
 }
 
 
@@ -174,6 +234,10 @@ def _writer_of_kin(value: Any) -> Callable[[Any, list[str], int], None]:
         )
     if isinstance(getattr(value, "data", None), bytes):
         return lambda binary, parts, depth: _write_bytes(binary.data, parts, depth)
+    if type(value).__name__ == "DateTime" and isinstance(getattr(value, "value", None), str):
+        return lambda date, parts, _: parts.append(
+            f"<value><dateTime.iso8601>{_escape(date.value)}</dateTime.iso8601></value>"
+        )
     raise RpcProtocolError(f"XML-RPC has no type for {type(value).__name__}: {str(value)[:60]}")
 
 
@@ -189,7 +253,10 @@ def _read_bool(text: str) -> bool:
 def _read_date(text: str) -> Any:
     import datetime
 
-    return datetime.datetime.strptime(text.strip(), "%Y%m%dT%H:%M:%S")
+    try:
+        return datetime.datetime.strptime(text, "%Y%m%dT%H:%M:%S")
+    except ValueError:
+        return DateTime(text)
 
 
 def _read_base64(text: str) -> bytes:
@@ -229,6 +296,7 @@ class _Reader:
         self._names: list[str] = []
         self._values: list[list[Any]] = []
         self._depth = 0
+        self._left = _MAX_ELEMENTS
         parser = expat.ParserCreate()
         parser.buffer_text = True
         parser.StartElementHandler = self._start
@@ -237,7 +305,7 @@ class _Reader:
         parser.StartDoctypeDeclHandler = self._refuse_doctype
         try:
             parser.Parse(body, True)
-        except (expat.ExpatError, ValueError, IndexError, KeyError) as error:
+        except (expat.ExpatError, ValueError, LookupError) as error:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
 
     def _refuse_doctype(self, *_: object) -> None:
@@ -248,6 +316,9 @@ class _Reader:
         # Each level of a value takes four elements at most (struct, member, value; array, data, value).
         if self._depth > 4 * _MAX_DEPTH:
             raise RpcProtocolError(f"a value is nested deeper than {_MAX_DEPTH} levels")
+        self._left -= 1
+        if self._left < 0:
+            raise RpcProtocolError(f"more than {_MAX_ELEMENTS} elements")
         if not self.root:
             self.root = tag
         self._text.clear()

@@ -27,6 +27,7 @@ def main() -> None:
         move_led.wait_for_service()
         for button in TO_THE_RIGHT:
             GPIO.add_event_detect(button, GPIO.RISING, callback=pressed, bouncetime=BOUNCE_TIME)
+        rospy.loginfo("Press the buttons.")
         rospy.spin()
     except rospy.ROSInterruptException:
         pass  # Ctrl-C while it waited for the service

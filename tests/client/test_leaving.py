@@ -55,7 +55,7 @@ def test_rosnode_kill(node: subprocess.Popen[str], master: str) -> None:
     slave.close()
     proxy.close()
     output, _ = node.communicate(timeout=5)
-    assert output == "hook\nspun\n"
+    assert output == "shutdown request: please\nhook\nspun\n"
     assert node.returncode == 0
     assert not is_known(master)
 

@@ -26,12 +26,14 @@ def test_a_link_that_fails_is_tried_again_with_growing_pauses() -> None:
     assert (delays[0], delays[1], delays[-1]) == (0.1, 0.2, 8.0)
 
 
-def test_a_link_that_was_up_starts_with_the_short_pause() -> None:
+def test_a_link_that_worked_starts_with_the_short_pause() -> None:
     plan = SubscriptionPlan()
     plan.publishers_changed(["http://a"])
     for _ in range(5):
         plan.lost("http://a")
-    plan.connected("http://a")
+    assert plan.failures("http://a") == 5
+    plan.worked("http://a")
+    assert plan.failures("http://a") == 0
     assert plan.lost("http://a") == Connect("http://a", 0.1)
 
 
@@ -40,3 +42,27 @@ def test_a_publisher_that_left_is_not_tried_again() -> None:
     plan.publishers_changed(["http://a"])
     plan.publishers_changed([])
     assert plan.lost("http://a") is None
+
+
+def test_what_happens_to_a_publisher_that_left_changes_nothing() -> None:
+    plan = SubscriptionPlan()
+    plan.worked("http://a")
+    plan.refused("http://a")
+    assert plan.failures("http://a") == 0
+    assert plan.publishers_changed(["http://a"]) == [Connect("http://a")]
+
+
+def test_one_that_refused_is_asked_again_when_the_master_next_tells_of_the_topic() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a", "http://b"])
+    plan.refused("http://a")
+    assert plan.publishers_changed(["http://a", "http://b"]) == [Connect("http://a")]
+    assert plan.publishers_changed(["http://a", "http://b"]) == []
+
+
+def test_a_list_that_is_not_full_yet_leaves_nobody() -> None:
+    plan = SubscriptionPlan()
+    plan.publishers_changed(["http://a", "http://b"])
+    assert plan.publishers_changed(["http://c"], keep=True) == [Connect("http://c")]
+    assert plan.publishers == ("http://c", "http://a", "http://b")
+    assert plan.publishers_changed(["http://b"]) == [Disconnect("http://c"), Disconnect("http://a")]

@@ -10,7 +10,7 @@ ros-map-msgs ros-move-base-msgs ros-pcl-msgs ros-tf2-msgs ros-topic-tools-srvs
 python3-shape-msgs python3-stereo-msgs python3-trajectory-msgs python3-visualization-msgs python3-map-msgs
 python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure
 catkin cmake ros-message-generation
-g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev"
+g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || missing="$missing $package"

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "referee"))
-from run_case import CASES, recorded, run_case
+from run_case import CASES, differences, recorded, run_case
 
 sys.path.pop(0)
 
@@ -23,4 +23,4 @@ def test_the_record_is_what_real_rospy_prints(name: str, real_master: str, tmp_p
     said = run_case(name, "/usr/bin/python3", real_master, tmp_path)
     if os.environ.get("RECORD"):
         recorded(name).write_text(said)
-    assert said == recorded(name).read_text()
+    assert not (found := differences(said, recorded(name).read_text())), found

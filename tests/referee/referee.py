@@ -69,7 +69,7 @@ class Other:
         assert self.process.stdout
         self.process.stdin.close()
         try:
-            self.process.wait(0.2)
+            self.process.wait(3.0)
         except subprocess.TimeoutExpired:
             self.process.terminate()
         try:

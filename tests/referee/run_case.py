@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import subprocess
 from pathlib import Path
@@ -35,6 +36,13 @@ def run_case(name: str, python: str, uri: str, home: Path) -> str:
     if done.returncode:
         print(done.stderr)
     return f"{done.stdout}exit status {done.returncode}\n"
+
+
+def differences(said: str, expected: str) -> str:
+    """The lines in which two outputs differ; nothing where they are the same."""
+    return "\n".join(
+        difflib.unified_diff(expected.splitlines(), said.splitlines(), "expected", "said", lineterm="", n=1)
+    )
 
 
 def recorded(name: str) -> Path:

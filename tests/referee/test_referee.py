@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from run_case import CASES, recorded, run_case
+from run_case import CASES, differences, recorded, run_case
 
 sys.path.pop(0)
 
@@ -16,4 +16,5 @@ sys.path.pop(0)
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", CASES)
 def test_case(name: str, master: str, tmp_path: Path) -> None:
-    assert run_case(name, sys.executable, master, tmp_path) == recorded(name).read_text()
+    said = run_case(name, sys.executable, master, tmp_path)
+    assert not (found := differences(said, recorded(name).read_text())), found

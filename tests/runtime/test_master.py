@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import queue
@@ -10,7 +11,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xmlrpc.client import Fault, ServerProxy
+from xmlrpc.client import Binary, DateTime, Fault, ServerProxy
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
@@ -18,34 +19,89 @@ import pytest
 HERE = Path(__file__).parent
 
 
-def calls() -> list[tuple[Any, ...]]:
+def referee() -> Any:
     spec = importlib.util.spec_from_file_location("master_calls", HERE / "master_calls.py")
     assert spec
     assert spec.loader
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return list(module.CALLS)
+    return module
+
+
+def plain(value: Any) -> Any:
+    """An answer as JSON can hold it."""
+    match value:
+        case Binary():
+            return {"binary": value.data.hex()}
+        case DateTime():
+            return {"date": value.value}
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case dict():
+            return {key: plain(item) for key, item in value.items()}
+    return value
 
 
 def answers(uri: str) -> list[Any]:
-    """The answer to each call; of a fault only that it was one, and what differs by process is blanked."""
+    """The answer to each call; what differs by process is blanked."""
     found: list[Any] = []
     with ServerProxy(uri) as proxy:
-        for method, *args in calls():
+        for method, *args in referee().CALLS:
             try:
                 answer: Any = getattr(proxy, method)(*args)
-            except Fault:
-                answer = "fault"
+            except Fault as fault:
+                answer = ["fault", fault.faultCode, fault.faultString]
             if method in ("getPid", "getUri") and answer[0] == 1:
                 answer[2] = "its own"
-            found.append(answer)
+            found.append(plain(answer))
     return found
 
 
+def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]]:
+    """What the nodes of SCENE are told after each call, sorted; ``expected`` says for how many to wait."""
+    nodes = [Slave(), Slave()]
+    found: list[list[Any]] = []
+
+    def shown(value: Any) -> Any:
+        text = json.dumps(value)
+        for number, node in enumerate(nodes):
+            text = text.replace(node.uri, f"{{{number}}}")
+        return json.loads(text)
+
+    try:
+        with ServerProxy(uri) as proxy:
+            for at, (method, *args) in enumerate(referee().SCENE):
+                words = [a.format(*(n.uri for n in nodes)) if isinstance(a, str) else a for a in args]
+                getattr(proxy, method)(*words)
+                told = [
+                    [n, *node.next()] for n, node in enumerate(nodes) for _ in range(counted(expected, at, n))
+                ]
+                if expected is None:
+                    told = [[n, *each] for n, node in enumerate(nodes) for each in node.all_until_quiet()]
+                found.append(sorted((shown(each) for each in told), key=str))
+        for node in nodes:
+            assert node.called.empty()
+    finally:
+        for node in nodes:
+            node.close()
+    return found
+
+
+def counted(expected: list[list[Any]] | None, at: int, node: int) -> int:
+    return sum(each[0] == node for each in expected[at]) if expected else 0
+
+
 def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
-    golden = json.loads((HERE / "master_answers.json").read_text())
-    assert len(golden) == len(calls()) > 100
-    for call, ours, real in zip(calls(), answers(master), golden, strict=True):
+    golden = json.loads((HERE / "master_answers.json").read_text())["answers"]
+    calls = referee().CALLS
+    assert len(golden) == len(calls) > 400
+    for call, ours, real in zip(calls, answers(master), golden, strict=True):
+        assert ours == real, call
+
+
+def test_nodes_are_told_what_real_rosmaster_tells_them(master: str) -> None:
+    golden = json.loads((HERE / "master_answers.json").read_text())["notices"]
+    for call, ours, real in zip(referee().SCENE, notices(master, golden), golden, strict=True):
         assert ours == real, call
 
 
@@ -70,6 +126,14 @@ class Slave:
 
     def next(self) -> tuple[Any, ...]:
         return self.called.get(timeout=5)
+
+    def all_until_quiet(self) -> list[tuple[Any, ...]]:
+        """For recording alone: what comes within half a second."""
+        found = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                found.append(self.called.get(timeout=0.5))
+        return found
 
     def close(self) -> None:
         self._server.shutdown()

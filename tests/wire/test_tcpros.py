@@ -37,8 +37,10 @@ def test_types_that_differ_are_told_apart_by_name() -> None:
 def test_a_type_of_the_same_name_with_another_definition_is_refused() -> None:
     old = InterfaceType("std_msgs/Bool", "0" * 32)
     why = check_subscriber(subscriber_header("/t", old, "/sub"), "/t", BOOL)
-    assert why is not None
-    assert "md5sums do not match" in why
+    assert why == (
+        f"Client [/sub] wants topic [/t] to have datatype/md5sum [std_msgs/Bool/{old.md5sum}], "
+        f"but our version has [std_msgs/Bool/{BOOL.md5sum}] Dropping connection."
+    )
 
 
 def test_a_renamed_type_with_the_same_fields_is_accepted() -> None:
@@ -46,11 +48,11 @@ def test_a_renamed_type_with_the_same_fields_is_accepted() -> None:
     assert check_subscriber(subscriber_header("/t", renamed, "/sub"), "/t", BOOL) is None
 
 
-@pytest.mark.parametrize("missing", ["topic", "md5sum"])
+@pytest.mark.parametrize("missing", ["callerid", "md5sum"])
 def test_a_subscriber_must_send(missing: str) -> None:
     fields = subscriber_header("/t", BOOL, "/sub")
     del fields[missing]
-    assert check_subscriber(fields, "/t", BOOL) == f"Missing required '{missing}' field in connection header"
+    assert check_subscriber(fields, "/t", BOOL) == f"Missing required '{missing}' field"
 
 
 def test_a_subscriber_need_not_send_type_definition_nor_nodelay() -> None:
@@ -72,9 +74,13 @@ def test_a_publisher_of_another_type_is_refused() -> None:
         check_publisher(publisher_header("/t", STRING, "/pub", latch=True), "/t", BOOL)
 
 
-def test_the_users_fields_do_not_replace_the_protocols() -> None:
-    header = publisher_header("/t", BOOL, "/pub", latch=True, extra={"cookies": "yes", "topic": "/x"})
+def test_the_users_fields_win_so_that_a_relay_tells_the_type_of_what_it_relays() -> None:
+    extra = {"cookies": "yes", "type": BOOL.name, "md5sum": BOOL.md5sum}
+    header = publisher_header("/t", ANY_TYPE, "/pub", latch=True, extra=extra)
     assert (header["cookies"], header["topic"], header["latching"]) == ("yes", "/t", "1")
+    check_publisher(header, "/t", BOOL)
+    with pytest.raises(HandshakeRefused):
+        check_publisher(header, "/t", STRING)
 
 
 def test_services() -> None:
@@ -84,6 +90,6 @@ def test_services() -> None:
     assert why is not None
     assert why.startswith("request from [/client]: md5sums do not match")
     assert check_service_client(service_client_header("/s", "*", "/client", probe=True), BOOL) is None
-    check_service(service_header(BOOL, "/server", "a/BRequest", "a/BResponse"))
+    check_service(service_header("/s", BOOL, "/server", "a/BRequest", "a/BResponse"))
     with pytest.raises(HandshakeRefused):
         check_service({"error": "no"})

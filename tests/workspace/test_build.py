@@ -247,6 +247,7 @@ def test_mistakes_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> No
         ("int8 x\n\ngeometry_msgs/Point p\n", 3, "generate_messages(DEPENDENCIES geometry_msgs)"),
         ("std_msgs/Boool b\n", 1, "message type [std_msgs/Boool] not found; did you mean std_msgs/Bool"),
         ("Ledd l\n", 1, "message type [p/Ledd] not found; did you mean p/Led?"),
+        ("int46 l\n", 1, "message type [p/int46] not found: did you mean int64?"),
         ("int8 x\nLed l\n", 1, "contains itself"),
     ],
 )

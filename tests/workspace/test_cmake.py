@@ -52,7 +52,9 @@ def test_lists_and_the_cache() -> None:
 
 
 def test_loops() -> None:
-    text = "set(L x y)\nforeach(T a b)\n f(${T})\n foreach(U IN LISTS L ITEMS z)\n  g(${T}${U})\n endforeach()\n"
+    text = (
+        "set(L x y)\nforeach(T a b)\n f(${T})\n foreach(U IN LISTS L ITEMS z)\n  g(${T}${U})\n endforeach()\n"
+    )
     text += "endforeach(T)\nh()"
     assert [(name, *arguments) for name, arguments, _ in read(text)] == [
         ("set", "L", "x", "y"),

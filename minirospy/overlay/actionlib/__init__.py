@@ -1,11 +1,9 @@
-"""actionlib: its messages (`actionlib.msg`). Servers and clients of actions are not part of minirospy yet."""
+"""actionlib, filled in by minirospy."""
 
-from typing import Any
+from actionlib_msgs.msg import GoalID as GoalID
+from actionlib_msgs.msg import GoalStatus as GoalStatus
+from actionlib_msgs.msg import GoalStatusArray as GoalStatusArray
+from std_msgs.msg import Header as Header
 
-
-def __getattr__(name: str) -> Any:
-    if name.startswith("__"):
-        raise AttributeError(name)
-    raise NotImplementedError(
-        f"actionlib.{name}: this version of minirospy has no actions yet, only actionlib.msg"
-    )
+from minirospy.actionlib import *  # noqa: F403
+from minirospy.actionlib import __all__ as __all__

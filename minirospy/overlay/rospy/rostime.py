@@ -1,5 +1,16 @@
 """rospy.rostime, filled in by minirospy."""
 
+from minirospy.client.core import (
+    is_rostime_initialized,
+    is_wallclock,
+    set_rostime_initialized,
+    switch_to_wallclock,
+    wallsleep,
+)
+from minirospy.client.core import set_rostime as _set_rostime  # noqa: F401 - tests of users set the time by it
 from minirospy.client.time import Duration, Time, get_rostime, get_time
 
-__all__ = ["Duration", "Time", "get_rostime", "get_time"]
+__all__ = [
+    "Duration", "Time", "get_rostime", "get_time", "is_rostime_initialized", "is_wallclock", "set_rostime_initialized",
+    "switch_to_wallclock", "wallsleep",
+]  # fmt: skip

@@ -1,0 +1,39 @@
+"""Actions: goals that take a while, with feedback on the way, a result at the end, and a way to stop them.
+
+The way of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
+`internal_goal_callback` -> simple_server, the user's function -> handle `set_succeeded` -> topic result ==>
+machine `update_result` -> simple_client `_handle_transition`, the user's function. Which state follows which
+stands in `minirospy.graph.goals`. What `import actionlib` re-exports. Source: http://wiki.ros.org/actionlib.
+"""
+
+from __future__ import annotations
+
+from minirospy.actionlib.client import ActionClient
+from minirospy.actionlib.goal_id import GoalIDGenerator
+from minirospy.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
+from minirospy.actionlib.machine import ClientGoalHandle, CommStateMachine, GoalManager
+from minirospy.actionlib.server import ActionServer, nop_cb
+from minirospy.actionlib.simple_client import SimpleActionClient
+from minirospy.actionlib.simple_server import SimpleActionServer
+from minirospy.actionlib.spec import ActionException
+from minirospy.actionlib.states import CommState, SimpleGoalState, TerminalState, get_name_of_constant
+
+__all__ = [
+    "ActionClient",
+    "ActionException",
+    "ActionServer",
+    "ClientGoalHandle",
+    "CommState",
+    "CommStateMachine",
+    "GoalIDGenerator",
+    "GoalManager",
+    "HandleTrackerDeleter",
+    "ServerGoalHandle",
+    "SimpleActionClient",
+    "SimpleActionServer",
+    "SimpleGoalState",
+    "StatusTracker",
+    "TerminalState",
+    "get_name_of_constant",
+    "nop_cb",
+]

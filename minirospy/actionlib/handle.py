@@ -1,0 +1,217 @@
+"""What a server holds of a goal: a StatusTracker each, and the ServerGoalHandle by which user code moves it on.
+
+Which state follows which is a table (`minirospy.graph.goals`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from actionlib_msgs.msg import GoalID, GoalStatus
+
+from minirospy import client as rospy
+from minirospy import times
+from minirospy.actionlib.goal_id import GoalIDGenerator
+from minirospy.actionlib.statuses import status_bytes
+from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent
+
+if TYPE_CHECKING:
+    from minirospy.actionlib.server import ActionServer
+
+__all__ = ["HandleTrackerDeleter", "ServerGoalHandle", "StatusTracker"]
+
+_NOTHING = times.Time()
+_WHERE_FROM = {
+    GoalEvent.ACCEPT: "a pending or recalling state",
+    GoalEvent.CANCEL: "a pending, recalling, active, or preempting state",
+    GoalEvent.REJECT: "a pending or recalling state",
+    GoalEvent.ABORT: "a preempting or active state",
+    GoalEvent.SUCCEED: "a preempting or active state",
+}
+
+
+class StatusTracker:
+    """A goal of the server's list, or an id whose cancel came before its goal."""
+
+    def __init__(self, goal_id: GoalID | None = None, status: int | None = None, goal: Any = None) -> None:
+        self.goal = goal
+        self.handle_tracker: HandleTrackerDeleter | None = None
+        self.id_generator = GoalIDGenerator()
+        self.ended_at = 0
+        """Nanoseconds; zero while the goal has not ended."""
+        self._bytes: bytes | None = None
+        self.status = GoalStatus()
+        if goal is None:
+            self.status.goal_id = goal_id or GoalID()
+            self.status.status = status or GoalStatus.PENDING
+        elif goal.goal_id.id:
+            self.status.goal_id = goal.goal_id
+            if self.status.goal_id.stamp == _NOTHING:
+                self.status.goal_id.stamp = rospy.Time.now()
+        else:
+            self.status.goal_id = self.id_generator.generate_ID()
+
+    @property
+    def handle_destruction_time(self) -> times.Time:
+        """When the goal ended; zero while it has not."""
+        return rospy.Time(nsecs=self.ended_at)
+
+    def end(self) -> None:
+        """The goal has ended: from now on it is told of for a while only."""
+        self.ended_at = rospy.Time.now().to_nsec()
+        self._bytes = None
+
+    def serialize(self) -> bytes:
+        """The status as it travels. Once the goal has ended, it changes no more."""
+        if self._bytes is not None:
+            return self._bytes
+        told = status_bytes(self.status)
+        if self.ended_at:
+            self._bytes = told
+        return told
+
+
+class HandleTrackerDeleter:
+    """Ends a goal of which nobody holds a handle any more."""
+
+    def __init__(self, action_server: ActionServer, status_tracker: StatusTracker) -> None:
+        self.action_server = action_server
+        self.status_tracker: StatusTracker | None = status_tracker
+
+    def __call__(self, ptr: object) -> None:
+        if self.status_tracker:
+            with self.action_server.lock:
+                self.status_tracker.end()
+
+
+class ServerGoalHandle:
+    """A goal that a server got. One that is made without arguments holds none: its calls are logged as mistakes."""
+
+    def __init__(
+        self,
+        status_tracker: StatusTracker | None = None,
+        action_server: ActionServer | None = None,
+        handle_tracker: HandleTrackerDeleter | None = None,
+    ) -> None:
+        self.status_tracker = status_tracker
+        self.action_server = action_server
+        self.handle_tracker = handle_tracker
+        self.goal = status_tracker.goal if status_tracker else None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ServerGoalHandle):
+            return NotImplemented if other is not None else False
+        if not self.goal or not other.goal:
+            return False
+        return bool(self.get_goal_id().id == other.get_goal_id().id)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self.get_goal_id().id)
+
+    def get_default_result(self) -> Any:
+        """A result with nothing in it."""
+        return self.action_server.ActionResultType() if self.action_server else None
+
+    def set_accepted(self, text: str = "") -> None:
+        """Begin with the goal."""
+        self._tell("Accepting goal, id: %s, stamp: %.2f")
+        if self._step(GoalEvent.ACCEPT, text) and self.action_server:
+            self.action_server.publish_status()
+
+    def set_canceled(self, result: Any = None, text: str = "") -> None:
+        """The goal ends because it was asked to: RECALLED where it had not begun, else PREEMPTED."""
+        self._tell("Setting status to canceled on goal, id: %s, stamp: %.2f")
+        self._finish(GoalEvent.CANCEL, result, text)
+
+    def set_rejected(self, result: Any = None, text: str = "") -> None:
+        """Refuse the goal."""
+        self._tell("Setting status to rejected on goal, id: %s, stamp: %.2f")
+        self._finish(GoalEvent.REJECT, result, text)
+
+    def set_aborted(self, result: Any = None, text: str = "") -> None:
+        """The goal has failed."""
+        self._tell("Setting status to aborted on goal, id: %s, stamp: %.2f")
+        self._finish(GoalEvent.ABORT, result, text)
+
+    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+        """The goal is reached."""
+        self._tell("Setting status to succeeded on goal, id: %s, stamp: %.2f")
+        self._finish(GoalEvent.SUCCEED, result, text)
+
+    def set_cancel_requested(self) -> bool:
+        """A client wants the goal canceled; whether that changes anything."""
+        self._tell("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
+        tracker = self.status_tracker
+        if not self.goal or tracker is None or self.action_server is None:
+            return False
+        with self.action_server.lock:
+            state = SERVER_STEPS[GoalEvent.CANCEL_REQUEST].get(tracker.status.status)
+            if state is None:
+                return False
+            tracker.status.status = int(state)
+            self.action_server.publish_status()
+            return True
+
+    def publish_feedback(self, feedback: Any) -> None:
+        """Send feedback to the goal's client."""
+        self._tell("Publishing feedback for goal, id: %s, stamp: %.2f")
+        if not self.goal or self.status_tracker is None or self.action_server is None:
+            rospy.logerr("Attempt to publish feedback on an uninitialized ServerGoalHandle")
+            return
+        with self.action_server.lock:
+            self.action_server.publish_feedback(self.status_tracker.status, feedback)
+
+    def get_goal(self) -> Any:
+        """The goal; None where the handle holds none."""
+        return self.goal.goal if self.goal else None
+
+    def get_goal_id(self) -> GoalID:
+        """The goal's id and stamp."""
+        if not self.goal or self.status_tracker is None:
+            rospy.logerr("Attempt to get a goal id on an uninitialized ServerGoalHandle")
+            return GoalID()
+        return self.status_tracker.status.goal_id
+
+    def get_goal_status(self) -> GoalStatus:
+        """The goal's status and text."""
+        if not self.goal or self.status_tracker is None:
+            rospy.logerr("Attempt to get goal status on an uninitialized ServerGoalHandle")
+            return GoalStatus()
+        return self.status_tracker.status
+
+    def _tell(self, line: str) -> None:
+        goal_id = self.get_goal_id()
+        rospy.logdebug(line, goal_id.id, goal_id.stamp.to_sec())
+
+    def _step(self, event: GoalEvent, text: str) -> bool:
+        """Take the goal to its next state; a step that cannot be taken is logged."""
+        tracker = self.status_tracker
+        if not self.goal or tracker is None or self.action_server is None:
+            rospy.logerr("Attempt to set status on an uninitialized ServerGoalHandle")
+            return False
+        with self.action_server.lock:
+            state = SERVER_STEPS[event].get(tracker.status.status)
+            if state is None:
+                rospy.logerr(
+                    "To transition to %s, the goal must be in %s, it is currently in state: %s",
+                    event.value,
+                    _WHERE_FROM[event],
+                    tracker.status.status,
+                )
+                return False
+            tracker.status.status = int(state)
+            tracker.status.text = text
+            return True
+
+    def _finish(self, event: GoalEvent, result: Any, text: str) -> None:
+        server, tracker = self.action_server, self.status_tracker
+        if server is None or tracker is None:
+            self._step(event, text)
+            return
+        with server.lock:
+            if self._step(event, text) and tracker.status.status in TERMINAL:
+                server.publish_result(tracker.status, result or self.get_default_result())
+                tracker.end()

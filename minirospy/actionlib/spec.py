@@ -1,0 +1,41 @@
+"""The messages of an action, by its class: `TestAction` -> its goal, result and feedback, with and without header."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from minirospy.errors import MinirospyError
+
+__all__ = ["ActionException", "ActionTypes", "action_types"]
+
+
+class ActionException(MinirospyError):
+    """A class that is no action."""
+
+
+class ActionTypes(NamedTuple):
+    """The message classes of an action; the ``action_`` ones are those that travel."""
+
+    action_goal: type[Any]
+    action_result: type[Any]
+    action_feedback: type[Any]
+    goal: type[Any]
+    result: type[Any]
+    feedback: type[Any]
+
+
+def action_types(action: Any) -> ActionTypes:
+    """The message classes of an action's class, such as ``runningLedAction``. Raises ActionException."""
+    try:
+        parts = action()
+        goal, result, feedback = parts.action_goal, parts.action_result, parts.action_feedback
+        return ActionTypes(
+            type(goal),
+            type(result),
+            type(feedback),
+            type(goal.goal),
+            type(result.result),
+            type(feedback.feedback),
+        )
+    except (AttributeError, TypeError):
+        raise ActionException(f"Type is not an action spec: {action}") from None

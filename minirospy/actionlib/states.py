@@ -1,0 +1,64 @@
+"""The numbers that an action's client tells, by the names that user code has for them."""
+
+from __future__ import annotations
+
+from minirospy.graph.goals import ClientState, GoalState, SimpleState
+
+__all__ = ["CommState", "SimpleGoalState", "TerminalState", "get_name_of_constant"]
+
+
+def get_name_of_constant(C: type, n: int) -> str:
+    """The name of the constant of a class that has this value, as ``NO_SUCH_STATE_77`` where it has none."""
+    for name, value in vars(C).items():
+        # A bool is an int, too: a message class has such constants.
+        if type(value) is int and value == n and not name.startswith("_"):
+            return name
+    return f"NO_SUCH_STATE_{n}"
+
+
+class CommState:
+    """How far a client is with a goal."""
+
+    WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
+    PENDING = int(ClientState.PENDING)
+    ACTIVE = int(ClientState.ACTIVE)
+    WAITING_FOR_RESULT = int(ClientState.WAITING_FOR_RESULT)
+    WAITING_FOR_CANCEL_ACK = int(ClientState.WAITING_FOR_CANCEL_ACK)
+    RECALLING = int(ClientState.RECALLING)
+    PREEMPTING = int(ClientState.PREEMPTING)
+    DONE = int(ClientState.DONE)
+    LOST = int(ClientState.LOST)
+
+    @classmethod
+    def to_string(cls, n: int) -> str:
+        """The name of a state."""
+        return get_name_of_constant(cls, n)
+
+
+class TerminalState:
+    """How a goal's life has ended."""
+
+    RECALLED = int(GoalState.RECALLED)
+    REJECTED = int(GoalState.REJECTED)
+    PREEMPTED = int(GoalState.PREEMPTED)
+    ABORTED = int(GoalState.ABORTED)
+    SUCCEEDED = int(GoalState.SUCCEEDED)
+    LOST = int(GoalState.LOST)
+
+    @classmethod
+    def to_string(cls, n: int) -> str:
+        """The name of a state."""
+        return get_name_of_constant(cls, n)
+
+
+class SimpleGoalState:
+    """How far the simple client is with its goal."""
+
+    PENDING = int(SimpleState.PENDING)
+    ACTIVE = int(SimpleState.ACTIVE)
+    DONE = int(SimpleState.DONE)
+
+    @classmethod
+    def to_string(cls, n: int) -> str:
+        """The name of a state."""
+        return get_name_of_constant(cls, n)

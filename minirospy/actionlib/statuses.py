@@ -1,0 +1,125 @@
+"""A list of statuses as it travels: actionlib_msgs/GoalStatusArray, made of parts and read in part.
+
+A server tells of each goal for seconds after its end, so a busy one tells thousands of statuses at a time, of
+which a client wants those of its own goals.
+"""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+from typing import Any
+
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+
+__all__ = ["StatusList", "find_status", "status_bytes"]
+
+_HEADER = struct.Struct("<4I")
+_COUNT = struct.Struct("<I")
+_STAMP_AND_LENGTH = struct.Struct("<3I")
+_STATUS_AND_LENGTH = struct.Struct("<BI")
+
+
+def status_bytes(status: GoalStatus) -> bytes:
+    """A status as it travels."""
+    buffer = BytesIO()
+    status.serialize(buffer)
+    return buffer.getvalue()
+
+
+class StatusList(GoalStatusArray):
+    """A GoalStatusArray that is sent as the parts which it was made of, and read when it is asked."""
+
+    _takes_memoryview = False
+
+    def __init__(self, parts: list[bytes] | None = None) -> None:
+        self._parts = parts or []
+        self._data = b""
+        self._start = 0
+        self._count = len(self._parts)
+        self._read: list[GoalStatus] | None = None
+        super().__init__()
+
+    @property
+    def status_list(self) -> list[GoalStatus]:
+        """The statuses."""
+        if self._read is None:
+            self._read = [self._status(start, end) for start, end in self._bounds()]
+        return self._read
+
+    @status_list.setter
+    def status_list(self, statuses: list[GoalStatus]) -> None:
+        # The base class sets an empty one.
+        self._read = statuses or None
+
+    def find(self, id: str) -> GoalStatus | None:
+        """The status of a goal; None where the list does not tell of it."""
+        name = id.encode()
+        key = _COUNT.pack(len(name)) + name
+        if key not in self._data:
+            return None
+        # It is there, or stands in another goal's text.
+        for start, end in self._bounds():
+            if self._data.startswith(key, start + 8):
+                return self._status(start, end)
+        return None
+
+    def serialize(self, buff: Any) -> None:
+        """Write the message. Raises genpy.SerializationError."""
+        if self._read is not None:
+            self._parts = [status_bytes(status) for status in self._read]
+        stamp = self.header.stamp
+        frame_id = self.header.frame_id.encode()
+        buff.write(_HEADER.pack(self.header.seq, stamp.secs, stamp.nsecs, len(frame_id)))
+        buff.write(frame_id)
+        buff.write(_COUNT.pack(len(self._parts)))
+        buff.write(b"".join(self._parts))
+
+    def deserialize(self, data: Any) -> StatusList:
+        """Take the message's bytes. Raises genpy.DeserializationError."""
+        data = bytes(data)
+        try:
+            seq, secs, nsecs, length = _HEADER.unpack_from(data)
+            self._start = _HEADER.size + length + _COUNT.size
+            (self._count,) = _COUNT.unpack_from(data, self._start - _COUNT.size)
+        except struct.error:
+            self._fail(data)
+        self.header.seq = seq
+        self.header.stamp.secs, self.header.stamp.nsecs = secs, nsecs
+        self.header.frame_id = data[_HEADER.size : _HEADER.size + length].decode("utf-8", "replace")
+        self._data = data
+        self._read = None
+        return self
+
+    def _bounds(self) -> list[tuple[int, int]]:
+        """Where each status begins and ends."""
+        bounds = []
+        data, end = self._data, self._start
+        try:
+            for _ in range(self._count if data else 0):
+                start = end
+                end += 17 + _STAMP_AND_LENGTH.unpack_from(data, start)[2]
+                end += _STATUS_AND_LENGTH.unpack_from(data, end - 5)[1]
+                bounds.append((start, end))
+        except struct.error:
+            self._fail(data)
+        return bounds
+
+    def _status(self, start: int, end: int) -> GoalStatus:
+        status = GoalStatus()
+        status.deserialize(self._data[start:end])
+        return status
+
+    def _fail(self, data: bytes) -> None:
+        # The generated class finds the same fault, and words it.
+        GoalStatusArray().deserialize(data)
+
+
+def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
+    """The status of a goal in a GoalStatusArray; None where it does not tell of it."""
+    if isinstance(statuses, StatusList):
+        return statuses.find(id)
+    for status in statuses.status_list:
+        if status.goal_id.id == id:
+            return status
+    return None

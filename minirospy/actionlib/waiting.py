@@ -1,0 +1,52 @@
+"""Blocking until others have made something true: no polling, ended by a shutdown, timed by ROS time."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from minirospy import client as rospy
+from minirospy import times
+from minirospy.client.process import process
+from minirospy.clock import SimulatedClock, wait_for_event
+
+__all__ = ["Waiting"]
+
+_FOREVER = times.Duration()
+_SIMULATED_SLICE = 0.02
+"""Seconds: nothing tells of simulated time's passing, which may be faster than the wall's."""
+
+
+class Waiting:
+    """Threads that wait for a condition; who may have made it true calls :meth:`notify`."""
+
+    def __init__(self) -> None:
+        self._events: list[threading.Event] = []
+
+    def notify(self) -> None:
+        """Have all that wait look again."""
+        for event in list(self._events):
+            event.set()
+
+    def wait_for(self, condition: Callable[[], bool], timeout: times.Duration) -> bool:
+        """Whether ``condition()`` came to hold within ``timeout`` (zero: whenever) and before a shutdown."""
+        deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
+        if condition():
+            return True
+        event = threading.Event()
+        self._events.append(event)
+        try:
+            with process.interrupting(event.set):
+                while not condition() and not process.is_shutdown():
+                    seconds = None
+                    if deadline is not None:
+                        seconds = (deadline - rospy.get_rostime()).to_sec()
+                        if seconds <= 0:
+                            break
+                        if isinstance(process.clock, SimulatedClock):
+                            seconds = _SIMULATED_SLICE
+                    wait_for_event(event, seconds)
+                    event.clear()
+        finally:
+            self._events.remove(event)
+        return condition()

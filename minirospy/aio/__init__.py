@@ -1,0 +1,20 @@
+"""The asyncio-native API: nodes that live in the program's own event loop, without a thread.
+
+::
+
+    async with Node("listener") as node:
+        async for scan in node.subscribe("/scan", LaserScan):
+            await node.publish("/nearest", Float32(min(scan.ranges)))
+
+A program may hold any number of nodes. Underneath are the objects that the rospy API stands on
+(``minirospy.runtime``). Examples: docs/asyncio.md.
+"""
+
+from __future__ import annotations
+
+from minirospy.aio.node import Node
+from minirospy.aio.services import Service, ServiceClass, ServiceProxy
+from minirospy.aio.time import Rate
+from minirospy.aio.topics import Publisher, Subscription
+
+__all__ = ["Node", "Publisher", "Rate", "Service", "ServiceClass", "ServiceProxy", "Subscription"]

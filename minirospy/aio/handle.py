@@ -1,0 +1,63 @@
+"""What publishers, subscriptions and services have in common: they are registered in the background."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Generator
+from io import BytesIO
+from types import TracebackType
+from typing import Any, TypeVar
+
+from minirospy.errors import (
+    MasterUnreachableError,
+    ROSSerializationException,
+    RpcError,
+    SerializationError,
+)
+
+__all__ = ["Handle", "registered", "serialized"]
+
+_T = TypeVar("_T")
+_H = TypeVar("_H", bound="Handle")
+
+
+class Handle:
+    """Something that is registered in the background: ``await handle`` waits until the master knows of it."""
+
+    _registration: asyncio.Task[None]
+
+    def __await__(self: _H) -> Generator[Any, None, _H]:
+        yield from asyncio.shield(self._registration).__await__()
+        return self
+
+    async def __aenter__(self: _H) -> _H:
+        return await self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """End it."""
+        raise NotImplementedError
+
+
+async def registered(
+    register: Callable[[_T], Awaitable[None]], part: _T, what: str, log: logging.Logger
+) -> None:
+    """Register; a master that says no is logged, as in rospy, and the program goes on."""
+    try:
+        await register(part)
+    except (MasterUnreachableError, RpcError) as error:
+        log.critical("unable to register %s with master: %s", what, error)
+
+
+def serialized(message: Any) -> bytes:
+    buffer = BytesIO()
+    try:
+        message.serialize(buffer)
+    except SerializationError as error:
+        raise ROSSerializationException(str(error)) from error
+    return buffer.getvalue()

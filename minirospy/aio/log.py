@@ -1,0 +1,67 @@
+"""Log lines of a node in an event loop: to the terminal and to /rosout, by Python's ``logging``."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+from minirospy.aio.topics import Publisher
+from minirospy.errors import (
+    ROSSerializationException,
+)
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["RosoutHandler", "TerminalHandler"]
+
+
+class TerminalHandler(logging.Handler):
+    """Lines as rospy prints them: debug and info to stdout, the rest to stderr."""
+
+    _NAMES = {logging.WARNING: "WARN", logging.CRITICAL: "FATAL"}
+
+    def __init__(self, node: Node) -> None:
+        super().__init__()
+        self._node = node
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line."""
+        name = self._NAMES.get(record.levelno, record.levelname)
+        stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
+        # The terminal may be gone; the program has better things to do.
+        with contextlib.suppress(OSError, ValueError):
+            stream.write(f"[{name}] [{record.created:f}]: {self.format(record)}\n")
+            stream.flush()
+
+
+class RosoutHandler(logging.Handler):
+    """Log records to /rosout."""
+
+    _LEVELS = ((logging.CRITICAL, 16), (logging.ERROR, 8), (logging.WARNING, 4), (logging.INFO, 2))
+
+    def __init__(self, node: Node, publisher: Publisher[Any], message_class: Any) -> None:
+        super().__init__()
+        self._node = node
+        self._publisher = publisher
+        self._message_class = message_class
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Publish one record."""
+        state = self._publisher._state
+        if state is None or self._node.is_shutdown:
+            return
+        message = self._message_class()
+        message.header.stamp = self._node.now()
+        message.level = next((level for least, level in self._LEVELS if record.levelno >= least), 1)
+        message.name = self._node.name
+        message.msg = self.format(record)
+        message.file = os.path.basename(record.pathname)
+        message.function = record.funcName or ""
+        message.line = record.lineno
+        message.topics = list(self._node._node.publications)
+        with contextlib.suppress(ROSSerializationException):
+            state.publish(message)

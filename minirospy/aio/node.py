@@ -1,0 +1,476 @@
+"""A node in an event loop: its life, and the doors to its topics, services, parameters and time."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import sys
+import time
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
+from types import TracebackType
+from typing import Any, TypeVar
+
+from minirospy import names
+from minirospy.aio.log import RosoutHandler, TerminalHandler
+from minirospy.aio.services import Service, ServiceClass, ServiceProxy
+from minirospy.aio.time import Rate, SimulatedTime
+from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription, interface_type
+from minirospy.environment import Environment
+from minirospy.errors import (
+    MasterUnreachableError,
+    ROSInitException,
+    ROSInterruptException,
+    RpcError,
+    RpcRefused,
+    ServiceException,
+    WireError,
+)
+from minirospy.runtime.node import Node as RuntimeNode
+from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
+from minirospy.runtime.topics import Publication
+from minirospy.times import Duration, Time
+from minirospy.wire.tcpros import ANY
+
+__all__ = ["Node"]
+
+_M = TypeVar("_M")
+_Request = TypeVar("_Request")
+_Response = TypeVar("_Response")
+_POLL_SECONDS = 0.1
+_PROBE_SECONDS = 5.0
+_BILLION = 1_000_000_000
+
+
+class _Unspecified:
+    """The default of ``default``: None is a value that a caller may want back."""
+
+
+_UNSPECIFIED = _Unspecified()
+
+
+class Node:
+    """A node of the computation graph, alive inside ``async with Node("name") as node:``.
+
+    ``name`` is without a namespace; ``anonymous`` adds a number to it. ``argv`` are remappings, private
+    parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
+    default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
+    for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
+
+    Entering waits for a master. All methods belong to the event loop that entered, but for :meth:`shutdown`.
+    Source: http://wiki.ros.org/Nodes.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        namespace: str = "",
+        anonymous: bool = False,
+        argv: Sequence[str] = (),
+        master_uri: str = "",
+        host: str = "",
+        rosout: bool = True,
+    ) -> None:
+        """Raises ValueError on a name that is empty or has a namespace."""
+        if not name:
+            raise ValueError("name must not be empty")
+        if "/" in name:
+            raise ValueError("namespaces are not allowed in node names: give namespace=")
+        self._arguments = names.parse_arguments(argv)
+        special = self._arguments.special
+        self._environment = Environment.read(
+            master_uri=special.get("__master") or master_uri,
+            host=special.get("__hostname") or special.get("__ip") or host,
+            namespace=special.get("__ns") or namespace,
+        )
+        name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
+        self.name = names.canonicalize(self._environment.namespace + "/" + name)
+        self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
+        """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+        self._remappings = self._arguments.resolved_remappings(self.name)
+        self._rosout = rosout
+        self._handlers: list[logging.Handler] = []
+        self._runtime: RuntimeNode | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._stopping = asyncio.Event()
+        self._published: dict[str, PublishedTopic] = {}
+        self._kept: dict[str, Publisher[Any]] = {}
+        self._subscribed: dict[str, SubscribedTopic] = {}
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._simulated: SimulatedTime | None = None
+        self._is_closed = False
+
+    # --- life
+
+    async def __aenter__(self) -> Node:
+        await self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def start(self) -> None:
+        """Open the node's servers and wait for a master; what ``async with`` does first.
+
+        Raises ROSInitException where the node cannot listen, or has been started before.
+        """
+        if self._runtime or self._is_closed:
+            raise ROSInitException(f"node [{self.name}] has been started before: make another one")
+        loop = asyncio.get_running_loop()
+        if sys.platform == "win32" and isinstance(loop, asyncio.ProactorEventLoop):
+            raise ROSInitException(
+                "this event loop cannot watch sockets: use "
+                "asyncio.run(main(), loop_factory=asyncio.SelectorEventLoop), or before Python 3.12 "
+                "asyncio.set_event_loop_policy(asyncio.WindowsSelectorEventLoopPolicy())"
+            )
+        self._loop = loop
+        runtime = RuntimeNode(self.name, self._environment, on_shutdown=self.shutdown)
+        try:
+            await runtime.start()
+        except OSError as error:
+            raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
+        self._runtime = runtime
+        try:
+            self._start_logging()
+            await self._wait_for_master()
+            await self._set_private_parameters()
+            if await self.get_param("/use_sim_time", False):
+                self._simulated = SimulatedTime(self._stopping)
+                self._spawn(self._follow_clock(self._simulated))
+            if self._rosout:
+                self._start_rosout()
+        except BaseException:
+            await self.close()
+            raise
+
+    async def close(self) -> None:
+        """Leave the graph: topics and services end, the master is told. Idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        self._stop()
+        for handler in self._handlers:
+            self.log.removeHandler(handler)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._runtime:
+            servers = list(self._runtime.services.values())
+            await self._runtime.close()
+            for server in servers:
+                if isinstance(server, LoopServiceServer):
+                    await server.cancel()
+
+    def shutdown(self, reason: object = "") -> None:
+        """Ask the node to end, from any thread: :meth:`spin` and loops over messages end, sleeps are interrupted.
+
+        The node leaves the graph when its ``async with`` block ends. `rosnode kill` ends here too.
+        """
+        if self._loop:
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._stop)
+
+    @property
+    def is_shutdown(self) -> bool:
+        """Whether the node is about to end, or has ended."""
+        return self._stopping.is_set()
+
+    async def spin(self) -> None:
+        """Wait until the node is asked to end."""
+        await self._stopping.wait()
+
+    @property
+    def uri(self) -> str:
+        """The URI of this node's Slave API. Raises ROSInitException before the node has been started."""
+        return self._node.uri
+
+    def resolve(self, name: str) -> str:
+        """The global name of ``name`` as this node sees it."""
+        return names.resolve(name, self.name, self._remappings)
+
+    # --- topics
+
+    def subscribe(self, topic: str, message_class: type[_M], *, queue_size: int = 10) -> Subscription[_M]:
+        """The messages of ``topic``, for ``async for``.
+
+        While the program is busy, the newest ``queue_size`` messages wait; older ones are dropped and counted
+        (``dropped``). Listening begins at once, in the background; ``await node.subscribe(...)`` waits until
+        the master knows. It ends by :meth:`Subscription.close`, or when nobody holds the subscription any more.
+        Raises ValueError on a ``queue_size`` below 1.
+        """
+        if queue_size < 1:
+            raise ValueError(f"queue_size is {queue_size}: a subscription keeps at least one message")
+        resolved = self.resolve(topic)
+        state = self._subscribed.get(resolved)
+        if state is None:
+            state = self._subscribed[resolved] = SubscribedTopic(self, resolved, message_class)
+        return Subscription(self, state, message_class, queue_size)
+
+    async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
+        """The next message of ``topic``.
+
+        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        """
+        async with self.subscribe(topic, message_class, queue_size=1) as subscription:
+            return await subscription.next(timeout)
+
+    def advertise(
+        self,
+        topic: str,
+        message_class: type[_M],
+        *,
+        queue_size: int | None = 10,
+        latch: bool = False,
+        headers: Mapping[str, str] | None = None,
+        tcp_nodelay: bool = False,
+    ) -> Publisher[_M]:
+        """A publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
+
+        ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
+        number; None: ``publish`` itself waits until all are written). ``latch``: whoever joins later gets the
+        last message. ``headers``: fields for the connection header. Raises ValueError where this node
+        publishes the topic with another type.
+        """
+        resolved = self.resolve(topic)
+        state = self._published.get(resolved)
+        if state is None:
+            publication = Publication(
+                resolved,
+                interface_type(message_class),
+                queue_size=queue_size or 0,
+                latch=latch,
+                headers=headers,
+                tcp_nodelay=tcp_nodelay,
+                on_link=lambda *_: state.links_changed() if state else None,
+            )
+            state = self._published[resolved] = PublishedTopic(self, publication, message_class)
+        elif state.publication.type.md5sum != message_class._md5sum:  # type: ignore[attr-defined]
+            raise ValueError(f"{self.name} publishes {resolved} as {state.publication.type.name} already")
+        state.publication.latch = state.publication.latch or latch
+        return Publisher(self, state, message_class, waits=queue_size is None)
+
+    async def publish(self, topic: str, message: Any) -> None:
+        """Publish one message; the topic stays advertised.
+
+        The first message of a topic waits up to a second for the subscribers that the master knows.
+        """
+        resolved = self.resolve(topic)
+        publisher = self._kept.get(resolved)
+        if publisher is None:
+            publisher = self._kept[resolved] = self.advertise(resolved, type(message))
+            await publisher
+            await publisher._wait_for_expected()
+        await publisher.publish(message)
+
+    # --- services
+
+    async def call(
+        self, service: str, service_class: ServiceClass[Any, _Response], *args: Any, **kwds: Any
+    ) -> _Response:
+        """Call a service, with a request or its fields, and return its response.
+
+        Raises ServiceException where the call fails, TypeError or AttributeError where the arguments do not
+        fit the request, SerializationError where a value does not. Cancelling it hangs up.
+        """
+        return await self.service_proxy(service, service_class)(*args, **kwds)
+
+    def service_proxy(
+        self,
+        service: str,
+        service_class: ServiceClass[Any, _Response],
+        *,
+        persistent: bool = False,
+        headers: Mapping[str, str] | None = None,
+    ) -> ServiceProxy[_Response]:
+        """A function for many calls: ``await proxy(...)``; ``persistent`` keeps one connection for all."""
+        return ServiceProxy(self, self.resolve(service), service_class, persistent, headers)
+
+    def serve(
+        self,
+        service: str,
+        service_class: ServiceClass[_Request, _Response],
+        handler: Callable[[_Request], Awaitable[Any]] | Callable[[_Request], Any],
+    ) -> Service:
+        """Offer a service; ``await node.serve(...)`` waits until the master knows it.
+
+        ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
+        their values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
+        other in a worker thread. What it raises goes to the client as the call's error.
+        Raises ServiceException where this node offers the service already.
+        """
+        resolved = self.resolve(service)
+        if resolved in self._node.services:
+            raise ServiceException(f"service [{resolved}] already registered")
+        return Service(self, resolved, service_class, handler)
+
+    async def wait_for_service(self, service: str, timeout: float | None = None) -> None:
+        """Wait until a service is registered and answers.
+
+        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
+        """
+        name = self.resolve(service)
+        try:
+            await asyncio.wait_for(self._wait_for_service(name), timeout)
+        except asyncio.TimeoutError:
+            raise TimeoutError(f"timeout exceeded while waiting for service {name}") from None
+
+    # --- parameters
+
+    async def get_param(self, name: str, default: Any = _UNSPECIFIED) -> Any:
+        """A parameter's value, or ``default``.
+
+        Raises KeyError where it is not set and there is no default, MasterUnreachableError.
+        """
+        try:
+            return await self._node.master("getParam", self.resolve(name))
+        except RpcRefused as error:
+            if default is _UNSPECIFIED:
+                raise KeyError(name) from error
+            return default
+
+    async def set_param(self, name: str, value: Any) -> None:
+        """Set a parameter; a dictionary sets a whole namespace. Raises RpcError on a value of no XML-RPC type."""
+        await self._node.master("setParam", self.resolve(name), value)
+
+    async def has_param(self, name: str) -> bool:
+        """Whether a parameter, or a namespace of that name, is set."""
+        return bool(await self._node.master("hasParam", self.resolve(name)))
+
+    async def delete_param(self, name: str) -> None:
+        """Delete a parameter, or a whole namespace. Raises KeyError where it is not set."""
+        try:
+            await self._node.master("deleteParam", self.resolve(name))
+        except RpcRefused as error:
+            raise KeyError(name) from error
+
+    async def search_param(self, name: str) -> str | None:
+        """The full name of the parameter nearest to this node's namespace; None where there is none."""
+        try:
+            return str(await self._node.master("searchParam", name))
+        except RpcRefused:
+            return None
+
+    async def get_param_names(self) -> list[str]:
+        """The names of all parameters."""
+        return list(await self._node.master("getParamNames"))
+
+    # --- time
+
+    def now(self) -> Time:
+        """The time: simulated with /use_sim_time (zero until /clock tells it), else the machine's."""
+        now = self._simulated.now if self._simulated else time.time_ns()
+        return Time(*divmod(now, _BILLION))
+
+    async def sleep(self, duration: float | Duration) -> None:
+        """Sleep for ``duration`` seconds of the node's time.
+
+        Raises ROSInterruptException where the node ends meanwhile, ROSTimeMovedBackwardsException where
+        simulated time jumps back.
+        """
+        seconds = duration.to_sec() if isinstance(duration, Duration) else duration
+        if self._simulated:
+            await self._simulated.sleep(int(seconds * 1e9))
+        else:
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._stopping.wait(), max(0.0, seconds))
+        if self.is_shutdown:
+            raise ROSInterruptException("ROS shutdown request")
+
+    def rate(self, hz: float) -> Rate:
+        """``async for _ in node.rate(10): ...`` runs ten times a second, until the node ends."""
+        return Rate(self, hz)
+
+    # --- within
+
+    @property
+    def _node(self) -> RuntimeNode:
+        if self._runtime is None:
+            raise ROSInitException(f"node [{self.name}] has not been started: use it inside `async with`")
+        return self._runtime
+
+    def _stop(self) -> None:
+        self._stopping.set()
+        for state in self._subscribed.values():
+            state.end()
+
+    def _spawn(self, work: Coroutine[Any, Any, _M]) -> asyncio.Task[_M]:
+        """A task of this node's own, cancelled when it closes."""
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def _later(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Do ``work`` on the loop, from any thread; not at all once the node is closed."""
+        if self._loop and not self._is_closed:
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(lambda: None if self._is_closed else self._spawn(work()))
+
+    async def _wait_for_master(self) -> None:
+        told = False
+        while True:
+            try:
+                await self._node.master("getPid")
+            except MasterUnreachableError as error:
+                if not told:
+                    self.log.warning("%s. Will keep trying.", error)
+                    told = True
+                await self.sleep(0.25)
+            else:
+                return
+
+    async def _set_private_parameters(self) -> None:
+        if not self._arguments.parameters:
+            return
+        import yaml
+
+        for key, text in self._arguments.parameters.items():
+            await self.set_param("~" + key, yaml.safe_load(text))
+
+    async def _follow_clock(self, simulated: SimulatedTime) -> None:
+        from rosgraph_msgs.msg import Clock
+
+        async for message in self.subscribe("/clock", Clock, queue_size=1):
+            simulated.set(message.clock.to_nsec())
+
+    def _start_logging(self) -> None:
+        if self.log.level == logging.NOTSET:
+            self.log.setLevel(logging.INFO)
+        # A program that has set up logging gets the lines in its own way.
+        if not self.log.hasHandlers():
+            self._add_handler(TerminalHandler(self))
+
+    def _start_rosout(self) -> None:
+        from rosgraph_msgs.msg import Log
+
+        self._add_handler(
+            RosoutHandler(self, self.advertise("/rosout", Log, queue_size=100, latch=True), Log)
+        )
+
+    def _add_handler(self, handler: logging.Handler) -> None:
+        self._handlers.append(handler)
+        self.log.addHandler(handler)
+
+    async def _wait_for_service(self, name: str) -> None:
+        told = False
+        while not self.is_shutdown:
+            try:
+                uri = await self._node.master("lookupService", name)
+                client = await AsyncServiceClient.connect(
+                    uri, name, ANY, self.name, probe=True, timeout=_PROBE_SECONDS
+                )
+            except (RpcError, MasterUnreachableError):
+                pass
+            except (OSError, WireError):
+                if not told:
+                    self.log.warning("wait_for_service(%s): failed to contact, will keep trying", name)
+                    told = True
+            else:
+                client.close()
+                return
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._stopping.wait(), _POLL_SECONDS)
+        raise ROSInterruptException("rospy shutdown")

@@ -1,0 +1,196 @@
+"""Services of a node in an event loop, and calls of services."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import inspect
+import traceback
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from minirospy.aio.handle import Handle, registered, serialized
+from minirospy.errors import (
+    CallFailed,
+    HandshakeRefused,
+    MasterUnreachableError,
+    RpcError,
+    RpcRefused,
+    ServiceException,
+    WireError,
+)
+from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.service import to_response
+from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer, ServiceServer
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["Service", "ServiceClass", "ServiceProxy"]
+
+_Request_co = TypeVar("_Request_co", covariant=True)
+_Response_co = TypeVar("_Response_co", covariant=True)
+
+
+class ServiceClass(Protocol[_Request_co, _Response_co]):
+    """What a service class has, as ``std_srvs.srv.SetBool``: the classes of its request and response."""
+
+    @property
+    def _request_class(self) -> type[_Request_co]: ...
+
+    @property
+    def _response_class(self) -> type[_Response_co]: ...
+
+
+class ServiceProxy(Generic[_Response_co]):
+    """Calls a service; made by :meth:`Node.service_proxy`. With ``persistent``, calls wait for each other."""
+
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        service_class: ServiceClass[Any, _Response_co],
+        persistent: bool,
+        headers: Mapping[str, str] | None,
+    ) -> None:
+        self.name = name
+        self._node = node
+        self._service_class: Any = service_class
+        self._persistent = persistent
+        self._headers = dict(headers or {})
+        self._client: AsyncServiceClient | None = None
+        self._lock = asyncio.Lock()
+
+    async def __call__(self, *args: Any, **kwds: Any) -> _Response_co:
+        """Call the service. Raises as :meth:`Node.call` does."""
+        request = serialized(args_kwds_to_message(self._service_class._request_class, args, kwds))
+        if not self._persistent:
+            client = await self._connect()
+            try:
+                return await self._exchange(client, request)
+            finally:
+                client.close()
+        async with self._lock:
+            if self._client and self._client.has_ended():
+                self.close()
+            if self._client is None:
+                self._client = await self._connect()
+            keeping = False
+            try:
+                response = await self._exchange(self._client, request)
+                keeping = True
+            except ServiceException as error:
+                keeping = isinstance(error.__cause__, CallFailed)
+                raise
+            finally:
+                # Cancelled in the middle, the answer would be taken for that of the next call.
+                if not keeping:
+                    self.close()
+        return response
+
+    def close(self) -> None:
+        """Close a persistent connection. Idempotent."""
+        client, self._client = self._client, None
+        if client:
+            client.close()
+
+    async def _connect(self) -> AsyncServiceClient:
+        node = self._node
+        try:
+            uri = await node._node.master("lookupService", self.name)
+        except RpcRefused as error:
+            raise ServiceException(f"service [{self.name}] unavailable") from error
+        except (MasterUnreachableError, RpcError) as error:
+            raise ServiceException(f"unable to contact master: {error}") from error
+        try:
+            return await AsyncServiceClient.connect(
+                uri,
+                self.name,
+                self._service_class._md5sum,
+                node.name,
+                persistent=self._persistent,
+                headers=self._headers,
+            )
+        except HandshakeRefused as error:
+            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error
+        except (OSError, WireError) as error:
+            raise ServiceException(f"unable to connect to service: {error}") from error
+
+    async def _exchange(self, client: AsyncServiceClient, request: bytes) -> _Response_co:
+        try:
+            body = await client.call(request)
+        except CallFailed as error:
+            raise ServiceException(
+                f"service [{self.name}] responded with an error: {error.text!r}"
+            ) from error
+        except (OSError, WireError) as error:
+            raise ServiceException(f"transport error completing service call: {error}") from error
+        response: Any = self._service_class._response_class()
+        try:
+            response.deserialize(body)
+        except Exception as error:  # whatever a foreign message class raises on bad bytes
+            raise ServiceException(f"transport error completing service call: {error}") from error
+        response._connection_header = client.header
+        return response  # type: ignore[no-any-return]
+
+
+class Service(Handle):
+    """A service that a node offers; made by :meth:`Node.serve`."""
+
+    def __init__(self, node: Node, name: str, service_class: Any, handler: Callable[[Any], Any]) -> None:
+        self.name = name
+        self._node = node
+        self._request_class: Any = service_class._request_class
+        self._response_class: Any = service_class._response_class
+        self._handler = handler
+        runtime = node._node
+        is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(
+            getattr(handler, "__call__", None)  # noqa: B004 - an object whose __call__ is a coroutine function
+        )
+        type_ = InterfaceType(service_class._type, service_class._md5sum)
+        types = {"request_type": self._request_class._type, "response_type": self._response_class._type}
+        self._server: ServiceServer
+        if is_async:
+            self._server = LoopServiceServer(
+                name, type_, node.name, self._handle_on_loop, workers=runtime.workers, **types
+            )
+        else:
+            self._server = runtime.make_service(name, type_, self._handle_in_worker, **types)
+        self._registration = node._spawn(
+            registered(runtime.serve, self._server, f"service [{name}]", node.log)
+        )
+
+    async def close(self) -> None:
+        """Stop offering the service; calls under way get their answers. Idempotent."""
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            await self._node._node.unserve(self._server)
+
+    async def _handle_on_loop(self, body: bytes, header: Header) -> bytes:
+        try:
+            return self._response(await self._handler(self._request(body, header)))
+        except Exception as error:
+            raise self._failure(error) from error
+
+    def _handle_in_worker(self, body: memoryview, header: Header) -> bytes:
+        try:
+            return self._response(self._handler(self._request(bytes(body), header)))
+        except Exception as error:
+            raise self._failure(error) from error
+
+    def _request(self, body: bytes, header: Header) -> Any:
+        request = self._request_class()
+        request.deserialize(body)
+        request._connection_header = header
+        return request
+
+    def _response(self, returned: Any) -> bytes:
+        return serialized(to_response(self._response_class, returned))
+
+    def _failure(self, error: Exception) -> ServiceException:
+        if isinstance(error, ServiceException):
+            return ServiceException(f"service cannot process request: {error}")
+        text = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+        self._node.log.error("Error processing request: %s\n%s", error, text)
+        return ServiceException(f"error processing request: {error}")

@@ -1,0 +1,86 @@
+"""Time of a node in an event loop: simulated time, and rates."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
+
+from minirospy.errors import (
+    ROSInterruptException,
+    ROSTimeMovedBackwardsException,
+)
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["Rate", "SimulatedTime"]
+
+_LOOK_SECONDS = 0.1
+
+
+class Rate:
+    """Keeps a loop at ``hz`` turns a second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
+
+    def __init__(self, node: Node, hz: float) -> None:
+        """Raises ValueError where ``hz`` is not above 0."""
+        if hz <= 0:
+            raise ValueError(f"a rate of {hz} Hz: it has to be above 0")
+        self._node = node
+        self._period = int(1e9 / hz)
+        self._last = node.now().to_nsec()
+
+    def __aiter__(self) -> AsyncIterator[int]:
+        return self._turns()
+
+    async def sleep(self) -> None:
+        """Sleep until the turn is over, less what its work took. Raises as :meth:`Node.sleep` does."""
+        now = self._node.now().to_nsec()
+        # Time jumped back, or the work took several turns: do not wait for ages, nor rush through what was missed.
+        if not self._last <= now <= self._last + 2 * self._period:
+            self._last = now
+        self._last += self._period
+        await self._node.sleep(max(0, self._last - now) / 1e9)
+
+    async def _turns(self) -> AsyncIterator[int]:
+        for turn in itertools.count():
+            yield turn
+            try:
+                await self.sleep()
+            except ROSTimeMovedBackwardsException:
+                continue
+            except ROSInterruptException:
+                return
+
+
+class SimulatedTime:
+    """The time that /clock tells, in nanoseconds; 0 until it does."""
+
+    def __init__(self, stopping: asyncio.Event) -> None:
+        self.now = 0
+        self._stopping = stopping
+        self._tick = asyncio.Event()
+
+    def set(self, now: int) -> None:
+        self.now = now
+        self._tick.set()
+        self._tick = asyncio.Event()
+
+    async def sleep(self, nanoseconds: int) -> None:
+        """Wait until the time has moved on so far, or the node ends. Raises ROSTimeMovedBackwardsException."""
+        while self.now == 0 and not self._stopping.is_set():
+            await self._next_tick()
+        before = self.now
+        end = before + nanoseconds
+        while self.now < end and not self._stopping.is_set():
+            await self._next_tick()
+            if self.now < before:
+                raise ROSTimeMovedBackwardsException(self.now / 1e9)
+            before = self.now
+
+    async def _next_tick(self) -> None:
+        # The end of the node does not tick: look again now and then.
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._tick.wait(), _LOOK_SECONDS)

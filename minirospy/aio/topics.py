@@ -1,0 +1,271 @@
+"""Publishers and subscriptions of a node in an event loop. Messages become bytes, and bytes messages, on the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import struct
+import weakref
+from collections import deque
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from minirospy.aio.handle import Handle, registered, serialized
+from minirospy.errors import (
+    MasterUnreachableError,
+    ROSException,
+    ROSInterruptException,
+    RpcError,
+)
+from minirospy.idl.message import args_kwds_to_message
+from minirospy.runtime.topics import Publication
+from minirospy.runtime.topics import Subscription as RuntimeSubscription
+from minirospy.wire.framing import CHUNK
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
+
+_M = TypeVar("_M")
+_LENGTH = struct.Struct("<I")
+_JOIN_SECONDS = 1.0
+
+
+class Subscription(Handle, Generic[_M]):
+    """The messages of a topic, for ``async for``; made by :meth:`Node.subscribe`.
+
+    The iteration ends when the subscription is closed or the node ends.
+    """
+
+    def __init__(self, node: Node, state: SubscribedTopic, message_class: type[_M], queue_size: int) -> None:
+        self.topic = state.topic
+        self.dropped = 0
+        """How many messages gave way to newer ones."""
+        self._node = node
+        self._message_class = message_class
+        self._takes_memoryview = getattr(message_class, "_takes_memoryview", False)
+        self._queue: deque[tuple[bytes | memoryview, Header]] = deque(maxlen=queue_size)
+        self._arrived = asyncio.Event()
+        self._ended = node.is_shutdown
+        self._state = state
+        self._registration = state.join(self)
+
+    def __aiter__(self) -> AsyncIterator[_M]:
+        return self
+
+    async def __anext__(self) -> _M:
+        while True:
+            while not self._queue:
+                if self._ended:
+                    raise StopAsyncIteration
+                self._arrived.clear()
+                await self._arrived.wait()
+            message = self._deserialized(*self._queue.popleft())
+            if message is not None:
+                return message
+
+    async def next(self, timeout: float | None = None) -> _M:
+        """The next message.
+
+        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        """
+        try:
+            return await asyncio.wait_for(self.__anext__(), timeout)
+        except asyncio.TimeoutError:
+            text = f"timeout exceeded while waiting for message on topic {self.topic}"
+            raise TimeoutError(text) from None
+        except StopAsyncIteration:
+            raise ROSInterruptException("rospy shutdown") from None
+
+    @property
+    def num_connections(self) -> int:
+        """How many publishers are connected."""
+        return len(self._state.subscription.links)
+
+    async def close(self) -> None:
+        """Stop listening. What has come can still be read. Idempotent."""
+        self._end()
+        await self._state.leave(self)
+
+    def _put(self, frame: bytes | memoryview, header: Header) -> None:
+        if len(self._queue) == self._queue.maxlen:
+            self.dropped += 1
+        self._queue.append((frame, header))
+        self._arrived.set()
+
+    def _end(self) -> None:
+        self._ended = True
+        self._arrived.set()
+
+    def _deserialized(self, frame: bytes | memoryview, header: Header) -> _M | None:
+        message: Any = self._message_class()
+        try:
+            message.deserialize(frame if self._takes_memoryview else bytes(frame))
+        except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
+            self._node.log.error(
+                "a message on %s from %s does not fit %s: %s",
+                self.topic,
+                header.get("callerid"),
+                message._type,
+                error,
+            )
+            return None
+        message._connection_header = header
+        return message  # type: ignore[no-any-return]
+
+
+class Publisher(Handle, Generic[_M]):
+    """Publishes messages on a topic; made by :meth:`Node.advertise`."""
+
+    def __init__(self, node: Node, state: PublishedTopic, message_class: type[_M], *, waits: bool) -> None:
+        self.topic = state.publication.topic
+        self._node = node
+        self._message_class = message_class
+        self._waits = waits
+        self._state: PublishedTopic | None = state
+        self._registration = state.join(self)
+
+    async def publish(self, *args: Any, **kwds: Any) -> None:
+        """Publish a message, or the message that these field values make.
+
+        Does not wait for subscribers, except with ``queue_size=None``. Raises ROSException once it is closed,
+        ROSSerializationException or TypeError on values that do not fit.
+        """
+        if not self._registration.done():
+            await self
+        state = self._state
+        if state is None or self._node.is_shutdown:
+            raise ROSException("publish() to a closed topic")
+        state.publish(args_kwds_to_message(self._message_class, args, kwds))
+        if self._waits:
+            for link in state.publication.links:
+                await link.drain(float("inf"))
+
+    @property
+    def num_connections(self) -> int:
+        """How many subscribers are connected."""
+        return len(self._state.publication.links) if self._state else 0
+
+    async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:
+        """Wait until so many subscribers are connected. Raises TimeoutError after ``timeout`` seconds."""
+        try:
+            await asyncio.wait_for(self._wait_for(count), timeout)
+        except asyncio.TimeoutError:
+            text = f"timeout exceeded while waiting for {count} subscribers of topic {self.topic}"
+            raise TimeoutError(text) from None
+
+    async def close(self) -> None:
+        """Stop publishing; the topic ends with the last publisher of it in this node. Idempotent."""
+        state, self._state = self._state, None
+        if state:
+            await state.leave(self)
+
+    async def _wait_for(self, count: int) -> None:
+        while self._state and self.num_connections < count:
+            await self._state.next_change()
+
+    async def _wait_for_expected(self) -> None:
+        assert self._state
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._wait_for(self._state.publication.expected), _JOIN_SECONDS)
+
+
+class SubscribedTopic:
+    """One subscribed topic of a node."""
+
+    def __init__(self, node: Node, topic: str, message_class: type[Any]) -> None:
+        self.topic = topic
+        self._node = node
+        self._handles: weakref.WeakSet[Subscription[Any]] = weakref.WeakSet()
+        runtime = node._node
+        self.subscription: RuntimeSubscription = runtime.make_subscription(
+            topic, interface_type(message_class), self._deliver, on_loop=True
+        )
+        self._registration = node._spawn(
+            registered(runtime.subscribe, self.subscription, f"subscription [{topic}]", node.log)
+        )
+
+    def join(self, handle: Subscription[Any]) -> asyncio.Task[None]:
+        self._handles.add(handle)
+        # `async for ... break` leaves a subscription behind that nobody holds.
+        weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
+        return self._registration
+
+    async def leave(self, handle: Subscription[Any]) -> None:
+        self._handles.discard(handle)
+        await self._leave_if_empty()
+
+    def end(self) -> None:
+        for handle in list(self._handles):
+            handle._end()
+
+    async def _leave_if_empty(self) -> None:
+        if self._handles or self._node._subscribed.get(self.topic) is not self:
+            return
+        del self._node._subscribed[self.topic]
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            await self._registration
+            await self._node._node.unsubscribe(self.subscription)
+
+    def _deliver(self, frame: memoryview, header: Header) -> None:
+        # A small frame lies in a buffer that the next receive reuses.
+        kept = frame if len(frame) > CHUNK else bytes(frame)
+        for handle in list(self._handles):
+            handle._put(kept, header)
+
+
+class PublishedTopic:
+    """One published topic of a node."""
+
+    def __init__(self, node: Node, publication: Publication, message_class: type[Any]) -> None:
+        self.publication = publication
+        self._node = node
+        self._handles: set[Publisher[Any]] = set()
+        self._sequence = itertools.count(1)
+        self._has_header = bool(getattr(message_class, "_has_header", False))
+        self._changed = asyncio.Event()
+        self._registration = node._spawn(
+            registered(node._node.advertise, publication, f"publication [{publication.topic}]", node.log)
+        )
+
+    def join(self, handle: Publisher[Any]) -> asyncio.Task[None]:
+        self._handles.add(handle)
+        return self._registration
+
+    async def leave(self, handle: Publisher[Any]) -> None:
+        self._handles.discard(handle)
+        topic = self.publication.topic
+        if self._handles or self._node._published.get(topic) is not self:
+            return
+        del self._node._published[topic]
+        self.links_changed()
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            await self._registration
+            for link in self.publication.links:
+                await link.drain(_JOIN_SECONDS)
+            await self._node._node.unadvertise(self.publication)
+
+    def publish(self, message: Any) -> None:
+        """Send a message to all subscribers; may be called from any thread."""
+        if self.publication.links or self.publication.latch:
+            if self._has_header:
+                message.header.seq = next(self._sequence)
+            body = serialized(message)
+            self.publication.publish(_LENGTH.pack(len(body)) + body)
+
+    def links_changed(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def next_change(self) -> None:
+        """Return when a subscriber has come or gone."""
+        await self._changed.wait()
+
+
+def interface_type(message_class: Any) -> InterfaceType:
+    text = getattr(message_class, "_full_text", "")
+    return InterfaceType(message_class._type, message_class._md5sum, text)

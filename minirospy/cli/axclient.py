@@ -1,0 +1,198 @@
+"""axclient.py: send a goal to an action server from the terminal, by a form made from the goal's type.
+
+Source: http://wiki.ros.org/actionlib (Tools): there it is a window, here lines, so that a script may use it too.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+from minirospy.cli.command import Parser, run
+from minirospy.cli.form import ask_for, fields, flow
+from minirospy.errors import ROSException, UsageError
+
+__all__ = ["action_class", "main", "read_answer"]
+
+_BAR = 30
+_CANCEL_SECONDS = 10.0
+_SLICE_SECONDS = 0.25
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status: 0 where the goal succeeded."""
+    return run("axclient.py", lambda: _axclient(argv))
+
+
+def _axclient(argv: Sequence[str] | None) -> int:
+    parser = Parser(
+        "axclient.py",
+        description="Send a goal to an action server: asks for each field, shows the feedback, prints the result. "
+        "Ctrl-C cancels the goal.",
+    )
+    parser.add_argument("action", help="the server's name, as /run_led")
+    parser.add_argument(
+        "type", nargs="?", help="the action's type, as rpi_msgs/runningLed; found by the server's topics"
+    )
+    parser.add_argument(
+        "goal", nargs="?", help="the goal as YAML, instead of the questions: '{numberOfRuns: 3}'"
+    )
+    parser.add_argument("-t", "--timeout", type=float, metavar="SEC", help="how long to wait for the server")
+    from minirospy import client as rospy
+
+    options = parser.parse_args(rospy.myargv(argv)[0 if argv is not None else 1 :])
+    if options.goal is None and options.type and options.type.lstrip().startswith("{"):
+        options.type, options.goal = None, options.type
+    # Ctrl-C is to cancel the goal first.
+    rospy.init_node("axclient", anonymous=True, disable_signals=True, disable_rosout=True)
+    action = rospy.resolve_name(options.action)
+    cls = action_class(options.type or _found_type(action, options.timeout))
+    from minirospy.actionlib import SimpleActionClient
+
+    client = SimpleActionClient(action, cls)
+    if not client.wait_for_server(rospy.Duration.from_sec(0.5)):
+        print(f"Waiting for an action server at {action} ...", flush=True)
+        if not client.wait_for_server(rospy.Duration.from_sec(options.timeout or 0.0)):
+            raise ROSException(f"no action server at {action}")
+    goal = client.action_client.ActionGoal().goal
+    if options.goal is not None:
+        from minirospy.introspect.messages import check, fill
+        from minirospy.introspect.values import parse_value
+
+        check(fill(goal, [parse_value(options.goal)]))
+    else:
+        ask_for(goal, read_answer, _complain)
+    return _Progress(client, goal).run()
+
+
+def action_class(type_: str) -> type[Any]:
+    """The class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+
+    Raises NotFoundError.
+    """
+    from minirospy.idl.load import get_message_class, message_class
+
+    name = type_.replace("/msg/", "/").replace("/action/", "/")
+    found = get_message_class(name)
+    if found is None or not hasattr(found, "action_goal"):
+        found = message_class(name if name.endswith("Action") else name + "Action")
+    cls: type[Any] = found
+    return cls
+
+
+def read_answer(question: str) -> str:
+    """A line from the terminal; at the end of the input each answer is empty."""
+    try:
+        return input(question)
+    except EOFError:
+        return ""
+
+
+def _complain(error: Exception) -> None:
+    if not sys.stdin.isatty():
+        raise error
+    print(error, file=sys.stderr)
+
+
+def _found_type(action: str, timeout: float | None) -> str:
+    """The type of the action that is served at ``action``. Raises ROSException after ``timeout`` seconds."""
+    from minirospy.introspect.graph import Graph
+
+    waiting = threading.Event()
+    waited = 0.0
+    with Graph.open("axclient") as graph:
+        while True:
+            type_ = graph.master.get_topic_types().get(action + "/goal", "")
+            if type_.endswith("ActionGoal"):
+                return type_[: -len("Goal")]
+            if type_ not in ("", "*"):
+                raise UsageError(f"{action} is no action: {action}/goal is of type {type_}")
+            if not waited:
+                print(f"Waiting for an action server at {action} ...", flush=True)
+            if timeout is not None and waited >= timeout:
+                raise ROSException(f"no action server at {action}")
+            waiting.wait(0.25)
+            waited += 0.25
+
+
+class _Progress:
+    """A goal under way: tells of its state and feedback, cancels at Ctrl-C."""
+
+    def __init__(self, client: Any, goal: Any) -> None:
+        self._client = client
+        self._goal = goal
+        self._done = threading.Event()
+        self._lock = threading.Lock()
+        self._is_line_open = False
+        self._is_active = False
+
+    def run(self) -> int:
+        """Send the goal and wait for its end; the exit status."""
+        from actionlib_msgs.msg import GoalStatus
+
+        from minirospy.idl.message import strify_message
+
+        client = self._client
+        self._tell("Sent")
+        try:
+            client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
+            # In slices: a Ctrl-C just before a wait would be seen at its end only.
+            while not self._done.wait(_SLICE_SECONDS):
+                pass
+        except KeyboardInterrupt:
+            self._tell("Cancelling (Ctrl-C again: leave)")
+            client.cancel_goal()
+            if not self._done.wait(_CANCEL_SECONDS):
+                raise ROSException("the server does not end the goal") from None
+        state = client.get_state()
+        names = {value: name for name, value in vars(GoalStatus).items() if name.isupper()}
+        text = client.get_goal_status_text()
+        self._tell(names.get(state, str(state)).capitalize() + (f": {text}" if text else ""))
+        result = client.get_result()
+        if result is not None and result.__slots__:
+            print(strify_message(result), flush=True)
+        return 0 if state == GoalStatus.SUCCEEDED else 1
+
+    def _on_done(self, state: int, result: Any) -> None:
+        self._done.set()
+
+    def _on_active(self) -> None:
+        with self._lock:
+            is_first, self._is_active = not self._is_active, True
+        if is_first:
+            self._tell("Active")
+
+    def _on_feedback(self, feedback: Any) -> None:
+        # It travels by a connection of its own, and may come before the status.
+        self._on_active()
+        line = "Feedback: " + ", ".join(f"{field.path}: {flow(field.value)}" for field in fields(feedback))
+        share = progress(self._goal, feedback)
+        if share is not None:
+            full = round(_BAR * share)
+            line += f"  [{'#' * full}{'.' * (_BAR - full)}] {share:.0%}"
+        self._tell(line, replaces=True)
+
+    def _tell(self, line: str, *, replaces: bool = False) -> None:
+        """Print a line; on a terminal feedback takes the place of the feedback before."""
+        with self._lock:
+            on_terminal = sys.stdout.isatty()
+            if self._is_line_open and not replaces:
+                print()
+            self._is_line_open = on_terminal and replaces
+            if self._is_line_open:
+                print(f"\r\033[K{line}", end="", flush=True)
+            else:
+                print(line, flush=True)
+
+
+def progress(goal: Any, feedback: Any) -> float | None:
+    """How much of a goal is reached, 0 to 1, where each has one number and the goal's is the greater; else None."""
+    wanted, reached = (
+        [field.value for field in fields(message) if type(field.value) in (int, float)]
+        for message in (goal, feedback)
+    )
+    if len(wanted) != 1 or len(reached) != 1 or not 0 <= reached[0] <= wanted[0] or not wanted[0]:
+        return None
+    return float(reached[0] / wanted[0])

@@ -1,0 +1,84 @@
+"""A message as a form on the terminal: a question per field, with what is in it as the default; answers are YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from minirospy.errors import MessageException, ValueTextError
+from minirospy.introspect.messages import check, fill
+from minirospy.introspect.values import parse_value
+
+__all__ = ["Field", "ask_for", "fields", "flow"]
+
+
+class Field(NamedTuple):
+    """A field to ask for: its path (``pose.position.x``), type and value."""
+
+    path: str
+    type: str
+    value: Any
+
+
+def fields(message: Any, prefix: str = "") -> Iterator[Field]:
+    """The fields of a message and of those in it; an array, a time and a duration are one field each."""
+    for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
+        value = getattr(message, name)
+        if hasattr(value, "_slot_types"):
+            yield from fields(value, f"{prefix}{name}.")
+        else:
+            yield Field(prefix + name, type_, value)
+
+
+def ask_for(message: Any, ask: Callable[[str], str], complain: Callable[[Exception], None]) -> Any:
+    """``message`` with the answers to a question per field; an empty answer leaves a field as it is.
+
+    ``ask(question)`` gives the answer. ``complain(error)`` is told of one that does not fit: then the question
+    is asked again; it may raise instead.
+    """
+    for field in list(fields(message)):
+        answer = ask(_question(field)).strip()
+        while answer:
+            try:
+                # Tried on a message of its own: a value that does not fit must not stay.
+                values = _nested(field.path, _value(field, answer))
+                check(fill(type(message)(), [values]))
+            except (MessageException, ValueTextError) as error:
+                complain(error)
+                answer = ask(_question(field)).strip()
+            else:
+                fill(message, [values])
+                break
+    return message
+
+
+def flow(value: Any) -> str:
+    """A value on one line, as YAML."""
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, bytes | list | tuple):
+        return "[" + ", ".join(flow(each) for each in value) + "]"
+    if hasattr(value, "_slot_types"):
+        inner = (f"{name}: {flow(getattr(value, name))}" for name in value.__slots__)
+        return "{" + ", ".join(inner) + "}"
+    if hasattr(value, "nsecs"):
+        return f"{{secs: {value.secs}, nsecs: {value.nsecs}}}"
+    return str(value) if value != "" else "''"
+
+
+def _question(field: Field) -> str:
+    return f"{field.path} ({field.type}) [{flow(field.value)}]: "
+
+
+def _value(field: Field, answer: str) -> Any:
+    """An answer's value; a string needs no quotes."""
+    if field.type == "string" and answer[0] not in "'\"":
+        return answer
+    return parse_value(answer)
+
+
+def _nested(path: str, value: Any) -> Any:
+    """``a.b`` and a value -> {a: {b: value}}."""
+    for name in reversed(path.split(".")):
+        value = {name: value}
+    return value

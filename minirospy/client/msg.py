@@ -1,0 +1,62 @@
+"""Messages with their length in front, as rospy.msg writes and reads them. Source: http://wiki.ros.org/ROS/TCPROS."""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+from typing import Any
+
+from minirospy.errors import DeserializationError
+
+__all__ = ["deserialize_messages", "serialize_message"]
+
+_LENGTH = struct.Struct("<I")
+
+
+def serialize_message(b: BytesIO, seq: int, msg: Any) -> None:
+    """Write ``msg`` with its length to ``b``; a header gets ``seq``, and with frame_id "0" none."""
+    if getattr(msg.__class__, "_has_header", False):
+        msg.header.seq = seq
+        if msg.header.frame_id is None:
+            msg.header.frame_id = "0"
+    start = b.tell()
+    b.write(b"\0\0\0\0")
+    msg.serialize(b)
+    end = b.tell()
+    b.seek(start)
+    b.write(_LENGTH.pack(end - start - 4))
+    b.seek(end)
+
+
+def deserialize_messages(
+    b: BytesIO,
+    msg_queue: list[Any],
+    data_class: type[Any],
+    queue_size: int | None = None,
+    max_msgs: int | None = None,
+    start: int = 0,
+) -> None:
+    """Move the complete messages of ``b``, from ``start`` to where it stands, to ``msg_queue``.
+
+    At most ``max_msgs`` of them; ``queue_size`` keeps only so many, the newest. What is incomplete moves to the
+    front of ``b``. Raises DeserializationError.
+    """
+    data, position, count = b.getvalue()[: b.tell()], start, 0
+    while (max_msgs is None or count < max_msgs) and len(data) - position >= 4:
+        (size,) = _LENGTH.unpack_from(data, position)
+        if len(data) - position - 4 < size:
+            break
+        message = data_class()
+        try:
+            message.deserialize(data[position + 4 : position + 4 + size])
+        except (struct.error, ValueError, IndexError) as error:
+            raise DeserializationError(f"cannot deserialize {data_class._type}: {error}") from error
+        msg_queue.append(message)
+        position += 4 + size
+        count += 1
+    if queue_size is not None:
+        del msg_queue[: max(0, len(msg_queue) - queue_size)]
+    if position > start:
+        b.seek(0)
+        b.truncate()
+        b.write(data[position:])

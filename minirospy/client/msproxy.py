@@ -1,0 +1,150 @@
+"""The master as rospy.get_master() gives it: the Master API with its answers as they come, and parameters like a dict.
+
+Source: http://wiki.ros.org/ROS/Master_API and the behaviour of rospy.msproxy.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from minirospy.client.params import get_param_cached
+from minirospy.client.process import process
+from minirospy.errors import RpcFault, RpcUnreachable
+from minirospy.runtime.rpc_client import RpcClient
+
+__all__ = ["MasterProxy", "ServerProxy", "get_master", "xmlrpcapi"]
+
+_NAMES_FIRST = frozenset(
+    {
+        "deleteParam",
+        "getParam",
+        "getPublishedTopics",
+        "hasParam",
+        "lookupNode",
+        "lookupService",
+        "registerPublisher",
+        "registerService",
+        "registerSubscriber",
+        "searchParam",
+        "setParam",
+        "subscribeParam",
+        "unregisterPublisher",
+        "unregisterService",
+        "unregisterSubscriber",
+        "unsubscribeParam",
+    }
+)
+"""The methods whose first argument is a name of the graph."""
+
+
+class ServerProxy:
+    """An XML-RPC server: each attribute is a method of it.
+
+    As with xmlrpc.client, a server that cannot be reached is an OSError (ConnectionRefusedError, TimeoutError),
+    a fault of it an xmlrpc.client.Fault. Any number of threads may call.
+    """
+
+    def __init__(self, uri: str) -> None:
+        self._uri = uri
+        self._client = RpcClient(uri)
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *args: self._call(name, args)
+
+    def __repr__(self) -> str:
+        return f"<ServerProxy for {self._uri}>"
+
+    def _call(self, method: str, args: tuple[Any, ...]) -> Any:
+        try:
+            return self._client.call(method, *args)
+        except RpcUnreachable as error:
+            if isinstance(error.__cause__, OSError):
+                raise error.__cause__ from error
+            raise ConnectionError(str(error)) from error
+        except RpcFault as error:
+            from xmlrpc.client import Fault
+
+            raise Fault(error.code, error.text) from error
+
+
+class MasterProxy:
+    """The master at ``uri``: its API with this node's name put in front and names resolved, answers as they come.
+
+    ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``. Beside it
+    ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
+    are those of the parameters. Errors: see :class:`ServerProxy`.
+    """
+
+    def __init__(self, uri: str) -> None:
+        self.target = ServerProxy(uri)
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        method = getattr(self.target, name)
+
+        def call(*args: Any) -> Any:
+            if args and name in _NAMES_FIRST:
+                args = (process.resolve(args[0]), *args[1:])
+            return method(process.name, *args)
+
+        return call
+
+    def __getitem__(self, key: str) -> Any:
+        code, _, value = self.getParam(key)
+        if code != 1:
+            raise KeyError(key)
+        return value
+
+    def __setitem__(self, key: str, val: Any) -> None:
+        self.setParam(key, val)
+
+    def __delitem__(self, key: str) -> None:
+        if self.deleteParam(key)[0] != 1:
+            raise KeyError(key)
+
+    def __contains__(self, key: str) -> bool:
+        code, _, value = self.hasParam(key)
+        return code == 1 and bool(value)
+
+    def __iter__(self) -> Iterator[str]:
+        code, _, value = self.getParamNames()
+        return iter(value if code == 1 else [])
+
+    def search_param(self, key: str) -> str | None:
+        """The nearest parameter of this name, upwards from this node's namespace; None where there is none."""
+        code, _, value = self.target.searchParam(process.name, key)
+        return value if code == 1 else None
+
+    def get_param_cached(self, key: str) -> Any:
+        """A parameter's value, kept by this node. Raises KeyError."""
+        return get_param_cached(key)
+
+
+def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
+    """The master of this node; an ``env`` of the caller's own names another by its ROS_MASTER_URI."""
+    uri = None if env is os.environ else env.get("ROS_MASTER_URI")
+    return _master(uri or process.environment.master_uri, os.getpid())
+
+
+def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
+    """The XML-RPC server at ``uri``, of which there is one object; None where that is no URI."""
+    if not uri or not uri.startswith(("http://", "rosrpc://")):
+        return None
+    return _server(uri, os.getpid()) if cache else ServerProxy(uri)
+
+
+# By process: a fork must not speak on its parent's connections.
+@functools.cache
+def _master(uri: str, pid: int) -> MasterProxy:
+    return MasterProxy(uri)
+
+
+@functools.cache
+def _server(uri: str, pid: int) -> ServerProxy:
+    return ServerProxy(uri)

@@ -1,0 +1,226 @@
+"""The life of an action's goal, as tables: what the server may make of it, and what a client concludes from what it hears.
+
+In: a state and an event. Out: the next state, or the states to pass through, or None where that cannot be.
+Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself where that page leaves things open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum, IntEnum
+
+__all__ = [
+    "CLIENT_STEPS",
+    "SERVER_STEPS",
+    "SIMPLE_STEPS",
+    "TERMINAL",
+    "ClientState",
+    "GoalEvent",
+    "GoalState",
+    "SimpleState",
+    "SimpleStep",
+    "client_steps",
+    "visible_state",
+]
+
+
+class GoalState(IntEnum):
+    """What a server tells of a goal: the numbers of actionlib_msgs/GoalStatus."""
+
+    PENDING = 0
+    ACTIVE = 1
+    PREEMPTED = 2
+    SUCCEEDED = 3
+    ABORTED = 4
+    REJECTED = 5
+    PREEMPTING = 6
+    RECALLING = 7
+    RECALLED = 8
+    LOST = 9
+
+
+class ClientState(IntEnum):
+    """How far a client is with a goal: actionlib.CommState."""
+
+    WAITING_FOR_GOAL_ACK = 0
+    PENDING = 1
+    ACTIVE = 2
+    WAITING_FOR_RESULT = 3
+    WAITING_FOR_CANCEL_ACK = 4
+    RECALLING = 5
+    PREEMPTING = 6
+    DONE = 7
+    LOST = 8
+
+
+class SimpleState(IntEnum):
+    """The same, as the simple client sees it: actionlib.SimpleGoalState."""
+
+    PENDING = 0
+    ACTIVE = 1
+    DONE = 2
+
+
+class GoalEvent(Enum):
+    """What a server does with a goal, or is asked to do. The value names where it leads, for a person."""
+
+    ACCEPT = "an active state"
+    CANCEL_REQUEST = "a cancel requested state"
+    CANCEL = "a cancelled state"
+    REJECT = "a rejected state"
+    ABORT = "an aborted state"
+    SUCCEED = "a succeeded state"
+
+
+class SimpleStep(Enum):
+    """What a change of the client's state means to the simple client."""
+
+    NONE = "nothing"
+    ACTIVATE = "the goal has become active"
+    FINISH = "the goal is done"
+    WRONG = "this state cannot follow"
+
+
+TERMINAL = frozenset(
+    {
+        GoalState.PREEMPTED,
+        GoalState.SUCCEEDED,
+        GoalState.ABORTED,
+        GoalState.REJECTED,
+        GoalState.RECALLED,
+        GoalState.LOST,
+    }
+)
+"""Where a goal's life ends."""
+
+_G = GoalState
+_C = ClientState
+_S = SimpleState
+
+SERVER_STEPS: Mapping[GoalEvent, Mapping[int, GoalState]] = {
+    GoalEvent.ACCEPT: {_G.PENDING: _G.ACTIVE, _G.RECALLING: _G.PREEMPTING},
+    GoalEvent.CANCEL_REQUEST: {_G.PENDING: _G.RECALLING, _G.ACTIVE: _G.PREEMPTING},
+    GoalEvent.CANCEL: {
+        _G.PENDING: _G.RECALLED,
+        _G.RECALLING: _G.RECALLED,
+        _G.ACTIVE: _G.PREEMPTED,
+        _G.PREEMPTING: _G.PREEMPTED,
+    },
+    GoalEvent.REJECT: {_G.PENDING: _G.REJECTED, _G.RECALLING: _G.REJECTED},
+    GoalEvent.ABORT: {_G.PREEMPTING: _G.ABORTED, _G.ACTIVE: _G.ABORTED},
+    GoalEvent.SUCCEED: {_G.PREEMPTING: _G.SUCCEEDED, _G.ACTIVE: _G.SUCCEEDED},
+}
+"""The server's side. A state that an event does not name stays as it is, and the event is a mistake."""
+
+_Steps = Mapping[int, tuple[ClientState, ...]]
+
+_STAYS: tuple[ClientState, ...] = ()
+_TO_RESULT = (_C.WAITING_FOR_RESULT,)
+_PREEMPTED = (_C.PREEMPTING, _C.WAITING_FOR_RESULT)
+_ACTIVE_PREEMPTED = (_C.ACTIVE, _C.PREEMPTING, _C.WAITING_FOR_RESULT)
+_ACTIVE_RESULT = (_C.ACTIVE, _C.WAITING_FOR_RESULT)
+_PENDING_RESULT = (_C.PENDING, _C.WAITING_FOR_RESULT)
+_ENDED: _Steps = dict.fromkeys((_G.PREEMPTED, _G.SUCCEEDED, _G.ABORTED, _G.REJECTED, _G.RECALLED), _STAYS)
+
+CLIENT_STEPS: Mapping[int, _Steps] = {
+    _C.WAITING_FOR_GOAL_ACK: {
+        _G.PENDING: (_C.PENDING,),
+        _G.ACTIVE: (_C.ACTIVE,),
+        _G.PREEMPTED: _ACTIVE_PREEMPTED,
+        _G.SUCCEEDED: _ACTIVE_RESULT,
+        _G.ABORTED: _ACTIVE_RESULT,
+        _G.REJECTED: _PENDING_RESULT,
+        _G.PREEMPTING: (_C.ACTIVE, _C.PREEMPTING),
+        _G.RECALLING: (_C.PENDING, _C.RECALLING),
+        _G.RECALLED: _PENDING_RESULT,
+    },
+    _C.PENDING: {
+        _G.PENDING: _STAYS,
+        _G.ACTIVE: (_C.ACTIVE,),
+        _G.PREEMPTED: _ACTIVE_PREEMPTED,
+        _G.SUCCEEDED: _ACTIVE_RESULT,
+        _G.ABORTED: _ACTIVE_RESULT,
+        _G.REJECTED: _TO_RESULT,
+        _G.PREEMPTING: (_C.ACTIVE, _C.PREEMPTING),
+        _G.RECALLING: (_C.RECALLING,),
+        _G.RECALLED: (_C.RECALLING, _C.WAITING_FOR_RESULT),
+    },
+    _C.ACTIVE: {
+        _G.ACTIVE: _STAYS,
+        _G.PREEMPTED: _PREEMPTED,
+        _G.SUCCEEDED: _TO_RESULT,
+        _G.ABORTED: _TO_RESULT,
+        _G.PREEMPTING: (_C.PREEMPTING,),
+    },
+    # A status may be older than the result whose status the client has seen already.
+    _C.WAITING_FOR_RESULT: {_G.ACTIVE: _STAYS, **_ENDED},
+    _C.WAITING_FOR_CANCEL_ACK: {
+        _G.PENDING: _STAYS,
+        _G.ACTIVE: _STAYS,
+        _G.PREEMPTED: _PREEMPTED,
+        _G.SUCCEEDED: _PREEMPTED,
+        _G.ABORTED: _PREEMPTED,
+        _G.REJECTED: _TO_RESULT,
+        _G.PREEMPTING: (_C.PREEMPTING,),
+        _G.RECALLING: (_C.RECALLING,),
+        _G.RECALLED: (_C.RECALLING, _C.WAITING_FOR_RESULT),
+    },
+    _C.RECALLING: {
+        _G.PREEMPTED: _PREEMPTED,
+        _G.SUCCEEDED: _PREEMPTED,
+        _G.ABORTED: _PREEMPTED,
+        _G.REJECTED: _TO_RESULT,
+        _G.PREEMPTING: (_C.PREEMPTING,),
+        _G.RECALLING: _STAYS,
+        _G.RECALLED: _TO_RESULT,
+    },
+    _C.PREEMPTING: {
+        _G.PREEMPTED: _TO_RESULT,
+        _G.SUCCEEDED: _TO_RESULT,
+        _G.ABORTED: _TO_RESULT,
+        _G.PREEMPTING: _STAYS,
+    },
+    _C.DONE: _ENDED,
+}
+"""The client's side: the states that it passes through, in order, when it hears of a goal's status.
+
+A status may have been missed (a list replaces the one before), so one may lead over several states. What is
+not named cannot follow.
+"""
+
+_NONE: Mapping[int, SimpleStep] = dict.fromkeys(ClientState, SimpleStep.NONE)
+
+SIMPLE_STEPS: Mapping[int, Mapping[int, SimpleStep]] = {
+    _S.PENDING: {
+        **_NONE,
+        _C.ACTIVE: SimpleStep.ACTIVATE,
+        _C.PREEMPTING: SimpleStep.ACTIVATE,
+        _C.DONE: SimpleStep.FINISH,
+    },
+    _S.ACTIVE: {**_NONE, _C.RECALLING: SimpleStep.WRONG, _C.DONE: SimpleStep.FINISH},
+    _S.DONE: {
+        **_NONE,
+        _C.ACTIVE: SimpleStep.WRONG,
+        _C.RECALLING: SimpleStep.WRONG,
+        _C.PREEMPTING: SimpleStep.WRONG,
+        _C.DONE: SimpleStep.WRONG,
+    },
+}
+"""The simple client's side: its state, and the client's state that has come."""
+
+_VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.PENDING}
+
+
+def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
+    """What a client in ``state`` passes through when it hears ``status``; None where that cannot follow.
+
+    Raises KeyError on a status that no server tells.
+    """
+    if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
+        raise KeyError(status)
+    return CLIENT_STEPS[state].get(status)
+
+
+def visible_state(status: int) -> int:
+    """What the simple client tells of a goal's status: one that is being cancelled is still pending or active."""
+    return int(_VISIBLE.get(status, status))

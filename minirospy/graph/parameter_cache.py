@@ -1,0 +1,50 @@
+"""What a node knows of parameters that it has asked for before: values in, news of changes in, values out.
+
+Pure. A change makes the node forget what it concerns, and the next read asks the master: so news that overtake
+each other, and the empty dictionary that stands for "deleted" as well as for "empty", do no harm.
+Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["ParameterCache"]
+
+
+class ParameterCache:
+    """Values by global name; ``KeyError`` as a value says that a parameter is not set.
+
+    :meth:`store` and :meth:`changed` from several threads want a lock around them.
+    """
+
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+        self._changes = 0
+
+    @property
+    def changes(self) -> int:
+        """How many changes there were: to be read before the master is asked, and given to :meth:`store`."""
+        return self._changes
+
+    def get(self, key: str) -> Any:
+        """What was stored for ``key`` and has not changed since. Raises LookupError."""
+        return self._values[key]
+
+    def store(self, key: str, value: Any, changes: int) -> None:
+        """Keep the master's answer, unless there was a change since it was asked."""
+        if changes == self._changes:
+            self._values[key] = value
+
+    def changed(self, key: str) -> None:
+        """Forget what a change of ``key`` concerns: itself, what is below it, and what it is a part of."""
+        changed = _with_slash(key)
+        self._changes += 1
+        for known in list(self._values):
+            name = _with_slash(known)
+            if name.startswith(changed) or changed.startswith(name):
+                del self._values[known]
+
+
+def _with_slash(key: str) -> str:
+    return key if key.endswith("/") else key + "/"

@@ -1,0 +1,30 @@
+"""What a service's handler returned, as the response that is sent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy.errors import ServiceException
+
+__all__ = ["to_response"]
+
+
+def to_response(response_class: type[Any], returned: Any) -> Any:
+    """A response of ``response_class`` from what a handler may return: a response, a dictionary of some of its
+    fields, a list or tuple of all their values, or the value of its only field.
+
+    Raises ServiceException with rospy's words.
+    """
+    # A class of the same type may come from elsewhere: a reloaded module, a foreign generator.
+    if getattr(type(returned), "_type", None) == response_class._type:
+        return returned
+    if returned is None:
+        raise ServiceException("service handler returned None")
+    try:
+        if isinstance(returned, dict):
+            return response_class(**returned)
+        values = returned if isinstance(returned, list | tuple) else [returned]
+        return response_class(*values)
+    except (TypeError, AttributeError) as error:
+        what = "wrong number of values" if isinstance(returned, list | tuple) else "invalid value"
+        raise ServiceException(f"handler returned {what}: {error}") from error

@@ -1,0 +1,20 @@
+"""actionlib.simple_action_client, filled in by minirospy."""
+
+from actionlib_msgs.msg import GoalStatus
+
+from minirospy.actionlib import (
+    ActionClient,
+    CommState,
+    SimpleActionClient,
+    SimpleGoalState,
+    get_name_of_constant,
+)
+
+__all__ = [
+    "ActionClient",
+    "CommState",
+    "GoalStatus",
+    "SimpleActionClient",
+    "SimpleGoalState",
+    "get_name_of_constant",
+]

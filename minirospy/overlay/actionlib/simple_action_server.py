@@ -1,0 +1,7 @@
+"""actionlib.simple_action_server, filled in by minirospy."""
+
+from actionlib_msgs.msg import GoalStatus
+
+from minirospy.actionlib import ActionServer, ServerGoalHandle, SimpleActionServer, nop_cb
+
+__all__ = ["ActionServer", "GoalStatus", "ServerGoalHandle", "SimpleActionServer", "nop_cb"]

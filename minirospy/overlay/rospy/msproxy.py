@@ -1,0 +1,5 @@
+"""rospy.msproxy, filled in by minirospy."""
+
+from minirospy.client.msproxy import MasterProxy
+
+__all__ = ["MasterProxy"]

@@ -1,0 +1,96 @@
+"""Who may connect: the networks of ``--allow`` and MINIROSPY_ALLOW."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from minirospy.errors import UsageError
+
+if TYPE_CHECKING:
+    # Without networks, as in nearly every node, it is not imported.
+    from ipaddress import IPv4Network, IPv6Network
+
+__all__ = ["Access", "listening_lines"]
+
+
+class Access:
+    """Peers of these networks may connect, and this machine itself; without any network everybody may."""
+
+    def __init__(self, networks: Iterable[str] = ()) -> None:
+        """``networks``: as 192.168.65.0/24 or a single address. Raises UsageError."""
+        self.networks = tuple(_network(text) for text in networks)
+        # A robot's peers are few and come often.
+        self._known: dict[str, bool] = {}
+
+    @classmethod
+    def parse(cls, text: str) -> Access:
+        """Of networks with commas or spaces between them."""
+        return cls(text.replace(",", " ").split())
+
+    def allows(self, peer: str, here: str = "") -> bool:
+        """Whether a connection from the address ``peer`` is welcome; ``here`` is this end's address."""
+        if not self.networks:
+            return True
+        known = self._known.get(peer)
+        if known is None:
+            if len(self._known) > 1000:
+                self._known.clear()
+            known = self._known[peer] = self._decide(peer)
+        return known or peer == here
+
+    def _decide(self, peer: str) -> bool:
+        import ipaddress
+
+        try:
+            address = ipaddress.ip_address(peer.partition("%")[0])
+        except ValueError:
+            return False
+        mapped = getattr(address, "ipv4_mapped", None)
+        address = mapped or address
+        return address.is_loopback or any(address in network for network in self.networks)
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.networks)) or "everybody"
+
+
+def listening_lines(bind_host: str, port: int, access: Access) -> list[str]:
+    """Where a server can be reached, and a warning where that is from the open internet."""
+    import ipaddress
+
+    lines = [f"listening on {_address(bind_host)}:{port}, open to {access}"]
+    if bind_host not in {"0.0.0.0", "::"} or access.networks:
+        own = [bind_host] if not access.networks else []
+    else:
+        own = _own_addresses()
+    public = [text for text in own if ipaddress.ip_address(text.partition("%")[0]).is_global]
+    if public:
+        lines.append(
+            f"WARNING: the open internet reaches this master at {', '.join(public)}, and ROS asks for no password: "
+            "say who may connect with --allow (as --allow 192.168.65.0/24), or listen elsewhere with ROS_IP"
+        )
+    return lines
+
+
+def _own_addresses() -> list[str]:
+    import socket
+
+    import psutil
+
+    families = {socket.AF_INET, socket.AF_INET6}
+    return [
+        each.address for all_ in psutil.net_if_addrs().values() for each in all_ if each.family in families
+    ]
+
+
+def _address(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _network(text: str) -> IPv4Network | IPv6Network:
+    import ipaddress
+
+    try:
+        return ipaddress.ip_network(text, strict=False)
+    except ValueError as error:
+        raise UsageError(f"'{text}' is not a network, as 192.168.65.0/24, nor an address") from error

@@ -1,0 +1,87 @@
+"""The master's journal as bytes: one record a change, each with its length and checksum in front.
+
+Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of what
+follows (4 bytes), a msgpack array ``[what, argument, ...]``. A record that is not whole ends the file: what
+stands behind it cannot be trusted to follow from what stands before.
+"""
+
+from __future__ import annotations
+
+import datetime
+import struct
+import zlib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import msgpack  # type: ignore[import-untyped]
+
+from minirospy.wire.xmlrpc import DateTime
+
+__all__ = ["HEAD", "Recovered", "parse_journal", "serialize_record"]
+
+HEAD = b"minirospy journal 1\n"
+
+_FRAME = struct.Struct("<II")
+_MAX_RECORD = 256 * 1024 * 1024
+_DATE, _DATE_TEXT = 1, 2
+
+
+class Recovered(NamedTuple):
+    """The records that are whole, how many bytes they take with the head, and what is wrong behind them."""
+
+    records: list[list[Any]]
+    size: int
+    damage: str
+
+
+def serialize_record(record: list[Any]) -> bytes:
+    """A record as it stands in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
+    body = _pack(record)
+    return _FRAME.pack(len(body), zlib.crc32(body)) + body
+
+
+def parse_journal(data: bytes) -> Recovered:
+    """The records in ``data``, up to the first that is not whole."""
+    if not data.startswith(HEAD):
+        return Recovered([], 0, "it does not begin as a journal" if data else "it is empty")
+    records: list[list[Any]] = []
+    at = len(HEAD)
+    while at < len(data):
+        if len(data) - at < _FRAME.size:
+            return Recovered(records, at, "its last record is torn")
+        length, checksum = _FRAME.unpack_from(data, at)
+        body = data[at + _FRAME.size : at + _FRAME.size + length]
+        if length > _MAX_RECORD or len(body) < length:
+            return Recovered(records, at, "its last record is torn")
+        record = _unpack(body) if zlib.crc32(body) == checksum else None
+        if not isinstance(record, list) or not record:
+            return Recovered(records, at, f"the record at byte {at} is damaged")
+        records.append(record)
+        at += _FRAME.size + length
+    return Recovered(records, at, "")
+
+
+def _encode_other(value: Any) -> Any:
+    if isinstance(value, datetime.datetime):
+        return msgpack.ExtType(_DATE, value.isoformat().encode())
+    if isinstance(value, DateTime):
+        return msgpack.ExtType(_DATE_TEXT, value.value.encode())
+    raise TypeError(f"a journal holds no {type(value).__name__}")
+
+
+def _decode_other(code: int, data: bytes) -> Any:
+    if code == _DATE:
+        return datetime.datetime.fromisoformat(data.decode())
+    if code == _DATE_TEXT:
+        return DateTime(data.decode())
+    raise ValueError(f"unknown type {code}")
+
+
+_pack: Callable[[Any], bytes] = msgpack.Packer(default=_encode_other, strict_types=True).pack
+
+
+def _unpack(body: bytes) -> Any:
+    try:
+        return msgpack.unpackb(body, ext_hook=_decode_other, strict_map_key=False)
+    except (ValueError, msgpack.UnpackException, TypeError):
+        return None

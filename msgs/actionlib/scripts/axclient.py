@@ -1,0 +1,9 @@
+#!/usr/bin/env python3
+"""axclient.py of actionlib: see `rosrun actionlib axclient.py -h`."""
+
+import sys
+
+from minirospy.cli.axclient import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+"""Where minirospy's actions are meant to do better than actionlib's; what is the same stands in tests/referee."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+BEGIN = """
+import threading, time
+import actionlib, rospy
+from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
+from actionlib_msgs.msg import GoalStatus
+rospy.init_node("case", argv=[], disable_rosout=True)
+def execute(goal):
+    if goal.goal == 3:
+        while not server.is_preempt_requested() and not rospy.is_shutdown():
+            time.sleep(0.001)
+        server.set_preempted()
+    else:
+        server.set_succeeded(TestResult(goal.goal))
+server = actionlib.SimpleActionServer("server", TestAction, execute, False)
+server.start()
+client = actionlib.SimpleActionClient("server", TestAction)
+assert client.wait_for_server(rospy.Duration(10))
+second = rospy.Duration(10)
+"""
+END = """
+rospy.signal_shutdown("")
+print("end")
+"""
+
+
+def run(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", BEGIN + code + END], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.endswith("end\n"), done.stdout + done.stderr
+    return done.stdout[: -len("end\n")] + done.stderr
+
+
+@pytest.mark.usefixtures("master")
+class TestActions:
+    def test_a_done_callback_sends_the_next_goal(self) -> None:
+        said = run("""
+over = threading.Event()
+def done(state, result):
+    print(result.result)
+    if result.result < 5:
+        client.send_goal(TestGoal(result.result + 1), done)
+    else:
+        over.set()
+client.send_goal(TestGoal(4), done)
+assert client.wait_for_result(second)
+over.wait(10)
+assert client.wait_for_result(second)
+print(client.get_result().result)
+""")
+        assert said == "4\n5\n5\n"
+
+    def test_a_done_callback_that_raises_holds_nobody_up(self) -> None:
+        said = run("""
+def done(state, result):
+    raise ValueError("bad done callback")
+client.send_goal(TestGoal(4), done)
+print(client.wait_for_result(second), client.simple_state)
+""")
+        assert said.startswith("True 2\n")
+        assert "ValueError: bad done callback" in said
+
+    def test_a_cancel_of_a_goal_that_is_done_changes_nothing(self) -> None:
+        said = run("""
+client.send_goal_and_wait(TestGoal(4))
+client.cancel_goal()
+time.sleep(0.3)  # a list of statuses comes
+print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state())
+""")
+        assert said == "True 3\n"
+
+    def test_many_goals_are_told_of_late_but_all(self) -> None:
+        said = run("""
+from actionlib_msgs.msg import GoalStatusArray
+lists, sizes, begun = [0], [0], time.monotonic()
+def hear(message):
+    lists[0] += 1
+    sizes[0] = max(sizes[0], len(message.status_list))
+rospy.Subscriber("server/status", GoalStatusArray, hear)
+states = {client.send_goal_and_wait(TestGoal(4), second) for _ in range(600)}
+took = time.monotonic() - begun
+print(states, len(server.action_server.status_list))
+time.sleep(0.3)  # the regular list
+print(sizes[0], lists[0] < 400, took < 5)
+""")
+        assert said == "{3} 600\n600 True True\n"
+
+    def test_timeouts_run_on_simulated_time(self) -> None:
+        said = run("""
+import minirospy.clock
+from minirospy.client.process import process
+clock = process.clock = minirospy.clock.SimulatedClock(10**9)
+client.send_goal(TestGoal(3))
+answers = []
+waiting = threading.Thread(target=lambda: answers.append(client.wait_for_result(rospy.Duration(100))))
+waiting.start()
+waiting.join(0.2)
+print(waiting.is_alive())
+clock.set(102 * 10**9)
+waiting.join(10)
+print(answers)
+client.cancel_goal()
+print(client.wait_for_result())
+""")
+        assert said == "True\n[False]\nTrue\n"
+
+    def test_goal_and_cancel_callbacks_never_meet_a_lock_crosswise(self) -> None:
+        """A goal comes while another one ends: actionlib's two locks may be taken in either order."""
+        said = run("""
+def ask():
+    own = actionlib.SimpleActionClient("server", TestAction)
+    own.wait_for_server(second)
+    for number in range(100):
+        own.send_goal(TestGoal(4))
+        own.cancel_all_goals()
+        ended.append(own.wait_for_result(second))
+ended = []
+threads = [threading.Thread(target=ask) for _ in range(3)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join(60)
+print(len(ended), all(ended))
+""")
+        assert said == "300 True\n"
+
+    def test_wrong_parameters_are_told(self) -> None:
+        said = run("""
+for value in (0, -1, "often"):
+    rospy.set_param("/actionlib_status_frequency", value)
+    try:
+        actionlib.ActionServer("other", TestAction, print, auto_start=False).start()
+    except actionlib.ActionException as error:
+        print(error)
+try:
+    actionlib.ActionServer("other", TestAction, None)
+except actionlib.ActionException as error:
+    print(error)
+""")
+        assert said == (
+            "parameter /actionlib_status_frequency must be a number of Hz above 0, not 0\n"
+            "parameter /actionlib_status_frequency must be a number of Hz above 0, not -1\n"
+            "parameter /actionlib_status_frequency must be a number of Hz above 0, not 'often'\n"
+            "ActionServer 'other' needs a goal callback\n"
+        )
+
+    def test_a_server_stops_and_starts_again(self) -> None:
+        said = run("""
+server.action_server.stop()
+print(client.wait_for_server(rospy.Duration.from_sec(0.1)))
+server.start()
+print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), second))
+server.start()
+print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), second))
+""")
+        assert said.splitlines()[1:] == ["True 3", "True 3"]
+
+    def test_a_server_that_nobody_spins_lives_on_until_ctrl_c(self) -> None:
+        import os
+        import signal
+
+        if os.name != "posix":
+            pytest.skip("Ctrl-C of a single process")
+        process = subprocess.Popen(
+            [sys.executable, "-c", BEGIN + "print('ready', flush=True)"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout
+        assert process.stdout.readline() == "ready\n"
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.3)
+        os.kill(process.pid, signal.SIGINT)
+        output, errors = process.communicate(timeout=10)
+        assert (output, errors, process.returncode) == ("", "", 0)

@@ -1,0 +1,191 @@
+"""roscore as a process: the session it takes up, the log folder, its options, the health line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from minirospy.cli.master import main, roscore
+from minirospy.runtime.master_proxy import MasterProxy
+
+BIN = Path(sys.executable).parent
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="Windows has no such signals between processes"
+)
+
+
+class Core:
+    """A roscore that has said that it is ready."""
+
+    def __init__(self, *options: str) -> None:
+        self.process = subprocess.Popen(
+            [str(BIN / "roscore"), *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        assert self.process.stdout
+        self.said = ""
+        for line in self.process.stdout:
+            self.said += line
+            if "Ctrl-C" in line:
+                break
+
+    def end(self, number: int = signal.SIGTERM) -> str:
+        """End it; what it still said."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        return self.process.communicate(timeout=10)[0]
+
+
+Start = Callable[..., Core]
+
+
+@pytest.fixture
+def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
+    """Start roscore on the test's port, which ROS_MASTER_URI names."""
+    import socket
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
+    started: list[Core] = []
+
+    def run(*options: str) -> Core:
+        started.append(Core(*options))
+        return started[-1]
+
+    yield run
+    for core in started:
+        core.end(signal.SIGKILL)
+
+
+def proxy() -> MasterProxy:
+    return MasterProxy(os.environ["ROS_MASTER_URI"], "/test")
+
+
+def test_a_killed_session_goes_on(start: Start) -> None:
+    first = start()
+    master = proxy()
+    run_id = master.get_param("/run_id")
+    master.set_param("/kept", {"a": [1, 2]})
+    first.end(signal.SIGKILL)
+    second = start()
+    assert "journal: recovered 0 nodes and 4 parameters of the master that stopped" in second.said
+    assert f"setting /run_id to {run_id}\n" in second.said
+    assert master.get_param("/kept") == {"a": [1, 2]}
+    # The /rosout of the killed one is not there twice, nor its address.
+    assert master.get_system_state().publishers == {"/rosout_agg": ["/rosout"]}
+    second.end()
+    third = start()
+    assert "journal" not in third.said
+    assert master.get_param("/run_id") != run_id
+    assert set(master.get_param_names()) == {"/run_id", "/rosdistro", "/rosversion"}
+    master.close()
+    assert not list(Path(os.environ["ROS_HOME"], "master").glob("*.damaged"))
+
+
+@pytest.mark.parametrize("options", [["--fresh"], ["--no-journal"]])
+def test_a_killed_session_that_is_not_wanted(start: Start, options: list[str]) -> None:
+    start(*options).end(signal.SIGKILL)
+    core = start(*options)
+    assert "recovered" not in core.said
+    master = proxy()
+    assert set(master.get_param_names()) == {"/run_id", "/rosdistro", "/rosversion"}
+    assert Path(os.environ["ROS_HOME"], "master").exists() == (options == ["--fresh"])
+    master.close()
+
+
+def test_the_end_of_the_terminal_is_a_clean_end(start: Start) -> None:
+    core = start()
+    assert list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
+    assert core.end(signal.SIGHUP) == "master stopped\n"
+    assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
+
+
+def test_a_shutdown_call_is_one_too(start: Start) -> None:
+    core = start()
+    master = proxy()
+    master.call("shutdown", "enough")
+    master.close()
+    assert core.process.wait(10) == 0
+    assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
+
+
+def test_the_log_folder(start: Start) -> None:
+    core = start()
+    master = proxy()
+    folder = Path(os.environ["ROS_LOG_DIR"]) / master.get_param("/run_id")
+    master.register_publisher("/t", "a/B", "http://127.0.0.1:1/")
+    master.set_param("/p", 1)
+    master.close()
+    core.end()
+    log = (folder / "master.log").read_text()
+    assert "[minirospy.master][INFO] " in log
+    assert ": +PUB [/t] /test http://127.0.0.1:1/\n" in log
+    assert ": +PARAM [/p] by /test\n" in log
+    assert "listening on 127.0.0.1:" in log
+    assert (folder.parent / "latest").resolve() == folder.resolve()
+
+
+def test_verbose_quiet_and_levels(start: Start) -> None:
+    core = start("-v", "--master-logger-level=error", "-w", "3", "-t", "1.5")
+    master = proxy()
+    master.set_param("/p", 1)
+    folder = Path(os.environ["ROS_LOG_DIR"]) / master.get_param("/run_id")
+    master.close()
+    assert "+PARAM [/p] by /test\n" in core.said + core.end()
+    assert "+PARAM" not in (folder / "master.log").read_text()
+
+
+def test_without_rosout(start: Start) -> None:
+    core = start("--no-rosout")
+    assert "rosout" not in core.said
+    master = proxy()
+    assert master.get_system_state().publishers == {}
+    master.close()
+
+
+def test_who_may_connect(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    core = start("--allow", "192.168.65.0/24", "--allow", "10.0.0.1")
+    assert "open to 192.168.65.0/24, 10.0.0.1/32\n" in core.said
+    master = proxy()
+    assert master.get_pid() == core.process.pid
+    master.close()
+    core.end()
+    monkeypatch.setenv("MINIROSPY_ALLOW", "10.1.0.0/16")
+    assert "open to 10.1.0.0/16\n" in start().said
+
+
+def test_the_health_line(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    core = start()
+    assert main(["--status"]) == 0
+    line = capsys.readouterr().out
+    assert line.startswith(f"{os.environ['ROS_MASTER_URI']}: pid {core.process.pid}, up 0:00:0")
+    assert " 1 nodes, 2 topics, " in line
+    assert " 3 parameters, " in line
+    assert f"journal: {os.environ['ROS_HOME']}/master/journal-" in line
+    assert line.count("\n") == 1
+    core.end()
+    assert roscore(["--status"]) == 1
+    assert "no ROS master answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--allow", "here"], "'here' is not a network"),
+        (["-t", "0"], "the timeout is more than 0 seconds"),
+        (["--master-logger-level", "loud"], "invalid choice: 'loud'"),
+    ],
+)
+def test_typed_wrong(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert roscore(words) == 2
+    error: Any = capsys.readouterr().err
+    assert says in error
+    assert error.count("\n") == 1

@@ -1,0 +1,368 @@
+"""A node's life where real rospy hangs or breaks: signals, forks, threads, pytest. What both do is in tests/referee."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from minirospy.errors import RpcRefused
+from minirospy.runtime.master_proxy import MasterProxy
+
+POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
+
+
+def start(script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A program that has said "ready"."""
+    process = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", script, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout
+    line = process.stdout.readline()
+    assert line == "ready\n", process.communicate()[1]
+    return process
+
+
+def signalled(script: str, number: int) -> tuple[int, str, str, float]:
+    """A program's exit status, what it says after the signal, and how long it takes."""
+    process = start(script)
+    begun = time.monotonic()
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=8)
+    return process.returncode, output, errors, time.monotonic() - begun
+
+
+DEAF = {
+    "time.sleep": "time.sleep(60)",
+    "a lock": "threading.Event().wait()",
+    "a busy loop": "while True: pass",
+    "input": "sys.stdin.readline()",
+    "publishing": "while True: pub.publish(True); time.sleep(0.01)",
+    "a thread without end": "threading.Thread(target=time.sleep, args=(60,)).start()",
+}
+
+
+@POSIX_ONLY
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("what", DEAF)
+def test_a_program_that_never_hears_of_the_shutdown_ends(master: str, what: str, number: int) -> None:
+    script = f"""
+import sys, threading, time, rospy
+from std_msgs.msg import Bool
+rospy.init_node("deaf")
+pub = rospy.Publisher("t", Bool, queue_size=1)
+rospy.on_shutdown(lambda: print("hook", flush=True))
+print("ready", flush=True)
+{DEAF[what]}
+"""
+    status, output, errors, seconds = signalled(script, number)
+    assert (status, output) == (0, "hook\n")
+    assert errors == "" or what == "a thread without end"
+    assert seconds < 1.0
+
+
+@POSIX_ONLY
+def test_a_loop_that_asks_keeps_its_clean_up(master: str) -> None:
+    script = """
+import time, rospy
+rospy.init_node("asks")
+print("ready", flush=True)
+while not rospy.is_shutdown():
+    time.sleep(0.9)
+time.sleep(0.6)
+print("cleaned up", flush=True)
+"""
+    status, output, errors, _ = signalled(script, signal.SIGINT)
+    assert (status, output, errors) == (0, "cleaned up\n", "")
+
+
+@POSIX_ONLY
+def test_a_program_that_was_told_keeps_its_clean_up(master: str) -> None:
+    script = """
+import time, rospy
+rospy.init_node("told")
+print("ready", flush=True)
+try:
+    rospy.wait_for_service("/nobody")
+except rospy.ROSInterruptException:
+    time.sleep(0.7)
+    print("cleaned up", flush=True)
+"""
+    status, output, errors, _ = signalled(script, signal.SIGINT)
+    assert (status, output, errors) == (0, "cleaned up\n", "")
+
+
+@POSIX_ONLY
+def test_a_second_ctrl_c_ends_a_hook(master: str) -> None:
+    process = start("""
+import time, rospy
+def hook():
+    print("in the hook", flush=True)
+    time.sleep(60)
+rospy.init_node("slow")
+rospy.on_shutdown(hook)
+print("ready", flush=True)
+rospy.spin()
+""")
+    process.send_signal(signal.SIGINT)
+    assert process.stdout
+    assert process.stdout.readline() == "in the hook\n"
+    begun = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=5)
+    assert time.monotonic() - begun < 1.0
+    assert not is_known(master, "/slow")
+
+
+FORKS = {
+    "os.fork": """
+pid = os.fork()
+if pid == 0:
+    child()
+    sys.exit(0)
+assert os.waitpid(pid, 0)[1] == 0
+""",
+    "Process": """
+worker = multiprocessing.get_context("fork").Process(target=child)
+worker.start()
+worker.join()
+assert worker.exitcode == 0
+""",
+    "terminate": """
+worker = multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,))
+worker.start()
+worker.terminate()
+worker.join()
+assert worker.exitcode == -15
+""",
+    "Pool": """
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    assert pool.map(abs, [-1, -2]) == [1, 2]
+""",
+    "a node of its own": """
+def own_node():
+    child()
+    rospy.init_node("own", argv=[])
+    heard = threading.Event()
+    subscriber = rospy.Subscriber("t", Int32, lambda message: heard.set())
+    assert heard.wait(5)
+    assert rospy.get_name() == "/own"
+worker = multiprocessing.get_context("fork").Process(target=own_node)
+worker.start()
+while worker.is_alive():
+    pub.publish(1)
+    worker.join(0.02)
+assert worker.exitcode == 0
+""",
+}
+
+
+@POSIX_ONLY
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+@pytest.mark.parametrize("how", FORKS)
+def test_a_fork_leaves_the_parents_node_alone(master: str, how: str) -> None:
+    script = f"""
+import multiprocessing, os, sys, threading, time
+import rospy
+from std_msgs.msg import Int32
+
+def child():
+    assert rospy.get_name() == "/parent" and not rospy.is_shutdown()
+    rospy.loginfo("a line of the child's")
+    rospy.Time.now()
+    pub.publish(99)
+    assert rospy.get_param("/nope", 5) == 5
+
+rospy.init_node("parent", argv=[])
+rospy.on_shutdown(lambda: print("hook of", rospy.get_name()))
+heard = []
+rospy.Subscriber("t", Int32, lambda message: heard.append(message.data))
+pub = rospy.Publisher("t", Int32, queue_size=10)
+while pub.get_num_connections() < 1:
+    time.sleep(0.01)
+{FORKS[how]}
+assert not rospy.is_shutdown()
+pub.publish(7)
+while 7 not in heard:
+    time.sleep(0.01)
+assert 99 not in heard
+assert rospy.get_master().lookupNode("/parent")[2] == rospy.get_node_uri()
+print("ends")
+"""
+    begun = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", script],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
+    )
+    lines = [line for line in done.stdout.splitlines() if not line.startswith("[INFO]")]
+    assert (done.returncode, lines, done.stderr) == (0, ["ends", "hook of /parent"], "")
+    assert time.monotonic() - begun < 5.0
+
+
+@pytest.mark.parametrize("method", [m for m in multiprocessing.get_all_start_methods() if m != "fork"])
+def test_other_start_methods(master: str, tmp_path: Path, method: str) -> None:
+    script = tmp_path / "program.py"
+    script.write_text(f"""
+import multiprocessing
+import rospy
+
+def work(number):
+    rospy.init_node("worker", anonymous=True, argv=[])
+    rospy.set_param("/done", number)
+
+if __name__ == "__main__":
+    rospy.init_node("parent", argv=[])
+    worker = multiprocessing.get_context("{method}").Process(target=work, args=(5,))
+    worker.start()
+    worker.join()
+    assert worker.exitcode == 0
+    assert rospy.get_param("/done") == 5
+    print(rospy.get_name())
+""")
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=20, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "/parent\n", "")
+
+
+def test_init_node_in_another_thread(master: str) -> None:
+    script = """
+import threading, rospy
+from std_msgs.msg import Bool
+def work():
+    rospy.init_node("threaded")
+    rospy.Publisher("t", Bool, queue_size=1)
+worker = threading.Thread(target=work)
+worker.start()
+worker.join()
+print(rospy.get_name(), [row[0] for row in rospy.get_published_topics() if row[0] == "/t"])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "/threaded ['/t']\n", "")
+    assert not is_known(master, "/threaded")
+
+
+def test_in_pytest(master: str, tmp_path: Path) -> None:
+    (tmp_path / "test_user.py").write_text("""
+import pytest, rospy
+from std_msgs.msg import Bool
+
+@pytest.fixture(scope="module", autouse=True)
+def node():
+    rospy.init_node("tested", argv=[], disable_signals=True)
+    yield
+    rospy.signal_shutdown("done")
+
+def test_one(caplog, capsys):
+    rospy.loginfo("a line")
+    rospy.Publisher("t", Bool, queue_size=1, latch=True).publish(True)
+    assert rospy.wait_for_message("t", Bool, timeout=5).data
+    assert rospy.get_name() == "/tested"
+
+def test_two():
+    assert not rospy.is_shutdown()
+""")
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert "2 passed" in done.stdout, done.stdout + done.stderr
+    assert done.returncode == 0
+    assert not is_known(master, "/tested")
+
+
+@pytest.mark.parametrize(
+    ("argument", "told"),
+    [
+        ("a:=b:=c", "invalid command-line parameters: [a:=b:=c] has more than one :="),
+        ("_p:=[1,", "invalid command-line parameters: [_p:=[1,]: while parsing a flow node"),
+        ("_p:=null", "invalid command-line parameters: [_p:=null]: XML-RPC has no type for NoneType"),
+        ("_p:=99999999999", "invalid command-line parameters: [_p:=99999999999]: the integer"),
+    ],
+)
+def test_a_wrong_argument_is_told_in_one_line(master: str, argument: str, told: str) -> None:
+    script = f"""
+import rospy
+try:
+    rospy.init_node("node", argv=[{argument!r}])
+except rospy.ROSInitException as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(told)
+    assert done.stdout.count("\n") == 1
+
+
+def is_known(master: str, name: str) -> bool:
+    proxy = MasterProxy(master, "/test")
+    try:
+        proxy.lookup_node(name)
+    except RpcRefused:
+        return False
+    finally:
+        proxy.close()
+    return True
+
+
+def test_get_master_names_another_by_its_uri(master: str) -> None:
+    script = """
+import rospy
+try:
+    rospy.get_master(env={"ROS_MASTER_URI": "http://localhost:1"}).getPid()
+except ConnectionRefusedError:
+    print("refused", rospy.get_master().getPid()[0])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+    )
+    assert (done.stdout, done.stderr) == ("refused 1\n", "")
+
+
+@POSIX_ONLY
+def test_ctrl_c_while_waiting_for_a_master() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import rospy; rospy.init_node('early')"], stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr
+    assert process.stderr.readline().startswith("Unable to register with master node [http://localhost:1]")
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=5)[1] == ""
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize("uri", ["foo", "localhost:11311", "http://localhost:99999"])
+def test_a_master_uri_that_is_none(uri: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    script = """
+import rospy
+try:
+    rospy.init_node("node")
+except rospy.ROSInitException as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+    )
+    told = f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311\n"
+    assert (done.returncode, done.stdout, done.stderr) == (0, told, "")

@@ -1,0 +1,145 @@
+"""Where services of ours do better than rospy's, on purpose: what rospy answers with a hang or a dead proxy."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from minirospy.runtime.master_proxy import MasterProxy
+
+SERVER = """
+import sys
+import threading
+import rospy
+from std_srvs.srv import SetBool, Trigger
+
+gate = threading.Event()
+
+def slow(request):
+    print("called", flush=True)
+    gate.wait(20)
+    return True, "late"
+
+rospy.init_node(sys.argv[1])
+rospy.Service("/slow", Trigger, slow)
+rospy.Service("/s", SetBool, lambda request: (request.data, sys.argv[1]))
+print("ready", flush=True)
+for line in sys.stdin:
+    exec(line)
+"""
+
+PERSISTENT = """
+import sys
+import rospy
+from std_srvs.srv import SetBool
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/s", SetBool, persistent=True)
+for line in sys.stdin:
+    try:
+        print(proxy(True).message, flush=True)
+    except rospy.ServiceException as error:
+        print(error, flush=True)
+"""
+
+WAITING = """
+import threading
+import rospy
+from std_srvs.srv import Trigger
+
+def call():
+    try:
+        rospy.ServiceProxy("/slow", Trigger)()
+    except rospy.ROSInterruptException as error:
+        print(error, flush=True)
+
+rospy.init_node("client")
+thread = threading.Thread(target=call)
+thread.start()
+input()
+rospy.signal_shutdown("enough")
+thread.join()
+"""
+
+Program = subprocess.Popen[str]
+
+
+@pytest.fixture
+def started(master: str) -> Iterator[list[Program]]:
+    """Programs to be ended with the test."""
+    programs: list[Program] = []
+    yield programs
+    for program in programs:
+        program.kill()
+        program.communicate()
+
+
+def start(started: list[Program], code: str, *arguments: str) -> Program:
+    program = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    started.append(program)
+    return program
+
+
+def say(program: Program, line: str = "") -> None:
+    assert program.stdin
+    program.stdin.write(line + "\n")
+    program.stdin.flush()
+
+
+def hear(program: Program) -> str:
+    assert program.stdout
+    return program.stdout.readline().rstrip("\n")
+
+
+def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
+    """rospy's raises AttributeError at each call from then on."""
+    client = start(started, PERSISTENT)
+    for name in ("one", "two"):
+        server = start(started, SERVER, name)
+        assert hear(server) == "ready"
+        for _ in range(2):
+            say(client)
+            assert hear(client) == name
+        say(server, "rospy.signal_shutdown('end')")
+        say(server, "sys.exit()")
+        server.wait(10)
+        say(client)
+        assert hear(client) == "service [/s] unavailable"
+
+
+def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
+    """rospy waits until the handler has returned."""
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, WAITING)
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client) == "node shutdown interrupted service call"
+    assert client.wait(5) == 0
+
+
+def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
+    """rospy's thread dies of it, and the client waits for ever."""
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    proxy = MasterProxy(master, "/test")
+    host, port = proxy.lookup_service("/s").removeprefix("rosrpc://").split(":")
+    proxy.close()
+    pairs = [
+        f"{key}={value}".encode() for key, value in (("callerid", "/me"), ("md5sum", "*"), ("service", "/s"))
+    ]
+    header = b"".join(struct.pack("<I", len(pair)) + pair for pair in pairs)
+    with socket.create_connection((host, int(port)), 5) as sock, sock.makefile("rb") as answer:
+        sock.sendall(struct.pack("<I", len(header)) + header)
+        answer.read(struct.unpack("<I", answer.read(4))[0])
+        sock.sendall(struct.pack("<I", 0))
+        ok, length = struct.unpack("<BI", answer.read(5))
+        assert ok == 0
+        assert answer.read(length).startswith(b"error processing request: ")

@@ -1,0 +1,96 @@
+"""Time where minirospy does better than rospy; what is the same is in tests/referee."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.usefixtures("master")
+
+
+def run(program: str) -> list[str]:
+    """The lines of a program that ends well, and soon."""
+    done = subprocess.run(
+        [sys.executable, "-c", "import rospy, threading\n" + program],
+        capture_output=True,
+        text=True,
+        timeout=15,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.splitlines()
+
+
+def test_a_timer_that_is_shut_down_ends_at_once() -> None:
+    program = """
+rospy.init_node("case")
+timer = rospy.Timer(rospy.Duration(1000), print)
+timer.shutdown()
+timer.join(5)
+print(timer.is_alive())
+other = rospy.Timer(rospy.Duration(1000), print)
+rospy.signal_shutdown("")
+other.join(5)
+print(other.is_alive())
+"""
+    assert run(program) == ["False", "False"]
+
+
+def test_a_shutdown_ends_every_sleep() -> None:
+    program = """
+rospy.init_node("case")
+ends = []
+def sleeps(sleep):
+    try:
+        ends.append(sleep())
+    except rospy.ROSInterruptException as error:
+        ends.append(str(error))
+threads = [threading.Thread(target=sleeps, args=[sleep]) for sleep in (lambda: rospy.sleep(1000), rospy.Rate(0.001).sleep)]
+for thread in threads:
+    thread.start()
+rospy.signal_shutdown("")
+for thread in threads:
+    thread.join()
+print(ends)
+rospy.sleep(0.01)
+rospy.Rate(100).sleep()
+print("who has asked for it may clean up")
+"""
+    assert run(program) == [
+        "['ROS shutdown request', 'ROS shutdown request']",
+        "who has asked for it may clean up",
+    ]
+
+
+def test_who_sleeps_by_simulated_time_wakes_up_when_it_ends() -> None:
+    program = """
+import rospy.rostime
+rospy.set_param("/use_sim_time", True)
+rospy.init_node("case")
+rospy.rostime._set_rostime(rospy.Time(5))
+thread = threading.Thread(target=rospy.sleep, args=[1], daemon=True)
+thread.start()
+thread.join(0.1)
+rospy.rostime.switch_to_wallclock()
+thread.join(5)
+print(thread.is_alive(), rospy.get_time() > 1e9)
+"""
+    assert run(program) == ["False True"]
+
+
+def test_an_error_in_simulated_time_is_told_where_a_timer_ends() -> None:
+    program = """
+import rospy.rostime
+threading.excepthook = lambda args: print(args.exc_type.__name__, args.exc_value)
+rospy.set_param("/use_sim_time", True)
+rospy.init_node("case")
+rospy.rostime._set_rostime(rospy.Time(5))
+timer = rospy.Timer(rospy.Duration(1), print)
+timer.join(0.1)
+rospy.rostime._set_rostime(rospy.Time(4))
+timer.join(5)
+print(timer.is_alive())
+"""
+    assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards", "False"]

@@ -1,0 +1,278 @@
+"""client/topics beyond rospy: what it warns of, waiting for subscribers, freshness, and what it survives.
+
+What is as with rospy is in tests/referee/cases/topics*.py. Each test is a program of its own, since a process has one node.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from minirospy.runtime.master_proxy import MasterProxy
+
+BEGIN = """
+import sys, threading, rospy
+from std_msgs.msg import Bool, Int32, String
+from sensor_msgs.msg import Image
+from geometry_msgs.msg import PointStamped
+
+def eventually(condition):
+    waiting = threading.Event()
+    for _ in range(1000):
+        if condition():
+            return True
+        waiting.wait(0.01)
+    return False
+"""
+
+Start = Callable[[str], "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start(master: str) -> Iterator[Start]:
+    """Start a program; it is killed in the end."""
+    with ExitStack() as running:
+
+        def run(code: str) -> subprocess.Popen[str]:
+            program = subprocess.Popen(
+                [sys.executable, "-c", BEGIN + code],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            running.callback(program.communicate)
+            running.callback(program.kill)
+            return program
+
+        yield run
+
+
+def finished(program: subprocess.Popen[str]) -> tuple[str, str]:
+    """What a program printed on stdout and on stderr; it ends by itself, with status 0."""
+    output, errors = program.communicate(timeout=30)
+    assert program.returncode == 0, errors
+    return output, errors
+
+
+def line(program: subprocess.Popen[str]) -> str:
+    assert program.stdout
+    return program.stdout.readline().rstrip("\n")
+
+
+UNHEARD = """
+rospy.init_node("talker")
+publisher = rospy.Publisher("/t", Bool, queue_size=1, latch={latch})
+publisher.publish(True)
+publisher.publish(True)
+"""
+
+
+@pytest.mark.parametrize("latch", [False, True])
+@pytest.mark.parametrize("subscriber", [False, True])
+def test_a_first_message_that_its_subscriber_misses_is_told_of_once(
+    start: Start, master: str, subscriber: bool, latch: bool
+) -> None:
+    if subscriber:
+        proxy = MasterProxy(master, "/listener")
+        proxy.register_subscriber("/t", "std_msgs/Bool", "http://127.0.0.1:1/")
+        proxy.close()
+    _, errors = finished(start(UNHEARD.format(latch=latch)))
+    told = "the first message on /t went to nobody: 1 known to the master, not connected yet"
+    assert errors.count(told) == (1 if subscriber and not latch else 0)
+    assert errors.count("\n") == errors.count(told)
+
+
+def test_waiting_for_subscribers(start: Start) -> None:
+    output, errors = finished(
+        start("""
+publisher = rospy.Publisher("/t", Int32, queue_size=1)
+try:
+    publisher.wait_for_subscribers()
+except rospy.ROSException as error:
+    print(error)
+rospy.init_node("talker")
+print(publisher.wait_for_subscribers(timeout=0.01), publisher.wait_for_subscribers(0))
+got, arrived = [], threading.Event()
+threading.Timer(0.1, lambda: rospy.Subscriber("/t", Int32, lambda m: (got.append(m.data), arrived.set()))).start()
+print(publisher.wait_for_subscribers())
+publisher.publish(5)
+print(arrived.wait(10), got)
+threading.Timer(0.1, rospy.signal_shutdown, ["test"]).start()
+try:
+    publisher.wait_for_subscribers(2)
+except rospy.ROSInterruptException as error:
+    print(error)
+publisher.unregister()
+try:
+    publisher.wait_for_subscribers()
+except rospy.ROSException as error:
+    print(error)
+""")
+    )
+    assert output.splitlines() == [
+        "ROS node has not been initialized yet. Please call init_node() first",
+        "False True",
+        "True",
+        "True [5]",
+        "rospy shutdown",
+        "wait_for_subscribers() on an unregistered() handle",
+    ]
+    assert errors == ""
+
+
+def test_another_type_on_a_topic_of_this_process_is_told_of(start: Start) -> None:
+    _, errors = finished(
+        start("""
+rospy.init_node("talker")
+kept = [rospy.Publisher("/t", type_, queue_size=1) for type_ in (String, String, rospy.AnyMsg, Int32)]
+""")
+    )
+    assert errors.count("\n") == 1
+    assert "topic [/t] is published as [std_msgs/String] by this process already" in errors
+    assert "[std_msgs/Int32]" in errors
+
+
+def test_bytes_that_do_not_fit_a_second_class_are_told_of(start: Start) -> None:
+    output, errors = finished(
+        start("""
+rospy.init_node("both")
+publisher = rospy.Publisher("/t", Int32, queue_size=1)
+got, strings = [], []
+rospy.Subscriber("/t", Int32, got.append)
+rospy.Subscriber("/t", String, strings.append)
+publisher.wait_for_subscribers()
+publisher.publish(5)
+print(eventually(lambda: got), strings)
+publisher.publish(6)
+print(eventually(lambda: len(got) == 2))
+""")
+    )
+    assert output == "True []\nTrue\n"
+    assert "a message on /t from /both does not fit std_msgs/String" in errors
+
+
+def test_a_value_that_does_not_fit_leaves_nothing_behind(start: Start) -> None:
+    output, _ = finished(
+        start("""
+rospy.init_node("talker")
+publisher = rospy.Publisher("/t", PointStamped, queue_size=10)
+got = []
+rospy.Subscriber("/t", PointStamped, got.append)
+publisher.wait_for_subscribers()
+wrong = PointStamped()
+wrong.header.frame_id = "a frame that is written before the fault"
+wrong.point.y = "far"
+try:
+    publisher.publish(wrong)
+except rospy.ROSSerializationException:
+    print("refused")
+right = PointStamped()
+right.point.y = 2.0
+publisher.publish(right)
+print(eventually(lambda: got), got[0].point.y, repr(got[0].header.frame_id))
+""")
+    )
+    assert output == "refused\nTrue 2.0 ''\n"
+
+
+def test_listeners_hear_of_peers_in_order_and_a_faulty_one_ends_nothing(start: Start) -> None:
+    output, errors = finished(
+        start("""
+rospy.init_node("talker")
+told = []
+class Listener(rospy.SubscribeListener):
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        threading.Event().wait(0.05)
+        told.append("come")
+        raise ValueError("bad listener")
+    def peer_unsubscribe(self, topic_name, num_peers):
+        told.append("gone")
+publisher = rospy.Publisher("/t", Bool, Listener(), queue_size=1)
+for _ in range(3):
+    subscriber = rospy.Subscriber("/t", Bool)
+    publisher.wait_for_subscribers()
+    subscriber.unregister()
+    eventually(lambda: publisher.get_num_connections() == 0)
+print(eventually(lambda: len(told) == 6), told)
+""")
+    )
+    assert output == "True ['come', 'gone', 'come', 'gone', 'come', 'gone']\n"
+    assert errors.count("ValueError: bad listener") == 3
+
+
+def test_a_slow_callback_sees_the_present(start: Start) -> None:
+    """The classic trap: large images, a slow callback, queue_size=1, buff_size as it is by default."""
+    output, _ = finished(
+        start("""
+rospy.init_node("camera")
+publisher = rospy.Publisher("/image", Image, queue_size=1)
+ages = []
+def callback(image):
+    ages.append((rospy.Time.now() - image.header.stamp).to_sec())
+    threading.Event().wait(0.1)
+rospy.Subscriber("/image", Image, callback, queue_size=1)
+publisher.wait_for_subscribers()
+data = bytes(900_000)
+while len(ages) < 15:
+    image = Image(data=data)
+    image.header.stamp = rospy.Time.now()
+    publisher.publish(image)
+    rospy.sleep(0.005)
+print(max(ages))
+""")
+    )
+    # An image every 5 ms, a callback of 100 ms: kept in order, the last would be 1.4 s old.
+    assert float(output) < 0.4
+
+
+LISTENER = """
+rospy.init_node("listener")
+rospy.Subscriber("/t", String, lambda message: print(message.data, flush=True))
+print("ready", flush=True)
+rospy.spin()
+"""
+TALKER = """
+rospy.init_node("talker")
+publisher = rospy.Publisher("/t", String, queue_size=1)
+publisher.wait_for_subscribers()
+publisher.publish("{text}")
+sys.stdin.read()
+"""
+
+
+def test_a_publisher_that_was_killed_and_comes_back_is_heard_again(start: Start) -> None:
+    listener = start(LISTENER)
+    assert line(listener) == "ready"
+    first = start(TALKER.format(text="one"))
+    assert line(listener) == "one"
+    first.kill()
+    first.wait()
+    start(TALKER.format(text="two"))
+    assert line(listener) == "two"
+    assert listener.poll() is None
+
+
+def test_a_killed_subscriber_is_nothing_to_its_publisher(start: Start) -> None:
+    listener = start(LISTENER)
+    assert line(listener) == "ready"
+    talker = start("""
+rospy.init_node("talker")
+publisher = rospy.Publisher("/t", String, queue_size=None)
+publisher.wait_for_subscribers()
+print("connected", flush=True)
+sys.stdin.readline()
+while publisher.get_num_connections():
+    publisher.publish("x" * 1000)
+publisher.publish("to nobody")
+print("alone", flush=True)
+""")
+    assert line(talker) == "connected"
+    listener.kill()
+    output, errors = talker.communicate("go\n", timeout=20)
+    assert (output, talker.returncode) == ("alone\n", 0)
+    assert errors.count("\n") == errors.count("SyntaxWarning") == 1

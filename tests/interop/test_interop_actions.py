@@ -1,0 +1,110 @@
+"""Actions: servers and clients of ours, of actionlib in Python and of actionlib in C++, each with each."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+STACKS = ("ours", "rospy", "roscpp")
+Run = Callable[[str, str, str], "subprocess.Popen[str]"]
+
+PAIRS = [(server, client) for server in STACKS for client in STACKS if "ours" in (server, client)]
+SAID = """\
+server True
+succeeds True SUCCEEDED reached 1
+succeeds feedback 10 11 12
+aborts True ABORTED failed 2
+aborts feedback
+state ACTIVE
+cancelled True PREEMPTED made way 3
+cancelled feedback
+state ACTIVE
+after another True SUCCEEDED reached 1
+after another feedback 10 11 12
+state ACTIVE
+all cancelled True PREEMPTED made way 3
+all cancelled feedback
+state ACTIVE
+cancelled by time True PREEMPTED made way 3
+cancelled by time feedback
+out of time PREEMPTED
+in time ABORTED
+"""
+
+
+@pytest.fixture(scope="session")
+def cpp_action_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """action_peer.cpp, compiled."""
+    compiler = shutil.which("g++")
+    assert compiler
+    program = tmp_path_factory.mktemp("cpp") / "action_peer"
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.split()
+    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / "action_peer.cpp"), *flags], check=True)
+    return program
+
+
+@pytest.fixture
+def run(request: pytest.FixtureRequest) -> Iterator[Run]:
+    """Start a peer: ``run(stack, role, uri)``."""
+    programs = []
+
+    def start(stack: str, role: str, uri: str) -> subprocess.Popen[str]:
+        command = {
+            "ours": [sys.executable, str(HERE / "action_peer.py")],
+            "rospy": ["/usr/bin/python3", str(HERE / "action_peer.py")],
+            "roscpp": [str(request.getfixturevalue("cpp_action_peer"))] if stack == "roscpp" else [],
+        }[stack]
+        program = subprocess.Popen(
+            [*command, role],
+            env={**os.environ, "ROS_MASTER_URI": uri},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        programs.append(program)
+        return program
+
+    yield start
+    for program in programs:
+        # A server ends with its input.
+        if program.poll() is None:
+            try:
+                program.communicate(timeout=10)
+            except subprocess.TimeoutExpired:
+                program.kill()
+        program.communicate()
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize(("server", "client"), PAIRS)
+def test_goals_end_the_same_whoever_serves_and_whoever_asks(
+    real_master: str, run: Run, server: str, client: str
+) -> None:
+    serving = run(server, "serve", real_master)
+    assert serving.stdout
+    assert any(line.strip() == "ready" for line in serving.stdout)
+    output, errors = run(client, "ask", real_master).communicate(timeout=100)
+    assert output == SAID, errors
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize("client", STACKS)
+def test_over_our_master(run: Run, client: str, master: str) -> None:
+    serving = run("ours", "serve", master)
+    assert serving.stdout
+    assert any(line.strip() == "ready" for line in serving.stdout)
+    output, errors = run(client, "ask", master).communicate(timeout=100)
+    assert output == SAID, errors

@@ -1,0 +1,252 @@
+"""What the cases of actions share: both ends of an action by hand, on its five topics, and the log lines of actionlib."""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+
+import rospy
+from actionlib.msg import TestActionFeedback, TestActionGoal, TestActionResult, TestGoal
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from referee import eventually, show
+
+_NAMES = {
+    value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)
+}
+# Lines of rospy itself, which are its own business.
+_OTHERS = re.compile(
+    r"connecting to |\[/.*failed to receive|.*topic|.*TCPROS|node|init_node|signal_shutdown|the first message"
+)
+_STAMP = re.compile(r"stamp: 1[5-9]\d{8}\.\d\d")
+_ID = re.compile(r"(/\w+)-(\d+)-1[5-9]\d{8}\.\d+")
+
+
+def name_of(status):
+    """PENDING and its kin."""
+    return _NAMES.get(status, status)
+
+
+def mask(text):
+    """A text without the times in it."""
+    text = _STAMP.sub("stamp: <stamp>", _ID.sub(r"\1-\2-<stamp>", text))
+    return re.sub(r"<bound method (\S+) of .*?>>", r"\1", text)
+
+
+class Story:
+    """What callbacks say and what is logged, from whichever thread, in order; shown where the case asks for it.
+
+    Lines of the terminal are turned off: what stands there is the business of other cases.
+    """
+
+    def __init__(self, level=logging.DEBUG):
+        self._changed = threading.Condition()
+        self._lines = []
+        self._said = 0
+        logger = logging.getLogger("rosout")
+        logger.handlers[:] = [_LogLines(self, level)]
+        logger.setLevel(level)
+
+    def say(self, *values):
+        """A callback tells of its call."""
+        with self._changed:
+            self._lines.append(" ".join(map(str, values)))
+            self._said += 1
+            self._changed.notify_all()
+
+    def log(self, *values):
+        """A line of the log."""
+        with self._changed:
+            self._lines.append(" ".join(map(str, values)))
+            self._changed.notify_all()
+
+    def wait(self, count, seconds=10):
+        """Whether callbacks come to have said so many things since the last tell."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._said >= count, seconds)
+
+    def wait_log(self, text, seconds=10):
+        """Whether a line with this text comes to be logged, or has been since the last tell."""
+        with self._changed:
+            return self._changed.wait_for(lambda: any(text in line for line in self._lines), seconds)
+
+    def tell(self):
+        """Show what was said since the last time."""
+        with self._changed:
+            for line in self._lines:
+                show("  ", mask(line))
+            self._lines = []
+            self._said = 0
+
+
+class _LogLines(logging.Handler):
+    def __init__(self, story, level):
+        super().__init__(level)
+        self._story = story
+
+    def emit(self, record):
+        text = record.getMessage()
+        if not _OTHERS.match(text):
+            # Of a traceback only what happened: its lines of code differ.
+            lines = text.splitlines() or [""]
+            self._story.log(
+                "log", record.levelname, lines[0], *(["...", lines[-1]] if len(lines) > 1 else [])
+            )
+
+
+class RawClient:
+    """A client by hand: sends what it is told, keeps what it hears."""
+
+    def __init__(self, ns):
+        self._changed = threading.Condition()
+        self.statuses = {}
+        self.seen = {}
+        self._last = {}
+        self.results = []
+        self.feedback = []
+        self.arrays = 0
+        self.array = None
+        self.goal_pub = rospy.Publisher(ns + "/goal", TestActionGoal, queue_size=10)
+        self.cancel_pub = rospy.Publisher(ns + "/cancel", GoalID, queue_size=10)
+        self.subscribers = [
+            rospy.Subscriber(ns + "/status", GoalStatusArray, self._on_status),
+            rospy.Subscriber(ns + "/result", TestActionResult, self._on_result),
+            rospy.Subscriber(ns + "/feedback", TestActionFeedback, self._on_feedback),
+        ]
+        ends = [self.goal_pub, self.cancel_pub, *self.subscribers]
+        assert eventually(lambda: all(end.get_num_connections() for end in ends))
+
+    def goal(self, id, goal=0, stamp=None):
+        """Send a goal; without ``stamp`` it has none."""
+        message = TestActionGoal(goal_id=GoalID(id=id), goal=TestGoal(goal))
+        if stamp is not None:
+            message.goal_id.stamp = stamp
+        self.goal_pub.publish(message)
+
+    def cancel(self, id="", stamp=None):
+        """Send a cancel."""
+        message = GoalID(id=id)
+        if stamp is not None:
+            message.stamp = stamp
+        self.cancel_pub.publish(message)
+
+    def wait_status(self, id, status, seconds=10):
+        """Whether the list of statuses comes to tell this of a goal."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
+
+    def wait_gone(self, id, seconds=10):
+        """Whether the list of statuses comes to leave a goal out."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self.arrays and id not in self.statuses, seconds)
+
+    def wait_results(self, count, seconds=10):
+        """Whether there come to be so many results."""
+        with self._changed:
+            return self._changed.wait_for(lambda: len(self.results) >= count, seconds)
+
+    def wait_feedback(self, count, seconds=10):
+        """Whether there come to be so many messages of feedback."""
+        with self._changed:
+            return self._changed.wait_for(lambda: len(self.feedback) >= count, seconds)
+
+    def tell(self):
+        """Show what was heard of each goal since the last time, in order."""
+        with self._changed:
+            for id, statuses in sorted(self.seen.items()):
+                show("   statuses of", id, *statuses)
+            for result in self.results:
+                show("   result", *result)
+            for feedback in self.feedback:
+                show("   feedback", *feedback)
+            self.seen, self.results, self.feedback = {}, [], []
+
+    def _on_status(self, message):
+        with self._changed:
+            self.arrays += 1
+            self.array = message
+            self.statuses = {}
+            for status in message.status_list:
+                id = mask(status.goal_id.id)
+                self.statuses[id] = status.status
+                said = f"{name_of(status.status)}({status.text})"
+                if self._last.get(id) != said:
+                    self._last[id] = said
+                    self.seen.setdefault(id, []).append(said)
+            self._changed.notify_all()
+
+    def _on_result(self, message):
+        with self._changed:
+            id = mask(message.status.goal_id.id)
+            self.results.append(
+                (id, name_of(message.status.status), repr(message.status.text), message.result.result)
+            )
+            self._changed.notify_all()
+
+    def _on_feedback(self, message):
+        with self._changed:
+            id = mask(message.status.goal_id.id)
+            self.feedback.append(
+                (id, name_of(message.status.status), repr(message.status.text), message.feedback.feedback)
+            )
+            self._changed.notify_all()
+
+
+class RawServer:
+    """A server by hand: keeps the goals and cancels that it hears, tells what it is told to tell."""
+
+    def __init__(self, ns):
+        self._changed = threading.Condition()
+        self.goals = []
+        self.cancels = []
+        self.status_pub = rospy.Publisher(ns + "/status", GoalStatusArray, latch=True, queue_size=50)
+        self.result_pub = rospy.Publisher(ns + "/result", TestActionResult, queue_size=50)
+        self.feedback_pub = rospy.Publisher(ns + "/feedback", TestActionFeedback, queue_size=50)
+        self.subscribers = [
+            rospy.Subscriber(ns + "/goal", TestActionGoal, self._on_goal),
+            rospy.Subscriber(ns + "/cancel", GoalID, self._on_cancel),
+        ]
+
+    def connected(self):
+        """Whether a client comes to be connected by all topics."""
+        ends = [self.status_pub, self.result_pub, self.feedback_pub, *self.subscribers]
+        return eventually(lambda: all(end.get_num_connections() for end in ends))
+
+    def wait_goals(self, count, seconds=10):
+        """Whether there come to be so many goals."""
+        with self._changed:
+            return self._changed.wait_for(lambda: len(self.goals) >= count, seconds)
+
+    def wait_cancels(self, count, seconds=10):
+        """Whether there come to be so many cancels."""
+        with self._changed:
+            return self._changed.wait_for(lambda: len(self.cancels) >= count, seconds)
+
+    def status(self, *statuses):
+        """Tell a list of (id, status, text)."""
+        said = [GoalStatus(GoalID(id=id), status, text) for id, status, text in statuses]
+        message = GoalStatusArray(status_list=said)
+        message.header.stamp = rospy.Time.now()
+        self.status_pub.publish(message)
+
+    def result(self, id, status, text="", result=0):
+        """Tell the result of a goal."""
+        message = TestActionResult(status=GoalStatus(GoalID(id=id), status, text))
+        message.result.result = result
+        self.result_pub.publish(message)
+
+    def feedback(self, id, feedback):
+        """Tell the feedback of a goal."""
+        message = TestActionFeedback(status=GoalStatus(GoalID(id=id), GoalStatus.ACTIVE, ""))
+        message.feedback.feedback = feedback
+        self.feedback_pub.publish(message)
+
+    def _on_goal(self, message):
+        with self._changed:
+            self.goals.append(message)
+            self._changed.notify_all()
+
+    def _on_cancel(self, message):
+        with self._changed:
+            self.cancels.append(message)
+            self._changed.notify_all()

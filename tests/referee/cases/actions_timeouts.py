@@ -1,0 +1,73 @@
+"""Parameters of a server: how long it tells of goals that ended, how often it tells; queue sizes."""
+
+import time
+
+import actionlib
+import rospy
+from action_peer import RawClient, Story
+from actionlib.msg import TestAction
+from actionlib_msgs.msg import GoalStatus
+from referee import outcome, show
+
+rospy.init_node("case", argv=[], disable_rosout=True)
+story = Story()
+rospy.set_param("server/status_list_timeout", 0.5)
+rospy.set_param("actionlib_status_frequency", 50.0)
+rospy.set_param("actionlib_server_pub_queue_size", -1)
+rospy.set_param("actionlib_server_sub_queue_size", 7)
+
+
+def execute(goal):
+    server.set_succeeded()
+
+
+server = actionlib.SimpleActionServer("server", TestAction, execute, False)
+server.start()
+show(server.action_server.status_frequency, server.action_server.status_list_timeout.to_sec())
+show(server.action_server.pub_queue_size, server.action_server.sub_queue_size)
+client = RawClient("server")
+client.goal("a", 1)
+show(client.wait_status("a", GoalStatus.SUCCEEDED))
+before = time.monotonic()
+show(client.wait_gone("a"), 0.3 < time.monotonic() - before < 1.5)
+client.cancel("b")
+show(client.wait_status("b", GoalStatus.RECALLING))
+before = time.monotonic()
+show(client.wait_gone("b"), 0.3 < time.monotonic() - before < 1.5)
+
+count, before = client.arrays, time.monotonic()
+client.wait_status("never", 1, seconds=1)
+rate = (client.arrays - count) / (time.monotonic() - before)
+show("about 50 Hz", 35 < rate < 60)
+array = client.array
+show(repr(array.header.frame_id), array.header.seq > 50, abs(array.header.stamp.to_sec() - time.time()) < 5)
+connection = array._connection_header
+show(connection["latching"], connection["type"], connection["md5sum"], connection["callerid"])
+
+show("== the older name of the frequency")
+rospy.set_param("old/status_frequency", 20.0)
+old = actionlib.ActionServer("old", TestAction, lambda handle: None, auto_start=False)
+old.start()
+show(old.status_frequency)
+story.tell()
+
+show("== auto start")
+auto = actionlib.ActionServer("auto", TestAction, lambda handle: None)
+show(auto.started)
+simple = actionlib.SimpleActionServer("simple_auto", TestAction)
+show(simple.action_server.started, simple.execute_thread)
+story.tell()
+show(RawClient("auto").arrays > 0, RawClient("simple_auto").arrays > 0)
+
+show("== the client's")
+rospy.set_param("actionlib_client_pub_queue_size", 9)
+rospy.set_param("actionlib_client_sub_queue_size", 8)
+client = actionlib.ActionClient("server", TestAction)
+show(client.pub_queue_size, client.sub_queue_size)
+rospy.set_param("actionlib_client_pub_queue_size", -9)
+rospy.set_param("actionlib_client_sub_queue_size", -8)
+client = actionlib.ActionClient("server", TestAction)
+show(client.pub_queue_size, client.sub_queue_size)
+rospy.set_param("actionlib_client_sub_queue_size", 0)
+outcome("a queue of nothing", lambda: actionlib.ActionClient("server", TestAction))
+rospy.signal_shutdown("the case is over")

@@ -1,0 +1,93 @@
+"""SubscribeListener: who is told of subscribers that come and go, and what the two publish functions do."""
+
+import threading
+
+import rospy
+from referee import Other, eventually, outcome, show
+from std_msgs.msg import String
+
+LISTENER = """
+import sys, rospy
+from std_msgs.msg import String
+rospy.init_node("listener", anonymous=True, argv=[])
+rospy.Subscriber(sys.argv[1], String, lambda message: print(message.data, flush=True))
+sys.stdin.read()
+"""
+
+rospy.init_node("case", argv=[])
+told = []
+changed = threading.Condition()
+
+
+def tell(*what):
+    with changed:
+        told.append(what)
+        changed.notify_all()
+
+
+def wait(count):
+    with changed:
+        return changed.wait_for(lambda: len(told) >= count, 10)
+
+
+class Listener(rospy.SubscribeListener):
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        peer_publish(String("welcome, peer"))
+        tell("come", topic_name)
+
+    def peer_unsubscribe(self, topic_name, num_peers):
+        tell("gone", topic_name, num_peers)
+
+
+publisher = rospy.Publisher("/told", String, Listener(), queue_size=10)
+first = Other(LISTENER, "/told")
+wait(1)
+show(told, publisher.get_num_connections())
+show("first", first.read())
+second = Other(LISTENER, "/told")
+wait(2)
+show(told, publisher.get_num_connections())
+show("second", second.read())
+publisher.publish("for all")
+show(first.read(), second.read())
+first.close()
+wait(3)
+show(told[2:], publisher.get_num_connections())
+
+other = rospy.Publisher("/told", String, Listener(), queue_size=10)
+third = Other(LISTENER, "/told")
+wait(5)
+show("two listeners", told[3:])
+show(third.read(), third.read())
+other.unregister()
+second.close()
+wait(6)
+show("one Publisher is gone", len(told) >= 6, told[5])
+third.close()
+del told[:]
+show("nobody", eventually(lambda: publisher.get_num_connections() == 0))
+
+
+class Whole(rospy.SubscribeListener):
+    """Uses the other function, and tells nobody that peers go."""
+
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        topic_publish(String("welcome, all"))
+
+
+rospy.Publisher("/whole", String, Whole(), queue_size=10)
+fourth = Other(LISTENER, "/whole")
+show("fourth", fourth.read())
+fourth.close()
+
+
+class Bad(rospy.SubscribeListener):
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        tell("bad")
+        raise ValueError("bad listener")
+
+
+outcome("what a listener is", lambda: rospy.Publisher("/nobody", String, 5, queue_size=10).name)
+base = rospy.SubscribeListener()
+outcome("the base class", lambda: base.peer_subscribe("/t", print, print))
+outcome("the base class", lambda: base.peer_unsubscribe("/t", 0))

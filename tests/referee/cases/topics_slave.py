@@ -1,0 +1,48 @@
+"""The Slave API of a node with topics: what tools are told of its connections, and what bad calls are answered."""
+
+import re
+import xmlrpc.client
+
+import rospy
+from referee import eventually, outcome, show
+from std_msgs.msg import String
+
+rospy.init_node("case", argv=[])
+node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
+publisher = rospy.Publisher("/told", String, queue_size=1)
+got = []
+subscriber = rospy.Subscriber("/told", String, got.append)
+show(eventually(lambda: publisher.get_num_connections() == 1 and subscriber.get_num_connections() == 1))
+publisher.publish("abc")
+show(eventually(lambda: len(got) == 1))
+code, text, rows = node.getBusInfo("/me")
+show("getBusInfo", code, text)
+for row in sorted(rows, key=lambda row: row[2]):
+    if row[4] == "/told":
+        # The subscriber's end may not know its socket any more: a race of the real one.
+        what = re.sub(r"\d+|None", "<number>", row[6].split(" to [")[0]) if len(row) > 6 else None
+        show("row", row[1:6], what, type(row[0]).__name__, len(row))
+code, text, (publications, subscriptions, services) = node.getBusStats("/me")
+show("getBusStats", code, text, services)
+show(
+    "publications",
+    [(topic, data > 0, [row[2:] for row in rows]) for topic, data, rows in publications if topic == "/told"],
+)
+show("subscriptions", [(topic, len(rows[0])) for topic, rows in subscriptions])
+outcome("getPublications", lambda: node.getPublications("/me"))
+outcome("getSubscriptions", lambda: node.getSubscriptions("/me"))
+outcome("getName", lambda: node.getName("/me"))
+outcome("getMasterUri", lambda: node.getMasterUri("/me")[:2])
+outcome("getPid", lambda: node.getPid("/me")[:2])
+outcome("getUri", lambda: node.getUri("/me"))
+outcome("publisherUpdate of nothing", lambda: node.publisherUpdate("/me", "/nobody", []))
+outcome("publisherUpdate with a string", lambda: node.publisherUpdate("/me", "/told", "x"))
+outcome("publisherUpdate with numbers", lambda: node.publisherUpdate("/me", "/told", [5]))
+outcome("publisherUpdate without a topic", lambda: node.publisherUpdate("/me"))
+outcome("publisherUpdate with a number", lambda: node.publisherUpdate("/me", 5, []))
+outcome("publisherUpdate with no name", lambda: node.publisherUpdate("/me", "", []))
+outcome("paramUpdate of a number", lambda: node.paramUpdate("/me", 5, 5))
+outcome("no caller", node.getName)
+outcome("a number as caller", lambda: node.getName(5))
+outcome("an empty caller", lambda: node.getName(""))
+outcome("one argument too many", lambda: node.getName("/me", 5))

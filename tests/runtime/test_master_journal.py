@@ -1,0 +1,484 @@
+"""What a killed master leaves, and what its successor makes of it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
+from typing import Any
+from xmlrpc.client import Fault, ServerProxy
+
+import pytest
+
+from minirospy.runtime import journal as journal_module
+from minirospy.runtime.journal import Journal
+from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.master import Master
+from minirospy.runtime.rpc_server import RpcServer
+from minirospy.wire.journal import HEAD, parse_journal
+
+BIN = Path(sys.executable).parent
+
+
+class Fakes:
+    """Nodes that answer each call with success; each at a port of its own. On the loop of the test."""
+
+    def __init__(self) -> None:
+        self.called: list[tuple[int, str, list[Any]]] = []
+        self._servers: dict[str, RpcServer] = {}
+
+    async def open(self, name: str = "") -> str:
+        """Another node, which calls itself ``name`` if asked; its URI."""
+
+        def answer(method: str, args: Sequence[Any]) -> list[Any]:
+            self.called.append((server.port, method, list(args)))
+            return [1, "", name if method == "getName" else 0]
+
+        server = RpcServer(answer)
+        await server.start()
+        uri = f"http://127.0.0.1:{server.port}/"
+        self._servers[uri] = server
+        return uri
+
+    async def close(self, uri: str = "") -> None:
+        for each in [uri] if uri else list(self._servers):
+            await self._servers.pop(each).close()
+        # A transport closes its socket one step later.
+        await asyncio.sleep(0.01)
+
+
+def run(test: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(asyncio.wait_for(test, 30))
+
+
+async def until(condition: Callable[[], object]) -> None:
+    while not condition():
+        await asyncio.sleep(0.005)
+
+
+def state(master: Master) -> Any:
+    """All that a master can be asked."""
+    ask = master.dispatch
+    found = [ask(what, ["/x"])[2] for what in ("getSystemState", "getTopicTypes", "getParamNames")]
+    nodes = sorted(master.registry.nodes().items())
+    services = {name: ask("lookupService", ["/x", name])[2] for name, _ in found[0][2]}
+    return [found, ask("getParam", ["/x", "/"]), nodes, services, sorted(master.parameters.subscriptions())]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "master" / "journal-1"
+
+
+async def start(path: Path, **options: Any) -> Master:
+    master = Master(journal=path, **options)
+    await master.start()
+    return master
+
+
+def call(master: Master, method: str, *args: Any) -> Any:
+    answer = master.dispatch(method, args)
+    assert answer[0] == 1, answer
+    return answer[2]
+
+
+def test_all_is_back(path: Path) -> None:
+    async def test() -> None:
+        nodes = Fakes()
+        uri, other = await nodes.open(), await nodes.open()
+        first = await start(path)
+        call(first, "registerPublisher", "/a", "/t", "std_msgs/Bool", uri)
+        call(first, "registerPublisher", "/b", "/t", "std_msgs/Bool", other)
+        call(first, "registerSubscriber", "/a", "/u", "*", uri)
+        call(first, "registerService", "/b", "/s", "rosrpc://x:1", other)
+        call(first, "subscribeParam", "/b", other, "/p")
+        call(first, "setParam", "/a", "/p", {"q": [1, 2.5, "x", True, b"\0"], "r": {}})
+        call(first, "setParam", "/a", "/gone", 1)
+        call(first, "deleteParam", "/a", "/gone")
+        call(first, "registerPublisher", "/a", "/left", "std_msgs/Bool", uri)
+        call(first, "unregisterPublisher", "/a", "/left", uri)
+        before = state(first)
+        await first.close(keep_journal=True)
+
+        nodes.called.clear()
+        second = await start(path)
+        assert state(second) == before
+        assert "recovered 2 nodes and 1 parameter of" in second.news[0]
+        # The nodes may have missed a call while the master was gone: they are told where things stand.
+        await until(
+            lambda: {method for _, method, _ in nodes.called} == {"getName", "publisherUpdate", "paramUpdate"}
+        )
+        assert state(second) == before
+        await second.close()
+        assert not path.exists()
+        await nodes.close()
+
+    run(test())
+
+
+def test_a_clean_end_leaves_nothing(path: Path) -> None:
+    async def test() -> None:
+        first = await start(path)
+        call(first, "setParam", "/a", "/p", 1)
+        assert path.exists()
+        await first.close()
+        await first.close()
+        assert not path.exists()
+        second = await start(path)
+        assert (second.news, call(second, "getParamNames", "/x")) == ([], [])
+        await second.close()
+
+    run(test())
+
+
+def test_a_fresh_start(path: Path) -> None:
+    async def test() -> None:
+        first = await start(path)
+        call(first, "setParam", "/a", "/p", 1)
+        await first.close(keep_journal=True)
+        second = await start(path, fresh=True)
+        assert call(second, "getParamNames", "/x") == []
+        await second.close()
+
+    run(test())
+
+
+def test_dead_nodes_are_pruned_and_their_subscribers_told(path: Path) -> None:
+    async def test() -> None:
+        nodes = Fakes()
+        live, dead, stranger = (
+            await nodes.open("/live"),
+            await nodes.open(),
+            await nodes.open("/somebody_else"),
+        )
+        first = await start(path)
+        call(first, "registerSubscriber", "/live", "/t", "a/B", live)
+        call(first, "registerPublisher", "/dead", "/t", "a/B", dead)
+        call(first, "registerPublisher", "/stranger", "/t", "a/B", stranger)
+        call(first, "subscribeParam", "/dead", dead, "/p")
+        await first.close(keep_journal=True)
+        await nodes.close(dead)
+
+        nodes.called.clear()
+        second = await start(path)
+        assert len(second.registry.nodes()) == 3
+        await until(lambda: second.registry.nodes() == {"/live": live})
+        assert list(second.parameters.subscriptions()) == []
+        await until(lambda: ("publisherUpdate", ["/master", "/t", []]) in [each[1:] for each in nodes.called])
+        # Pruned for good: not back after the next crash.
+        await second.close(keep_journal=True)
+        third = await start(path)
+        assert third.registry.nodes() == {"/live": live}
+        await third.close()
+        await nodes.close()
+
+    run(test())
+
+
+@pytest.mark.parametrize("lives", [True, False])
+@pytest.mark.parametrize("reason", ["another boot", "long ago"])
+def test_yesterdays_session_is_taken_up_only_if_somebody_is_still_there(
+    path: Path, lives: bool, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test() -> None:
+        nodes = Fakes()
+        uri = await nodes.open()
+        first = await start(path)
+        call(first, "registerPublisher", "/a", "/t", "a/B", uri)
+        call(first, "setParam", "/a", "/p", 1)
+        await first.close(keep_journal=True)
+        if not lives:
+            await nodes.close(uri)
+        if reason == "another boot":
+            monkeypatch.setattr(journal_module, "boot_id", lambda: "another")
+        else:
+            os.utime(path, (time.time() - 86400 * 3,) * 2)
+        second = await start(path)
+        assert call(second, "getParamNames", "/x") == (["/p"] if lives else [])
+        assert set(second.registry.nodes()) == ({"/a"} if lives else set())
+        assert ("recovered" if lives else "left behind: none of these nodes answers") in second.news[0]
+        await second.close()
+        await nodes.close()
+
+    run(test())
+
+
+@pytest.mark.parametrize("damage", ["torn", "changed", "empty", "not a journal"])
+def test_a_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) -> None:
+    async def test() -> None:
+        first = await start(path)
+        for number in range(10):
+            call(first, "setParam", "/a", f"/p{number}", number)
+        await first.close(keep_journal=True)
+        data = bytearray(path.read_bytes())
+        if damage == "torn":
+            del data[-3:]
+        elif damage == "changed":
+            data[-3] ^= 1
+        path.write_bytes({"empty": b"", "not a journal": b"x" * 100}.get(damage, bytes(data)))
+        second = await start(path)
+        kept = 9 if damage in {"torn", "changed"} else 0
+        assert call(second, "getParamNames", "/x") == [f"/p{number}" for number in range(kept)]
+        assert "recovered up to the last whole record" in second.news[0]
+        assert path.with_name("journal-1.damaged").exists()
+        # What is written now is whole again.
+        assert parse_journal(path.read_bytes()).damage == ""
+        await second.close()
+
+    run(test())
+
+
+def test_two_masters_never_share_a_journal(path: Path) -> None:
+    async def test() -> None:
+        first = await start(path)
+        second = await start(path)
+        assert second.news == [f"no journal: {path} is held by another master (pid {os.getpid()})"]
+        call(second, "setParam", "/a", "/p", 1)
+        call(first, "setParam", "/a", "/q", 1)
+        await second.close()
+        await first.close(keep_journal=True)
+        third = await start(path)
+        assert call(third, "getParamNames", "/x") == ["/q"]
+        await third.close()
+
+    run(test())
+
+
+def test_a_port_that_is_taken_leaves_the_journal_alone(path: Path) -> None:
+    async def test() -> None:
+        first = await start(path)
+        call(first, "setParam", "/a", "/q", 1)
+        await first.close(keep_journal=True)
+        with socket.socket() as other:
+            other.bind(("127.0.0.1", 0))
+            other.listen()
+            with pytest.raises(OSError, match="in use"):
+                await start(path, port=other.getsockname()[1])
+        second = await start(path)
+        assert call(second, "getParamNames", "/x") == ["/q"]
+        await second.close()
+
+    run(test())
+
+
+def test_a_full_disk_stops_no_master(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test() -> None:
+        master = await start(path)
+        call(master, "setParam", "/a", "/before", 1)
+        real = os.write
+
+        def full(file: int, data: Any) -> int:
+            real(file, bytes(data)[:5])
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(journal_module.os, "write", full)
+            call(master, "setParam", "/a", "/during", 1)
+        assert "No space left" in call(master, "minirospy.status", "/x")["journal"]
+        monkeypatch.setattr(journal_module, "_RETRY_SECONDS", 0.0)
+        call(master, "setParam", "/a", "/after", 1)
+        assert "failing" not in call(master, "minirospy.status", "/x")["journal"]
+        await master.close(keep_journal=True)
+        second = await start(path)
+        assert call(second, "getParamNames", "/x") == ["/before", "/during", "/after"]
+        await second.close()
+
+    run(test())
+
+
+def test_a_journal_where_none_can_be(tmp_path: Path) -> None:
+    async def test() -> None:
+        (tmp_path / "file").write_text("")
+        master = await start(tmp_path / "file" / "journal")
+        assert "no journal, a crash of the master would lose the graph" in master.news[0]
+        assert call(master, "minirospy.status", "/x")["journal"] == "none"
+        await master.close()
+
+    run(test())
+
+
+def random_call(rng: random.Random) -> tuple[Any, ...]:
+    node = f"/n{rng.randrange(4)}"
+    uri = f"http://127.0.0.1:1/{rng.randrange(6) % 4}/"
+    topic, key = f"/t{rng.randrange(4)}", rng.choice(["/p", "/p/a", "/p/a/b", "/q", "/"])
+    value = rng.choice([1, "x", [1, {"z": 2}], {"a": {"b": 3}}, {}, 2.5])
+    return rng.choice(
+        [
+            ("registerPublisher", node, topic, rng.choice(["a/B", "c/D", "*"]), uri),
+            ("registerSubscriber", node, topic, rng.choice(["a/B", "*"]), uri),
+            ("registerService", node, topic, f"rosrpc://x:{rng.randrange(3)}", uri),
+            ("unregisterPublisher", node, topic, uri),
+            ("unregisterSubscriber", node, topic, uri),
+            ("unregisterService", node, topic, f"rosrpc://x:{rng.randrange(3)}"),
+            ("setParam", node, key, value),
+            ("setParam", node, key, value),
+            ("deleteParam", node, key),
+            ("subscribeParam", node, uri, key),
+            ("unsubscribeParam", node, uri, key),
+        ]
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("compact", [300, 10**6], ids=["rewritten often", "appended"])
+def test_after_any_calls_the_journal_tells_the_same(
+    path: Path, seed: int, compact: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal_module, "_COMPACT_BYTES", compact)
+    monkeypatch.setattr(journal_module, "_COMPACT_FACTOR", 1)
+
+    async def test() -> None:
+        rng = random.Random(seed)
+        master = await start(path)
+        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        for number in range(400):
+            method, *args = random_call(rng)
+            master.dispatch(method, args)
+            if number % 20 == 19:
+                again = Master()
+                for record in parse_journal(path.read_bytes()).records[1:]:
+                    again._replay(*record)
+                assert state(again) == state(master)
+        await master.close()
+
+    run(test())
+
+
+def test_a_rewrite_that_is_interrupted_leaves_the_old_file(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal(path, lambda: [["set", "/", {"a": 1}]])
+    assert journal.open() is None
+    journal.rewrite()
+    before = path.read_bytes()
+    monkeypatch.setattr(journal_module.os, "replace", lambda *_: (_ for _ in ()).throw(OSError("no")))
+    with pytest.raises(OSError, match="no"):
+        journal.rewrite()
+    assert path.read_bytes() == before
+    assert before.startswith(HEAD)
+    journal.close()
+
+
+# --- kill -9, with a real process
+
+
+class Killed:
+    """A roscore that is killed and started again on the same port, and two hundred fake nodes."""
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.uri = f"http://127.0.0.1:{port}/"
+        self.process = self.start()
+
+    def start(self) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [str(BIN / "roscore"), "-q", "-p", str(self.port)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
+
+    def kill(self) -> float:
+        """Kill and start; the seconds until it answers with all that it knew."""
+        self.process.send_signal(signal.SIGKILL if sys.platform != "win32" else signal.SIGTERM)
+        self.process.communicate()
+        begin = time.monotonic()
+        self.process = self.start()
+        while True:
+            try:
+                with ServerProxy(self.uri) as proxy:
+                    proxy.getPid("/test")
+                return time.monotonic() - begin
+            except OSError:
+                assert time.monotonic() - begin < 10
+                time.sleep(0.01)
+
+    def end(self) -> None:
+        self.process.terminate()
+        self.process.communicate(timeout=10)
+
+
+class Registering:
+    """A client that registers nodes and sets parameters, and remembers what was answered."""
+
+    def __init__(self, master: str, uris: list[str]) -> None:
+        self.answered: set[tuple[str, str, str]] = set()
+        self._master = master
+        self._uris = uris
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def lasts(self, seconds: float) -> bool:
+        return not self._over.wait(seconds)
+
+    def _run(self) -> None:
+        rng, number = random.Random(1), 0
+        while not self._over.is_set():
+            number += 1
+            node = rng.randrange(len(self._uris))
+            name, topic = f"/node{node}", f"/t{number % 1000}"
+            with contextlib.suppress(OSError, Fault), ServerProxy(self._master) as proxy:
+                for _ in range(5):
+                    proxy.registerPublisher(name, topic, "std_msgs/Bool", self._uris[node])
+                    self.answered.add(("pub", topic, name))
+                    proxy.registerSubscriber(name, topic + "/in", "std_msgs/Bool", self._uris[node])
+                    self.answered.add(("sub", topic + "/in", name))
+                    proxy.setParam(name, f"/p/{name[1:]}", number)
+                    self.answered.add(("par", f"/p/{name[1:]}", ""))
+
+
+def known(master: str) -> set[tuple[str, str, str]]:
+    with ServerProxy(master) as proxy:
+        published, subscribed, _ = proxy.getSystemState("/test")[2]  # type: ignore[index,misc]
+        parameters: Any = proxy.getParamNames("/test")[2]  # type: ignore[index]
+    found = {("pub", topic, name) for topic, names in published for name in names}
+    found |= {("sub", topic, name) for topic, names in subscribed for name in names}
+    return found | {("par", key, "") for key in parameters}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
+@pytest.mark.timeout(600)
+def test_two_hundred_nodes_survive_their_master() -> None:
+    """CRASHES=50 in the environment makes it the long one."""
+    crashes = int(os.environ.get("CRASHES", "4"))
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    loop, fakes = LoopThread("fakes"), Fakes()
+
+    async def open_all() -> list[str]:
+        return [await fakes.open() for _ in range(200)]
+
+    master = Killed(port)
+    client = Registering(master.uri, loop.run(open_all(), 20.0))
+    rng, times = random.Random(2), []
+    try:
+        for _ in range(crashes):
+            assert client.lasts(rng.uniform(0.2, 0.7))
+            before = set(client.answered)
+            times.append(master.kill())
+            assert not before - known(master.uri)
+    finally:
+        client.end()
+        loop.run(fakes.close(), 20.0)
+        loop.close()
+        master.end()
+    assert len({name for _, _, name in client.answered}) > 20
+    median = sorted(times)[len(times) // 2]
+    print(f"{crashes} crashes, {len(client.answered)} answers kept, back after {median:.2f} s")
+    # A second on a quiet machine; the start of Python is most of it.
+    assert median < 3.0, times

@@ -1,0 +1,142 @@
+"""runtime/node and runtime/slave: what a node answers its peers, and what it says of its own address."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator, Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import RpcFault
+from minirospy.runtime import node as node_module
+from minirospy.runtime import tcp
+from minirospy.runtime.loop import new_event_loop
+from minirospy.runtime.node import Node
+from minirospy.runtime.rpc_async import AsyncRpcClient
+from minirospy.runtime.slave import SlaveApi
+
+NO_MASTER = {"ROS_MASTER_URI": "http://127.0.0.1:1", "ROS_IP": "127.0.0.1"}
+
+
+def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run a scene on a loop of its own."""
+    loop = new_event_loop()
+    try:
+        loop.run_until_complete(asyncio.wait_for(scene(), 30))
+    finally:
+        loop.run_until_complete(loop.shutdown_asyncgens())
+        loop.run_until_complete(loop.shutdown_default_executor())
+        loop.close()
+
+
+@contextlib.asynccontextmanager
+async def running(variables: dict[str, str] = NO_MASTER) -> AsyncIterator[Node]:
+    node = Node("/node", Environment.read(variables))
+    await node.start()
+    try:
+        yield node
+    finally:
+        await node.close()
+
+
+@pytest.mark.parametrize(
+    ("call", "answer"),
+    [
+        (("getName", "/me"), [1, "", "/node"]),
+        (("getName",), [-1, "missing required caller_id parameter", ""]),
+        (("getName", 5), [-1, "caller_id must be a string", ""]),
+        (("getName", "/me", 5), [-1, "Error: bad call arity", ""]),
+        (("getBusStats", "/me"), [1, "", [[], [], []]]),
+        (("publisherUpdate", "/me", "/t", "x"), [-1, "ERROR: param [publishers] must be a list", -1]),
+        (
+            ("publisherUpdate", "/me", "/t", [5]),
+            [-1, "ERROR: param [publishers] must be a list of strings", -1],
+        ),
+        (("requestTopic", "/me", "/t", [["TCPROS"]]), [-1, "Not a publisher of [/t]", []]),
+        (("system.multicall",), []),
+        (("system.multicall", [{"methodName": "getName", "params": ["/me"]}]), [[[1, "", "/node"]]]),
+        (
+            ("system.multicall", [5, {"methodName": "getNothing", "params": []}]),
+            [
+                {"faultCode": 1, "faultString": "a call is a struct of methodName and params"},
+                {"faultCode": 1, "faultString": 'method "getNothing" is not supported'},
+            ],
+        ),
+    ],
+)
+def test_the_slave_api_answers(call: tuple[Any, ...], answer: Any) -> None:
+    api = SlaveApi(Node("/node", Environment.read(NO_MASTER)))
+    assert api.dispatch(call[0], call[1:]) == answer
+
+
+def test_a_method_that_is_not_there_is_a_fault() -> None:
+    with pytest.raises(RpcFault, match="getNothing"):
+        SlaveApi(Node("/node", Environment.read(NO_MASTER))).dispatch("getNothing", ["/me"])
+
+
+@pytest.mark.parametrize(
+    ("fields", "error"),
+    [
+        ({"callerid": "/raw"}, "no topic or service name detected"),
+        ({"topic": "/t", "callerid": "/raw"}, "[/node] is not a publisher of [/t]. Topics are []"),
+        ({"service": "/s", "callerid": "/raw"}, "[/node] is not a provider of  [/s]"),
+    ],
+)
+def test_a_peer_that_asks_for_what_is_not_there_is_told_so(
+    fields: dict[str, str], error: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scene() -> None:
+        async with running() as node:
+            sock = await tcp.connect("127.0.0.1", node.tcpros_port)
+            await tcp.send_header(sock, fields)
+            assert await tcp.receive_header(sock) == {"error": error}
+            assert await asyncio.get_running_loop().sock_recv(sock, 1) == b""
+            sock.close()
+
+    run(scene)
+    assert f"Could not process inbound connection: {error}" in caplog.text
+
+
+def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(node_module, "_MOST_IDLE", 20)
+
+    async def scene() -> None:
+        async with running() as node:
+            rpc = AsyncRpcClient()
+            port = int(node.uri.rsplit(":", 1)[1].strip("/"))
+            idle: list[socket.socket] = []
+            for number in range(200):
+                idle.append(await tcp.connect("127.0.0.1", port))
+                if number % 50 == 49:
+                    assert await rpc.call(node.uri, "getName", "/me") == [1, "", "/node"]
+            assert node._server
+            assert node._server.clients <= 20
+            await rpc.close()
+            for sock in idle:
+                sock.close()
+
+    run(scene)
+
+
+@pytest.mark.parametrize(
+    ("host", "master", "told"),
+    [
+        ("localhost", "192.0.2.1", True),
+        ("127.0.0.1", "192.0.2.1", True),
+        ("192.0.2.7", "192.0.2.1", False),
+        ("localhost", "localhost", False),
+    ],
+)
+def test_a_node_that_is_on_loopback_for_a_master_elsewhere_says_so(
+    host: str, master: str, told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scene() -> None:
+        async with running({"ROS_MASTER_URI": f"http://{master}:11411", "ROS_HOSTNAME": host}):
+            pass
+
+    run(scene)
+    assert ("set ROS_IP" in caplog.text) == told

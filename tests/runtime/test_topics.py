@@ -1,0 +1,507 @@
+"""runtime/topics and runtime/node: links between nodes of one loop, with real sockets, and what ends them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+import struct
+import threading
+from collections.abc import AsyncIterator, Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import WireError
+from minirospy.runtime import tcp, topics
+from minirospy.runtime.loop import new_event_loop
+from minirospy.runtime.master import Master
+from minirospy.runtime.node import Node
+from minirospy.runtime.rpc_async import AsyncRpcClient
+from minirospy.runtime.topics import Publication, Subscription
+from minirospy.wire.framing import serialize_frame
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")
+STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+
+
+def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run a scene on a loop of its own."""
+    loop = new_event_loop()
+    try:
+        loop.run_until_complete(asyncio.wait_for(scene(), 30))
+    finally:
+        loop.run_until_complete(loop.shutdown_asyncgens())
+        loop.close()
+
+
+async def eventually(condition: Callable[[], object]) -> None:
+    """Wait until a condition holds; the test's time limit ends the wait."""
+    while not condition():
+        await asyncio.sleep(0.01)
+
+
+def environment(master: Master) -> Environment:
+    return Environment.read({"ROS_MASTER_URI": f"http://127.0.0.1:{master.port}", "ROS_IP": "127.0.0.1"})
+
+
+@contextlib.asynccontextmanager
+async def graph(*names: str, watch_seconds: float = 60.0) -> AsyncIterator[tuple[Master, list[Node]]]:
+    """A master and some nodes on this loop."""
+    master = Master(host="127.0.0.1")
+    await master.start()
+    nodes = [Node(name, environment(master), watch_seconds=watch_seconds) for name in names]
+    try:
+        for node in nodes:
+            await node.start()
+        yield master, nodes
+    finally:
+        for node in nodes:
+            await node.close()
+        await master.close()
+
+
+class Box:
+    """What was delivered."""
+
+    def __init__(self) -> None:
+        self.bodies: list[bytes] = []
+        self.headers: list[Header] = []
+
+    def __call__(self, frame: memoryview, header: Header) -> None:
+        self.bodies.append(bytes(frame))
+        self.headers.append(header)
+
+
+async def listen(node: Node, topic: str, deliver: Callable[[memoryview, Header], None]) -> Subscription:
+    subscription = node.make_subscription(topic, STRING, deliver)
+    await node.subscribe(subscription)
+    return subscription
+
+
+async def publish(node: Node, topic: str, **options: Any) -> Publication:
+    publication = Publication(topic, STRING, **options)
+    await node.advertise(publication)
+    return publication
+
+
+class Foreign:
+    """A publisher by hand: ``serve(connection)`` plays what comes after the subscriber's header."""
+
+    def __init__(self, serve: Callable[[socket.socket], Coroutine[Any, Any, None]]) -> None:
+        self.connections = 0
+        self._serve = serve
+        self._listener = tcp.Listener(self._accept)
+        self._listener.open("127.0.0.1")
+
+    async def answer(self, *_: Any) -> Any:
+        return [1, "ready", ["TCPROS", "127.0.0.1", self._listener.port]]
+
+    async def _accept(self, sock: socket.socket, _address: str) -> None:
+        self.connections += 1
+        await tcp.receive_header(sock)
+        with contextlib.suppress(OSError, WireError):
+            await self._serve(sock)
+        sock.close()
+
+    async def close(self) -> None:
+        await self._listener.close()
+
+
+async def subscribe_to(
+    foreign: Foreign,
+    monkeypatch: pytest.MonkeyPatch,
+    node: Node,
+    deliver: Callable[[memoryview, Header], None],
+) -> Subscription:
+    """A subscription that the master told of one publisher, which ``foreign`` plays."""
+    subscription = node.make_subscription("/t", STRING, deliver)
+    monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
+    subscription.publishers_changed(["http://127.0.0.1:1/"])
+    return subscription
+
+
+def test_messages_go_from_node_to_node() -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            box = Box()
+            publication = await publish(a, "/t")
+            await listen(b, "/t", box)
+            await eventually(lambda: publication.links)
+            publication.publish(serialize_frame(b"one"))
+            publication.publish(serialize_frame(b"two"))
+            await eventually(lambda: len(box.bodies) == 2)
+            assert box.bodies == [b"one", b"two"]
+            assert (box.headers[0]["callerid"], box.headers[0]["topic"]) == ("/a", "/t")
+
+    run(scene)
+
+
+def test_a_publisher_that_closes_the_connection_is_connected_again() -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            box = Box()
+            publication = await publish(a, "/t")
+            await listen(b, "/t", box)
+            for number in range(3):
+                await eventually(lambda: publication.links)
+                publication.publish(serialize_frame(b"%d" % number))
+                await eventually(lambda number=number: len(box.bodies) == number + 1)
+                publication.links[0].close()
+            assert box.bodies == [b"0", b"1", b"2"]
+
+    run(scene)
+
+
+def test_a_refused_subscriber_is_told_why_and_does_not_ask_again_until_something_changes(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = Publication("/t", BOOL)
+            await a.advertise(publication)
+            subscription = await listen(b, "/t", Box())
+            await eventually(lambda: "refused the connection" in caplog.text)
+            assert not publication.links
+            assert not subscription._connecting
+            await a.unadvertise(publication)
+            right = await publish(a, "/t")
+            await eventually(lambda: right.links)
+
+    run(scene)
+    assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
+
+
+def test_a_publisher_that_sends_garbage_is_told_of_and_asked_less_and_less(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    delays: list[float] = []
+
+    async def garbage(sock: socket.socket) -> None:
+        await tcp.send_header(sock, {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"})
+        await asyncio.get_running_loop().sock_sendall(sock, struct.pack("<I", 0xFFFFFFFF) + b"xxxx")
+        await tcp.receive_header(sock)
+
+    async def scene() -> None:
+        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        async with graph("/b") as (_, (b,)):
+            foreign, box = Foreign(garbage), Box()
+            subscription = await subscribe_to(foreign, monkeypatch, b, box)
+            start = subscription._start_connecting
+            monkeypatch.setattr(
+                subscription, "_start_connecting", lambda action: (delays.append(action.delay), start(action))
+            )
+            await eventually(lambda: len(delays) >= 4)
+            subscription.close()
+            await foreign.close()
+            assert box.bodies == []
+
+    run(scene)
+    assert delays[:4] == [0.001, 0.002, 0.004, 0.008]
+    assert "a message of 4294967295 bytes is over the limit" in caplog.text
+
+
+@pytest.mark.parametrize("answer", [b"", b"\x05\0\0\0ab", b"HTTP/1.1 400 Bad Request\r\n\r\n"])
+def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
+    answer: bytes, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def bad_header(sock: socket.socket) -> None:
+        await asyncio.get_running_loop().sock_sendall(sock, answer)
+
+    async def scene() -> None:
+        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        async with graph("/b") as (_, (b,)):
+            foreign = Foreign(bad_header)
+            subscription = await subscribe_to(foreign, monkeypatch, b, Box())
+            await eventually(lambda: foreign.connections >= 6)
+            subscription.close()
+            await foreign.close()
+
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    (told,) = [line for line in lines if "cannot connect to the publisher of /t" in line]
+    assert "Its address is right" in told
+
+
+@pytest.mark.parametrize(
+    ("uri", "advice"),
+    [
+        ("http://no-such-host.invalid:5/", "does not know the name 'no-such-host.invalid'"),
+        (
+            "http://127.0.0.1:1/",
+            "'127.0.0.1' is this machine: if the publisher runs on another one, set ROS_IP",
+        ),
+    ],
+)
+def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
+    uri: str, advice: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scene() -> None:
+        monkeypatch.setattr("minirospy.graph.subscription._FIRST_DELAY", 0.001)
+        async with graph("/b") as (_, (b,)):
+            subscription = b.make_subscription("/t", STRING, Box())
+            subscription.publishers_changed([uri])
+            await eventually(lambda: subscription._plan.failures(uri) >= 5)
+            subscription.close()
+
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert len(lines) == 1
+    assert lines[0].startswith(f"cannot connect to the publisher of /t at {uri}: ")
+    assert advice in lines[0]
+
+
+def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    bodies: list[bytes] = []
+
+    def slow(frame: memoryview, _header: Header) -> None:
+        bodies.append(bytes(frame[:4]))
+        begun.set()
+        go_on.wait(10)
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t", queue_size=2)
+            subscription = b.make_subscription("/t", STRING, slow, newest=1)
+            await b.subscribe(subscription)
+            await eventually(lambda: publication.links)
+            publication.publish(serialize_frame(b"0000" + bytes(1_000_000)))
+            await asyncio.get_running_loop().run_in_executor(None, begun.wait, 10)
+            for number in range(1, 101):
+                publication.publish(serialize_frame(b"%04d" % number + bytes(1_000_000)))
+            # 100 MB were published; what waits is bounded by the queue.
+            assert publication.links[0].waiting <= 3
+            go_on.set()
+            await eventually(lambda: bodies[-1] == b"0100")
+            assert len(bodies) <= 4
+
+    run(scene)
+
+
+def test_a_slow_reader_costs_the_publisher_no_more_than_its_queue() -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            publication = await publish(a, "/t", queue_size=5)
+            sock = await raw_subscriber(a)
+            await eventually(lambda: publication.links)
+            link = publication.links[0]
+            for _ in range(100):
+                publication.publish(serialize_frame(bytes(1_000_000)))
+            assert link.waiting <= 6
+            assert link.dropped >= 80
+            sock.close()
+            await eventually(lambda: not publication.links)
+            publication.publish(serialize_frame(b"to nobody"))
+
+    run(scene)
+
+
+def test_without_a_queue_publish_waits_for_the_reader() -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            publication = await publish(a, "/t", queue_size=None)
+            sock = await raw_subscriber(a)
+            await eventually(lambda: publication.links)
+            loop = asyncio.get_running_loop()
+            whole = serialize_frame(bytes(30_000_000))
+            done = loop.run_in_executor(None, publication.publish, whole)
+            await eventually(lambda: publication.links[0].waiting)
+            assert not done.done()
+            received = 0
+            while received < len(whole):
+                received += len(await loop.sock_recv(sock, 1 << 20))
+            await done
+            # A reader that goes away ends the wait too.
+            done = loop.run_in_executor(None, publication.publish, whole)
+            await eventually(lambda: publication.links[0].waiting)
+            sock.close()
+            await done
+
+    run(scene)
+
+
+async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
+    """A connection that has sent a subscriber's header for /t and received the answer, and reads no more."""
+    sock = await tcp.connect("127.0.0.1", node.tcpros_port)
+    fields = {"topic": "/t", "md5sum": STRING.md5sum, "type": STRING.name, "callerid": "/raw", **changes}
+    await tcp.send_header(sock, fields)
+    await tcp.receive_header(sock)
+    return sock
+
+
+def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t", latch=True)
+            publication.publish(serialize_frame(b"old"))
+            publication.publish(serialize_frame(b"new"))
+            box = Box()
+            subscription = await listen(b, "/t", box)
+            await eventually(lambda: box.bodies)
+            assert box.bodies == [b"new"]
+            assert subscription.links[0].latched == b"new"
+
+    run(scene)
+
+
+def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCaptureFixture) -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b", watch_seconds=0.05) as (master, (a, b)):
+            box = Box()
+            publication = await publish(a, "/t")
+            subscription = await listen(b, "/t", box)
+            again = threading.Event()
+            b.when_registered_again.append(again.set)
+            await eventually(lambda: publication.links)
+            link = subscription.links[0]
+            port = master.port
+            await master.close()
+            await eventually(lambda: "What is connected goes on" in caplog.text)
+            publication.publish(serialize_frame(b"while there is no master"))
+            await eventually(lambda: len(box.bodies) == 1)
+            restarted = Master(host="127.0.0.1", port=port)
+            await restarted.start()
+            try:
+                await eventually(lambda: restarted.registry.publishers().get("/t"))
+                await eventually(lambda: restarted.registry.subscribers().get("/t"))
+                await asyncio.get_running_loop().run_in_executor(None, again.wait, 10)
+                publication.publish(serialize_frame(b"after"))
+                await eventually(lambda: len(box.bodies) == 2)
+                assert subscription.links == (link,), "the connection outlived the master"
+                late = Box()
+                await listen(a, "/t", late)
+                await eventually(lambda: len(publication.links) == 2)
+            finally:
+                await restarted.close()
+
+    run(scene)
+    assert "has restarted: registered again" in caplog.text
+
+
+def test_a_list_that_is_still_filling_drops_nobody_who_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(topics, "_SETTLE_SECONDS", 0.01)
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t")
+            subscription = await listen(b, "/t", Box())
+            await eventually(lambda: publication.links)
+            subscription.registered_again([])
+            subscription.publishers_changed(["http://127.0.0.1:1/"])
+            await eventually(lambda: subscription._settling is None)
+            assert [link.uri for link in subscription.links] == [a.uri]
+            assert subscription._plan.publishers == ("http://127.0.0.1:1/",)
+            # A node that the master names again is connected already.
+            subscription.publishers_changed([a.uri])
+            assert not subscription._connecting.get(a.uri)
+            publication.links[0].close()
+            await eventually(lambda: len(publication.links) == 1)
+
+    run(scene)
+
+
+def test_ports_out_of_a_range() -> None:
+    async def scene() -> None:
+        master = Master(host="127.0.0.1")
+        await master.start()
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            first = taken.getsockname()[1]
+            ports = range(first, first + 20)
+            settings = environment(master)._replace(ports=ports)
+            node = Node("/ranged", settings)
+            await node.start()
+            try:
+                assert node.tcpros_port in ports
+                assert int(node.uri.rsplit(":", 1)[1].strip("/")) in ports
+                assert first not in (node.tcpros_port, int(node.uri.rsplit(":", 1)[1].strip("/")))
+            finally:
+                await node.close()
+                await master.close()
+
+    run(scene)
+
+
+@pytest.mark.skipif(not socket.has_ipv6, reason="this Python has no IPv6")
+def test_nodes_meet_over_ipv6() -> None:
+    async def scene() -> None:
+        master = Master(host="127.0.0.1")
+        await master.start()
+        settings = Environment.read(
+            {"ROS_MASTER_URI": f"http://127.0.0.1:{master.port}", "ROS_IP": "::1", "ROS_IPV6": "on"}
+        )
+        node = Node("/six", settings)
+        try:
+            await node.start()
+        except OSError:
+            await master.close()
+            pytest.skip("this machine has no IPv6 loopback")
+        try:
+            assert node.uri.startswith("http://[::1]:")
+            rpc = AsyncRpcClient()
+            assert await rpc.call(node.uri, "getName", "/test") == [1, "", "/six"]
+            await rpc.close()
+            box = Box()
+            publication = await publish(node, "/t")
+            await listen(node, "/t", box)
+            await eventually(lambda: publication.links)
+            publication.publish(serialize_frame(b"six"))
+            await eventually(lambda: box.bodies)
+        finally:
+            await node.close()
+            await master.close()
+
+    run(scene)
+
+
+def test_a_subscription_that_is_closed_in_the_middle_of_connecting_leaves_no_link() -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t")
+            for _ in range(30):
+                subscription = await listen(b, "/t", Box())
+                while not publication.links:
+                    await asyncio.sleep(0)
+                await b.unsubscribe(subscription)
+                await eventually(lambda: not publication.links)
+
+    run(scene)
+
+
+def test_a_publication_that_is_closed_takes_no_more_subscribers() -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            publication = await publish(a, "/t")
+            publication.close()
+            sock = await raw_subscriber(a)
+            assert await asyncio.get_running_loop().sock_recv(sock, 1) == b""
+            sock.close()
+            assert not publication.links
+
+    run(scene)
+
+
+def test_a_subscriber_that_comes_again_takes_the_place_of_its_stalled_link() -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            publication = await publish(a, "/t", queue_size=None)
+            first = await raw_subscriber(a)
+            other = await raw_subscriber(a, callerid="/other")
+            await eventually(lambda: len(publication.links) == 2)
+            loop = asyncio.get_running_loop()
+            whole = serialize_frame(bytes(30_000_000))
+            done = loop.run_in_executor(None, publication.publish, whole)
+            await eventually(lambda: all(link.waiting for link in publication.links))
+            second = await raw_subscriber(a)
+            await eventually(lambda: len(publication.links) == 2)
+            assert [link.peer for link in publication.links] == ["/other", "/raw"]
+            other.close()
+            await done
+            first.close()
+            second.close()
+
+    run(scene)

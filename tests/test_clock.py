@@ -1,0 +1,113 @@
+"""Clocks: sleeping by a time that the test sets."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from minirospy.clock import SimulatedClock, WallClock, wait_for_event
+from minirospy.errors import ROSTimeMovedBackwardsException
+
+SECOND = 10**9
+
+
+class Sleeping(threading.Thread):
+    """A thread that sleeps by a simulated clock. It waits when this is made, and again after each :meth:`at`."""
+
+    def __init__(self, clock: SimulatedClock, nanoseconds: int) -> None:
+        super().__init__(daemon=True)
+        self.clock = clock
+        self.nanoseconds = nanoseconds
+        self.stop = threading.Event()
+        self.waits = threading.Semaphore(0)
+        self.outcome: object = None
+        waited = clock._changed.wait
+
+        def wait(timeout: float | None = None) -> bool:
+            self.waits.release()
+            return waited(5)
+
+        clock._changed.wait = wait  # type: ignore[method-assign]
+        self.start()
+        assert self.waits.acquire(timeout=5)
+
+    def run(self) -> None:
+        try:
+            self.outcome = self.clock.sleep(self.nanoseconds, self.stop)
+        except ROSTimeMovedBackwardsException as error:
+            self.outcome = error
+
+    def at(self, now: int) -> None:
+        """Set the time, and return when the thread has looked at it and waits on."""
+        self.clock.set(now)
+        assert self.waits.acquire(timeout=5)
+
+    def end(self) -> object:
+        self.join(5)
+        assert not self.is_alive()
+        return self.outcome
+
+
+def test_wall_clock_tells_the_time() -> None:
+    assert abs(WallClock().now() / 1e9 - time.time()) < 1
+
+
+def test_wall_clock_sleeps() -> None:
+    began = time.monotonic()
+    assert WallClock().sleep(SECOND // 50, threading.Event())
+    assert time.monotonic() - began >= 0.019
+    assert WallClock().sleep(-SECOND, threading.Event())
+
+
+def test_a_stop_ends_a_sleep_on_wall_time() -> None:
+    stop = threading.Event()
+    stop.set()
+    assert not WallClock().sleep(60 * SECOND, stop)
+
+
+def test_wait_for_event() -> None:
+    event = threading.Event()
+    assert not wait_for_event(event, 0)
+    event.set()
+    assert wait_for_event(event, None)
+
+
+def test_simulated_sleep_ends_when_its_time_has_come() -> None:
+    clock = SimulatedClock(10 * SECOND)
+    sleeping = Sleeping(clock, 2 * SECOND)
+    sleeping.at(12 * SECOND - 1)
+    clock.set(12 * SECOND)
+    assert sleeping.end() is True
+
+
+def test_a_sleep_before_the_first_time_begins_with_it() -> None:
+    clock = SimulatedClock()
+    sleeping = Sleeping(clock, SECOND)
+    sleeping.at(100 * SECOND)
+    clock.set(101 * SECOND)
+    assert sleeping.end() is True
+
+
+@pytest.mark.parametrize("now", [5 * SECOND, 0])
+def test_time_that_jumps_back_raises(now: int) -> None:
+    clock = SimulatedClock(10 * SECOND)
+    sleeping = Sleeping(clock, 2 * SECOND)
+    clock.set(now)
+    error = sleeping.end()
+    assert isinstance(error, ROSTimeMovedBackwardsException)
+    assert error.time == 10 - now / 1e9
+
+
+def test_a_stop_ends_a_simulated_sleep() -> None:
+    for clock in (SimulatedClock(), SimulatedClock(SECOND)):
+        sleeping = Sleeping(clock, SECOND)
+        sleeping.stop.set()
+        clock.set(clock.now())
+        assert sleeping.end() is False
+
+
+def test_no_sleep_takes_no_time() -> None:
+    assert SimulatedClock(SECOND).sleep(0, threading.Event())
+    assert SimulatedClock(SECOND).sleep(-5, threading.Event())
