@@ -22,7 +22,7 @@ demo: $(STAMP)
 	@$(BIN)/minirospy demo
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest --ignore=tests/interop
+	@$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/interop
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
