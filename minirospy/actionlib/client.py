@@ -13,6 +13,7 @@ from actionlib_msgs.msg import GoalID, GoalStatusArray
 from minirospy import client as rospy
 from minirospy import times
 from minirospy.actionlib.machine import ClientGoalHandle, FeedbackCallback, GoalManager, TransitionCallback
+from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
 
@@ -45,6 +46,7 @@ class ActionClient:
             self.ActionGoal,
             subscriber_listener=listener,
             tcp_nodelay=True,
+            headers=TAKES_FAST_ANSWERS,
             queue_size=self.pub_queue_size,
         )
         self.pub_cancel = rospy.Publisher(

@@ -6,7 +6,11 @@ from typing import Any, NamedTuple
 
 from minirospy.errors import MinirospyError
 
-__all__ = ["ActionException", "ActionTypes", "action_types"]
+__all__ = ["TAKES_FAST_ANSWERS", "ActionException", "ActionTypes", "action_types"]
+
+
+TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
+"""What our clients say in the connection header of their goals."""
 
 
 class ActionException(MinirospyError):

@@ -261,10 +261,11 @@ def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
         if connection is not None:
             return connection
         status = None if process is None else process.poll()
-        if status or given_up() or time.monotonic() > deadline:
+        if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{place.name}] does not start{_last_words(place)}")
         if process is None or status is not None:
-            # Status 0 without an answer: it met a server that was just ending.
+            # Status 0 without an answer: it met a server that was just ending. Below 0: a Ctrl-C that was meant
+            # for us killed it before it had left our terminal.
             process = _start_server(place)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)

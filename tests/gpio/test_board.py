@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -12,6 +14,7 @@ import psutil
 import pytest
 
 from minirospy.errors import BoardError
+from minirospy.gpio import link
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function
 from minirospy.gpio.place import Place
@@ -193,3 +196,18 @@ def test_a_folder_open_to_others_is_refused(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(BoardError, match="is open to others"):
         Board()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no signals")
+def test_a_server_that_a_ctrl_c_killed_is_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    start = link._start_server
+    started: list[subprocess.Popen[bytes]] = []
+
+    def first_one_is_killed(place: Place) -> subprocess.Popen[bytes]:
+        started.append(subprocess.Popen(["sh", "-c", "kill -INT $$"]) if not started else start(place))
+        return started[-1]
+
+    monkeypatch.setattr(link, "_start_server", first_one_is_killed)
+    with Board() as board:
+        assert board.get(7) == 0
+    assert [process.wait(10) for process in started] == [-signal.SIGINT, 0]
