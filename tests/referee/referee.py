@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 _MASKS = [
+    (re.compile(r"(?:/[\w.-]+)+/referee/"), "<here>/"),
     (re.compile(r"http://[\w.-]+:\d+/?"), "<uri>"),
     (re.compile(r"rosrpc://[\w.-]+:\d+"), "<rosrpc>"),
     (re.compile(r"(?:127\.0\.0\.1|localhost)(?:'?, |:)\d+"), "<address>"),
