@@ -15,13 +15,14 @@ from minirospy.errors import ROSTimeMovedBackwardsException
 
 __all__ = ["Clock", "SimulatedClock", "WallClock", "wait_for_event"]
 
-_SLICE = 0.05 if sys.platform == "win32" else None
-"""On Windows Ctrl-C does not end a wait of the main thread: there a wait is cut into slices."""
+_SLICE = 0.05 if sys.platform == "win32" else 0.5
+"""Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not end a wait, and elsewhere
+one that comes just before the wait begins is seen only after it."""
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
     """``event.wait(timeout)`` which a signal can interrupt on every OS."""
-    if _SLICE is None:
+    if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
     while not event.is_set():

@@ -81,13 +81,17 @@ def test_watch_hears_the_chosen_pins_until_the_time_is_up(board: Board) -> None:
     assert [(edge.pin, edge.level) for edge in edges] == [(12, 1), (12, 0)]
 
 
+# It listens before it says so: an edge that comes before wait_for_edge() begins would be lost, as on hardware.
 CHILD = """
+import threading
 from RPi import GPIO
 GPIO.setmode(GPIO.BCM)
 GPIO.setup(11, GPIO.IN)
 GPIO.setup(7, GPIO.OUT)
+pressed = threading.Event()
+GPIO.add_event_detect(11, GPIO.RISING, callback=lambda channel: pressed.set())
 print("ready", flush=True)
-GPIO.wait_for_edge(11, GPIO.RISING)
+pressed.wait(20)
 GPIO.output(7, GPIO.input(11))
 """
 
