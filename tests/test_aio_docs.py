@@ -1,4 +1,4 @@
-"""The programs of docs/asyncio.md run, and print what the page says."""
+"""The asyncio programs of the docs run, and print what the pages say."""
 
 from __future__ import annotations
 
@@ -9,15 +9,22 @@ from pathlib import Path
 
 import pytest
 
-PAGE = (Path(__file__).parents[1] / "docs" / "asyncio.md").read_text(encoding="utf-8")
-PROGRAMS = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", PAGE, re.DOTALL)
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = {name: (DOCS / name).read_text(encoding="utf-8") for name in ("asyncio.md", "actions.md")}
+PROGRAMS = [
+    pytest.param(code, printed, id=f"{name}-{number}")
+    for name, page in PAGES.items()
+    for number, (code, printed) in enumerate(
+        re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL), 1
+    )
+]
 
 
 def test_every_program_says_what_it_prints() -> None:
-    assert PAGE.count("```python") == len(PROGRAMS) > 0
+    assert sum(page.count("```python") for page in PAGES.values()) == len(PROGRAMS) > 0
 
 
-@pytest.mark.parametrize(("code", "printed"), PROGRAMS, ids=range(1, len(PROGRAMS) + 1))
+@pytest.mark.parametrize(("code", "printed"), PROGRAMS)
 def test_program(code: str, printed: str, master: str) -> None:
     done = subprocess.run(
         [sys.executable, "-X", "dev", "-c", code], capture_output=True, text=True, timeout=30, check=False

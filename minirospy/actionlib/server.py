@@ -19,6 +19,7 @@ from minirospy.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, S
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS, ActionException, action_types
 from minirospy.actionlib.statuses import StatusList
 from minirospy.client.process import process
+from minirospy.graph.goals import is_meant
 
 __all__ = ["ActionServer", "nop_cb"]
 
@@ -212,11 +213,10 @@ class ActionServer:
             if not self.started:
                 return
             rospy.logdebug("The action server has received a new cancel request")
-            cancels_all = not goal_id.id and goal_id.stamp == _NOTHING
+            stamp = goal_id.stamp.to_nsec()
             for tracker in self.status_list:
                 own = tracker.status.goal_id
-                is_old = goal_id.stamp != _NOTHING and own.stamp <= goal_id.stamp
-                if not tracker.goal or not (cancels_all or own.id == goal_id.id or is_old):
+                if not tracker.goal or not is_meant(goal_id.id, stamp, own.id, own.stamp.to_nsec()):
                     continue
                 handle = self._handle(tracker)
                 if handle.set_cancel_requested():

@@ -86,10 +86,28 @@ class Subscription(Handle, Generic[_M]):
         """How many publishers are connected."""
         return len(self._state.subscription.links)
 
+    async def wait_for_publishers(self, count: int = 1, timeout: float | None = None) -> None:
+        """Wait until so many publishers are connected. Raises TimeoutError after ``timeout`` seconds."""
+        connected = asyncio.Event()
+        told = self._state.subscription.on_connected
+        told.append(connected.set)
+        try:
+            await asyncio.wait_for(self._wait_for(count, connected), timeout)
+        except asyncio.TimeoutError:
+            text = f"timeout exceeded while waiting for {count} publishers of topic {self.topic}"
+            raise TimeoutError(text) from None
+        finally:
+            told.remove(connected.set)
+
     async def close(self) -> None:
         """Stop listening. What has come can still be read. Idempotent."""
         self._end()
         await self._state.leave(self)
+
+    async def _wait_for(self, count: int, connected: asyncio.Event) -> None:
+        while self.num_connections < count:
+            await connected.wait()
+            connected.clear()
 
     def _put(self, frame: bytes | memoryview, header: Header) -> None:
         if len(self._queue) == self._queue.maxlen:

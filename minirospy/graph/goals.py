@@ -20,6 +20,7 @@ __all__ = [
     "SimpleState",
     "SimpleStep",
     "client_steps",
+    "is_meant",
     "visible_state",
 ]
 
@@ -219,6 +220,16 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
     if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
         raise KeyError(status)
     return CLIENT_STEPS[state].get(status)
+
+
+def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
+    """Whether a cancel means a goal: by its id, as one up to the cancel's stamp, or as one of all (neither given).
+
+    Stamps are nanoseconds; zero is none.
+    """
+    if not cancel_id and not cancel_stamp:
+        return True
+    return cancel_id == goal_id or bool(cancel_stamp and goal_stamp <= cancel_stamp)
 
 
 def visible_state(status: int) -> int:

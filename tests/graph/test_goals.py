@@ -15,6 +15,7 @@ from minirospy.graph.goals import (
     SimpleState,
     SimpleStep,
     client_steps,
+    is_meant,
     visible_state,
 )
 
@@ -95,3 +96,12 @@ def test_a_goal_that_is_being_cancelled_looks_as_before() -> None:
     assert visible_state(GoalState.RECALLING) == GoalState.PENDING
     assert visible_state(GoalState.SUCCEEDED) == GoalState.SUCCEEDED
     assert visible_state(55) == 55
+
+
+@pytest.mark.parametrize(
+    ("cancel_id", "cancel_stamp", "means"),
+    [("", 0, "abc"), ("a", 0, "a"), ("", 20, "ab"), ("c", 10, "ac"), ("d", 0, ""), ("", 5, "")],
+)
+def test_which_goals_a_cancel_means(cancel_id: str, cancel_stamp: int, means: str) -> None:
+    goals = {"a": 10, "b": 20, "c": 30}
+    assert "".join(id for id, stamp in goals.items() if is_meant(cancel_id, cancel_stamp, id, stamp)) == means

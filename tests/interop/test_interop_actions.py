@@ -12,10 +12,16 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-STACKS = ("ours", "rospy", "roscpp")
+STACKS = ("ours", "asyncio", "rospy", "roscpp")
+OURS = {"ours", "asyncio"}
 Run = Callable[[str, str, str], "subprocess.Popen[str]"]
 
-PAIRS = [(server, client) for server in STACKS for client in STACKS if "ours" in (server, client)]
+PAIRS = [
+    (server, client)
+    for server in STACKS
+    for client in STACKS
+    if len(OURS & {server, client}) == 1 or server == client == "ours"
+]
 SAID = """\
 server True
 succeeds True SUCCEEDED reached 1
@@ -63,6 +69,7 @@ def run(request: pytest.FixtureRequest) -> Iterator[Run]:
     def start(stack: str, role: str, uri: str) -> subprocess.Popen[str]:
         command = {
             "ours": [sys.executable, str(HERE / "action_peer.py")],
+            "asyncio": [sys.executable, str(HERE / "action_peer_aio.py")],
             "rospy": ["/usr/bin/python3", str(HERE / "action_peer.py")],
             "roscpp": [str(request.getfixturevalue("cpp_action_peer"))] if stack == "roscpp" else [],
         }[stack]
