@@ -45,13 +45,12 @@ def start(master: str) -> Iterator[Start]:
 
 
 @pytest.fixture
-def person(start: Start) -> Callable[[float], None]:
+def person(start: Start, board: Board) -> Callable[[float], None]:
     """Puts a person before a running scanner, so many metres from it (the nearest leg is 0.15 m nearer)."""
     start(sys.executable, SCANNER, "__ns:=/sick_safetyscanners")
 
     def move(away: float) -> None:
-        point = f"{{x: {away}, y: 0.0}}"
-        start(BIN / "rostopic", "pub", "-1", "/sick_safetyscanners/person", "geometry_msgs/Point", point)
+        board.move_person((away, 0.0))
 
     return move
 
@@ -98,7 +97,7 @@ def test_buttons_move_the_led(start: Start, board: Board) -> None:
     wait_for_lit(board, 2)
     client = node(start, "move_led_client.py")
     # The client watches its buttons once it is in the graph and has found the service.
-    graph = [BIN / "rosnode", "list"]
+    graph: list[str | Path] = [BIN / "rosnode", "list"]
     while "/button_monitor" not in subprocess.run(graph, capture_output=True, text=True, check=True).stdout:
         assert client.poll() is None
     lit = 2

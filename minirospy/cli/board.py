@@ -1,36 +1,64 @@
-"""minirospy board: the virtual board as a picture, and its buttons and pins for scripts."""
+"""minirospy board: the virtual board as a picture, and its buttons, pins and person for scripts."""
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 import time
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.cli.command import Parser, run
 from minirospy.cli.verbs import Family, Verb
+from minirospy.errors import UsageError
 from minirospy.gpio.board import Board, BoardState
-from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Pull
+from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Position, Pull
+from minirospy.gpio.place import Place
+from minirospy.scanner import FIELDS, Circle
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
+    from rich.text import Text
 
 __all__ = ["Picture", "main", "render"]
 
-_PICTURES_A_SECOND = 20
+_LOOK_SECONDS = 0.05
+"""Between two looks at the board."""
+
+_STEP = 0.05
+"""How far a key moves the person, in metres; also the width of a place on the map, and half its height."""
+
+_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6
+"""What the map shows, in metres."""
+
+_START: Position = (0.6, 0.0)
+"""Where the person comes in."""
+
+_STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "right": (0.0, -_STEP)}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command; its exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if words[:1] in (["-b"], ["--board"]):
+        if len(words) == 1:
+            return run(_FAMILY.name, _missing_name)
+        # For what the verbs open, as the variable would be for a node.
+        os.environ["MINIROSPY_BOARD"] = words[1]
+        words = words[2:]
     if not words:
         return run(_FAMILY.name, _show)
     return _FAMILY.main(words)
 
 
+def _missing_name() -> int:
+    raise UsageError("-b needs the name of a board: minirospy board -b robot1")
+
+
 class Picture:
-    """What rich draws for a board: its lights, its buttons, and the other pins in use."""
+    """What rich draws for a board: its lights, its buttons, the person, and the other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state
@@ -60,12 +88,52 @@ class Picture:
             for number, pin in enumerate(self.state.pins)
             if number not in LEDS and number not in BUTTONS and pin != Pin()
         ]
+        person: list[str | Text] = []
+        if self.state.person:
+            person = [
+                "",
+                f"Person   {_where(self.state.person)}",
+                *_map(self.state.person, options.ascii_only),
+            ]
         yield Panel(
-            Group(lights, "", buttons, *(["", *others] if others else [])),
+            Group(lights, "", buttons, *person, *(["", *others] if others else [])),
             title=f"virtual board [{self.state.name}]".replace("[", "\\["),
             box=box.ASCII if options.ascii_only else box.ROUNDED,
             expand=False,
         )
+
+
+def _map(person: Position, ascii_only: bool) -> list[Text]:
+    """The floor before the scanner from above, the scanner at its lower edge: its two fields, and the person."""
+    from rich.text import Text
+
+    body = Circle(*person)
+    warning, protective, somebody, scanner = ("-", "=", "#", "^") if ascii_only else ("░", "▒", "█", "▲")
+    colour = {warning: "yellow", protective: "red", somebody: "bold bright_white", scanner: "bold"}
+    lines = []
+    for row in range(round(_MAP_AHEAD / _STEP / 2), -1, -1):
+        line = Text("         ")
+        for column in range(round(_MAP_ASIDE / _STEP), -round(_MAP_ASIDE / _STEP) - 1, -1):
+            x, y = 2 * row * _STEP, column * _STEP
+            away = math.hypot(x, y)
+            place = " "
+            if math.hypot(x - body.x, y - body.y) <= body.radius:
+                place = somebody
+            elif not row and not column:
+                place = scanner
+            elif away < FIELDS[1]:
+                place = protective
+            elif away < FIELDS[0]:
+                place = warning
+            line.append(place, colour.get(place, ""))
+        lines.append(line)
+    return lines
+
+
+def _where(person: Position) -> str:
+    ahead, left = person
+    side = "left" if left >= 0 else "right"
+    return f"{ahead:.2f} m ahead, {abs(left):.2f} m {side}; nearest {Circle(*person).distance:.2f} m"
 
 
 def render(state: BoardState) -> Picture:
@@ -83,22 +151,40 @@ def _show() -> int:
         from rich.text import Text
 
         keys = " and ".join(str(number) for number in range(1, len(BUTTONS) + 1))
-        hint = Text(f"keys {keys}: press or release a button; q: quit", style="dim")
-        live = Live(
-            get_renderable=lambda: Group(render(board.state()), hint),
-            console=Console(),
-            refresh_per_second=_PICTURES_A_SECOND,
+        hint = Text(
+            f"keys {keys}: press or release a button; arrows: move the person before the scanner, "
+            "p: send them away; q: quit",
+            style="dim",
         )
+        shown = board.state()
+        live = Live(Group(render(shown), hint), console=Console(), auto_refresh=False)
         with _Keys() as pressed, live:
             while (key := pressed.next()) not in {"q", "\x04"}:
-                if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
-                    pin = BUTTONS[int(key) - 1]
-                    (board.release if board.get(pin) else board.press)(pin)
+                _act(board, key)
+                if (state := board.state()) != shown:
+                    shown = state
+                    live.update(Group(render(shown), hint), refresh=True)
     return 0
+
+
+def _act(board: Board, key: str) -> None:
+    """Do what a key says."""
+    if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
+        pin = BUTTONS[int(key) - 1]
+        (board.release if board.get(pin) else board.press)(pin)
+    elif key == "p":
+        board.move_person(None if board.person else _START)
+    elif key in _STEPS:
+        person = board.person
+        ahead, left = _STEPS[key]
+        board.move_person((round(person[0] + ahead, 3), round(person[1] + left, 3)) if person else _START)
 
 
 class _Keys:
     """Single keys from the terminal, without Enter and without echo; none where stdin is no terminal."""
+
+    _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
+    _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
 
     def __init__(self) -> None:
         self._is_terminal = sys.stdin is not None and sys.stdin.isatty()
@@ -121,23 +207,31 @@ class _Keys:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
-        """The key that was typed, or "" after a moment."""
+        """The key that was typed (an arrow by its name), or "" after a moment."""
         if not self._is_terminal:
-            time.sleep(0.2)
+            time.sleep(_LOOK_SECONDS)
             return ""
         if sys.platform == "win32":
             import msvcrt
 
             if msvcrt.kbhit():
-                return msvcrt.getwch()
-            time.sleep(0.05)
+                key = msvcrt.getwch()
+                return self._WINDOWS_ARROWS.get(msvcrt.getwch(), "") if key in "\x00\xe0" else key
+            time.sleep(_LOOK_SECONDS)
             return ""
-        import os
         import select
 
-        ready, _, _ = select.select([sys.stdin], [], [], 0.2)
+        ready, _, _ = select.select([sys.stdin], [], [], _LOOK_SECONDS)
+        if not ready:
+            return ""
         # Past Python's buffer: what it holds, select does not see. No byte at all is the terminal's end.
-        return os.read(sys.stdin.fileno(), 1).decode("ascii", "replace") or "q" if ready else ""
+        key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+        if key != "\x1b":
+            return key or "q"
+        # A key that sends several bytes sends them at once.
+        ready, _, _ = select.select([sys.stdin], [], [], 0)
+        sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
+        return self._ARROWS.get(sequence[-1:], "")
 
 
 def _press(argv: Sequence[str]) -> None:
@@ -170,6 +264,37 @@ def _set(argv: Sequence[str]) -> None:
     options = parser.parse_args(argv)
     with Board() as board:
         board.set(options.pin, options.level)
+
+
+def _person(argv: Sequence[str]) -> None:
+    parser = Parser(
+        "minirospy board person",
+        description="Put a person before the simulated scanner, or send them away; alone: print where they are.",
+    )
+    parser.add_argument("ahead", nargs="?", help="metres ahead of the scanner, or `away`")
+    parser.add_argument("left", nargs="?", help="metres to its left (0)")
+    options = parser.parse_args(argv)
+    with Board() as board:
+        if options.ahead == "away" and options.left is None:
+            board.move_person(None)
+        elif options.ahead is not None:
+            try:
+                position = float(options.ahead), float(options.left or 0)
+            except ValueError:
+                parser.error(
+                    "metres are numbers: minirospy board person 0.3 0; or: minirospy board person away"
+                )
+            board.move_person(position)
+        else:
+            print(_where(board.person) if board.person else "away")
+
+
+def _boards(argv: Sequence[str]) -> None:
+    Parser("minirospy board boards", description="Print the names of the boards of this user.").parse_args(
+        argv
+    )
+    for name in Place.find().names():
+        print(name)
 
 
 def _watch(argv: Sequence[str]) -> None:
@@ -218,12 +343,14 @@ _FAMILY = Family(
     "minirospy board",
     "minirospy board shows the virtual board live; with a command it serves scripts. Pins are BCM numbers.",
     (
+        Verb("person", "put a person before the scanner: person 0.3 0, person away", _person),
         Verb("press", "push buttons: press 11", _press),
         Verb("release", "let go of buttons: release 11", _release),
         Verb("get", "print the level of pins: get 7", _get),
         Verb("set", "put a level on a pin: set 7 1", _set),
         Verb("watch", "print a line for each edge: watch 7", _watch),
         Verb("list", "print the pins", _list),
+        Verb("boards", "print the names of the boards", _boards),
     ),
-    "MINIROSPY_BOARD names the board (default: default).",
+    "Several boards, one for each robot: `minirospy board -b NAME ...`, and MINIROSPY_BOARD=NAME for its nodes.",
 )

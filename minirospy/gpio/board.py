@@ -1,4 +1,4 @@
-"""The virtual board for programs that play the world: press its buttons, look at its lights.
+"""The virtual board for programs that play the world: press its buttons, look at its lights, walk before its scanner.
 
 ::
 
@@ -20,18 +20,21 @@ from types import TracebackType
 
 from minirospy.errors import BoardError
 from minirospy.gpio.link import Edge, Link
-from minirospy.gpio.model import PINS, Force, Pin, Press, Release
+from minirospy.gpio.model import PINS, Force, Pin, Position, Press, Release
 from minirospy.gpio.place import Place
+from minirospy.gpio.protocol import MovePerson
 
 __all__ = ["Board", "BoardState", "Edge"]
 
 
 @dataclass(frozen=True)
 class BoardState:
-    """The board at one moment: ``pins[n]`` is BCM pin n (function, pull, level, ...)."""
+    """The board at one moment: ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person``: metres from the
+    scanner, ahead and to the left, None for nobody there."""
 
     name: str
     pins: tuple[Pin, ...]
+    person: Position | None = None
 
     def level(self, pin: int) -> int:
         """The level of ``pin``: 0 or 1."""
@@ -77,6 +80,15 @@ class Board:
         """Drive an input to ``level`` (0 or 1) from outside; set an output as a second program would."""
         self._link.call(Force(pin, level))
 
+    @property
+    def person(self) -> Position | None:
+        """Where the person before the scanner stands: metres ahead and to the left; None: nobody is there."""
+        return self._link.person
+
+    def move_person(self, position: Position | None) -> None:
+        """Put the person somewhere (see :attr:`person`), or send them away (None)."""
+        self._link.call(MovePerson(position))
+
     def get(self, pin: int) -> int:
         """The level of ``pin``: 0 or 1."""
         return self._link.levels[_checked(pin)]
@@ -87,7 +99,7 @@ class Board:
 
     def state(self) -> BoardState:
         """A snapshot that does not change any more."""
-        return BoardState(self.name, tuple(self._link.states))
+        return BoardState(self.name, tuple(self._link.states), self._link.person)
 
     def watch(self, pins: Iterable[int] | None = None, timeout: float | None = None) -> Iterator[Edge]:
         """The edges of ``pins`` (default: all) from this call on, as they come.

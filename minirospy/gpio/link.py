@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import BoardError
-from minirospy.gpio.model import Function, Operation, Pin, Setup, Write
+from minirospy.gpio.model import Function, Operation, Pin, Position, Setup, Write
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import (
     VERSION,
@@ -25,6 +25,8 @@ from minirospy.gpio.protocol import (
     Done,
     Hello,
     Message,
+    MovePerson,
+    PersonMoved,
     ProtocolError,
     Refused,
     Request,
@@ -90,10 +92,11 @@ class Link:
         self._connection: _Connection | None = _reach(place, lambda: False)
         self.states: list[Pin] = list(self._connection.pins)
         self.levels: list[int] = [pin.level for pin in self.states]
+        self.person = self._connection.person
         self._reader = threading.Thread(target=self._read, name="gpio-mirror", daemon=True)
         self._reader.start()
 
-    def call(self, operation: Operation | None, timeout: float = ANSWER_PATIENCE) -> None:
+    def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
         """Carry ``operation`` out; when this returns, the mirror shows it. None only waits for what was sent.
 
         Raises BoardError when the board refuses or does not answer within ``timeout`` seconds.
@@ -134,7 +137,7 @@ class Link:
         if threading.current_thread() is not self._reader:
             self._reader.join(CLOSE_PATIENCE)
 
-    def _send(self, operation: Operation | None) -> int:
+    def _send(self, operation: Operation | MovePerson | None) -> int:
         if self._closed:
             raise BoardError(f"the connection to the virtual board [{self._place.name}] is closed")
         if self._failure is not None:
@@ -185,6 +188,7 @@ class Link:
                 if pin not in self._mine:
                     edge = self._take(Changed(pin, state, state.level != self.states[pin].level, now))
                     edges += [edge] if edge else []
+            self.person = connection.person
             for _number, data in self._unacknowledged:
                 connection.send(data)
             self._connection = connection
@@ -200,7 +204,9 @@ class Link:
             if message.pin not in self._written:
                 self.levels[message.pin] = level
             return Edge(message.pin, level, message.time) if message.edge else None
-        if isinstance(message, Refused):
+        if isinstance(message, PersonMoved):
+            self.person = message.position
+        elif isinstance(message, Refused):
             self._refused[message.number] = message.why
             self._acknowledge(message.number)
         elif isinstance(message, Done):
@@ -222,13 +228,14 @@ class Link:
 
 
 class _Connection:
-    """A socket on which the server has said Welcome: ``pins`` are those that it told of."""
+    """A socket on which the server has said Welcome: ``pins`` and ``person`` are what it told."""
 
-    def __init__(self, link: socket.socket, stream: Stream, pins: list[Pin], more: list[Message]) -> None:
+    def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link
         self._stream = stream
         self._more = more
-        self.pins = pins
+        self.pins: list[Pin] = welcome.pins
+        self.person: Position | None = welcome.person
 
     def send(self, data: bytes) -> None:
         # A server that died is noticed, and replaced, by the reader.
@@ -304,7 +311,7 @@ def _connect(place: Place) -> _Connection | None:
     if not isinstance(welcome, Welcome) or welcome.version != VERSION:
         link.close()
         raise BoardError(f"the virtual board [{place.name}] is in use by another version of minirospy")
-    return _Connection(link, stream, welcome.pins, more)
+    return _Connection(link, stream, welcome, more)
 
 
 def _start_server(place: Place) -> subprocess.Popen[bytes]:

@@ -2,11 +2,12 @@
 
 A pin is an input or an output. An output's level is its latch; an input's is what the world drives it to
 (a pressed button, a jumper wire), else its pull resistor, else 0. The latch outlives the direction and the
-process that wrote it, as on a Raspberry Pi.
+process that wrote it, as on a Raspberry Pi. Before the board stands a scanner, and perhaps a person.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
@@ -22,6 +23,7 @@ __all__ = [
     "Operation",
     "OperationError",
     "Pin",
+    "Position",
     "Press",
     "Pull",
     "Release",
@@ -108,6 +110,9 @@ class Force(NamedTuple):
 
 Operation = Setup | Write | Press | Release | Force
 
+Position = tuple[float, float]
+"""Metres from the scanner: ahead of it, and to its left."""
+
 
 class Change(NamedTuple):
     """``pin`` is now ``state``; ``edge`` says whether its level changed."""
@@ -118,15 +123,16 @@ class Change(NamedTuple):
 
 
 class OperationError(ValueError):
-    """An operation with a pin, level, function or pull that does not exist."""
+    """An operation with a pin, level, function, pull or position that does not exist."""
 
 
 class BoardModel:
-    """All the pins of one board."""
+    """All the pins of one board, and the person before it."""
 
-    def __init__(self, pins: Sequence[Pin] | None = None) -> None:
+    def __init__(self, pins: Sequence[Pin] | None = None, person: Position | None = None) -> None:
         fresh = [Pin(world=0 if number in BUTTONS else None) for number in range(PINS)]
         self.pins: list[Pin] = list(pins) if pins is not None else fresh
+        self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
         """Carry one operation out whole; the pins that differ. Raises OperationError and changes nothing."""
@@ -152,6 +158,14 @@ class BoardModel:
                 self.pins[pin] = state
                 changes.append(Change(pin, state, state.level != before.level))
         return changes
+
+    def move_person(self, position: Position | None) -> bool:
+        """Put the person there, None being out of the room; whether that is elsewhere. Raises OperationError."""
+        if position is not None and not all(map(math.isfinite, position)):
+            raise OperationError(f"a position is two lengths in metres, not {position}")
+        moved = position != self.person
+        self.person = position
+        return moved
 
     def _set_up(self, pin: int, function: int, pull: int, initial: int | None) -> dict[int, Pin]:
         try:

@@ -47,6 +47,10 @@ class Place:
         folder = Path(given) if given else _usual_folder()
         return cls(name, folder.absolute())
 
+    def names(self) -> list[str]:
+        """The boards of this folder, sorted."""
+        return sorted(path.name.removesuffix(".lock") for path in self.folder.glob("*.lock"))
+
     def prepare(self) -> None:
         """Make the folder; raises BoardError when it cannot be made or others may write to it."""
         try:
@@ -82,7 +86,7 @@ class Place:
 
     @property
     def state_path(self) -> Path:
-        """The pins as the last server left them."""
+        """The board as the last server left it."""
         return self.folder / f"{self.name}.pins"
 
     @property

@@ -1,8 +1,8 @@
 """Messages between a board's server and its clients <-> bytes (msgpack). Pure.
 
 Each message is an array: its kind's number, then its fields. A client opens with Hello and then sends
-Requests, numbered upwards; the server opens with Welcome (all pins), sends Changed to everybody when pins
-change, and Done to a client for the requests it carried out, after the Changed that they caused.
+Requests, numbered upwards; the server opens with Welcome (the whole board), sends Changed and PersonMoved to
+everybody when something changes, and Done to a client for the requests it carried out, after what they caused.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from minirospy.gpio.model import (
     Function,
     Operation,
     Pin,
+    Position,
     Press,
     Pull,
     Release,
@@ -31,17 +32,19 @@ __all__ = [
     "Done",
     "Hello",
     "Message",
+    "MovePerson",
+    "PersonMoved",
     "ProtocolError",
     "Refused",
     "Request",
     "Stream",
     "Welcome",
-    "decode_pins",
-    "encode_pins",
+    "decode_board",
+    "encode_board",
     "serialize",
 ]
 
-VERSION = 1
+VERSION = 2
 _MAX_BUFFER = 1 << 20
 
 
@@ -56,18 +59,25 @@ class Hello(NamedTuple):
     token: str
 
 
+class MovePerson(NamedTuple):
+    """The person goes to a position; None is out of the room."""
+
+    position: Position | None
+
+
 class Request(NamedTuple):
     """Carry ``operation`` out; None asks only for the Done."""
 
     number: int
-    operation: Operation | None
+    operation: Operation | MovePerson | None
 
 
 class Welcome(NamedTuple):
-    """The server's first message: every pin."""
+    """The server's first message: every pin, and where the person is."""
 
     version: int
     pins: list[Pin]
+    person: Position | None
 
 
 class Changed(NamedTuple):
@@ -77,6 +87,12 @@ class Changed(NamedTuple):
     state: Pin
     edge: bool
     time: float
+
+
+class PersonMoved(NamedTuple):
+    """The person is now at ``position``."""
+
+    position: Position | None
 
 
 class Done(NamedTuple):
@@ -92,10 +108,10 @@ class Refused(NamedTuple):
     why: str
 
 
-Message = Hello | Request | Welcome | Changed | Done | Refused
+Message = Hello | Request | Welcome | Changed | Done | Refused | PersonMoved
 
-_KINDS: tuple[type[Message], ...] = (Hello, Request, Welcome, Changed, Done, Refused)
-_OPERATIONS: tuple[type[Operation], ...] = (Setup, Write, Press, Release, Force)
+_KINDS: tuple[type[Message], ...] = (Hello, Request, Welcome, Changed, Done, Refused, PersonMoved)
+_OPERATIONS: tuple[type[Operation | MovePerson], ...] = (Setup, Write, Press, Release, Force, MovePerson)
 _KIND_NUMBER = {kind: number for number, kind in enumerate(_KINDS)}
 _OPERATION_NUMBER = {kind: number for number, kind in enumerate(_OPERATIONS)}
 
@@ -127,17 +143,17 @@ class Stream:
             raise ProtocolError(f"not a message of a board: {error}") from error
 
 
-def encode_pins(pins: list[Pin]) -> bytes:
-    """All pins as one block, for the file that keeps them."""
-    return serialize(Welcome(VERSION, pins))
+def encode_board(pins: list[Pin], person: Position | None) -> bytes:
+    """A board as one block, for the file that keeps it."""
+    return serialize(Welcome(VERSION, pins, person))
 
 
-def decode_pins(block: bytes) -> list[Pin]:
-    """The pins of :func:`encode_pins`; raises ProtocolError."""
+def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
+    """The pins and the person of :func:`encode_board`; raises ProtocolError."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
-        raise ProtocolError("not the pins of a board")
-    return messages[0].pins
+        raise ProtocolError("not a saved board")
+    return messages[0].pins, messages[0].person
 
 
 def _message(item: Any) -> Message:
@@ -150,14 +166,23 @@ def _request(number: Any, item: Any) -> Request:
     operation = _OPERATIONS[_natural(item[0])](*item[1:])
     if isinstance(operation, Write):
         operation = Write(tuple((pin, level) for pin, level in operation.levels))
+    elif isinstance(operation, MovePerson):
+        operation = MovePerson(_position(operation.position))
     return Request(_natural(number), operation)
 
 
-def _welcome(version: Any, items: Any) -> Welcome:
+def _welcome(version: Any, items: Any, person: Any = None) -> Welcome:
     pins = [_pin(*item) for item in items]
     if len(pins) != PINS:
         raise ProtocolError(f"{len(pins)} pins instead of {PINS}")
-    return Welcome(_natural(version), pins)
+    return Welcome(_natural(version), pins, _position(person))
+
+
+def _position(item: Any) -> Position | None:
+    if item is None:
+        return None
+    ahead, left = item
+    return float(ahead), float(left)
 
 
 def _pin(function: Any, pull: Any, world: Any, latch: Any) -> Pin:
@@ -177,5 +202,6 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda pin, state, edge, time: Changed(_natural(pin), _pin(*state), bool(edge), float(time)),
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
+    lambda position: PersonMoved(_position(position)),
 )
 """In the order of _KINDS."""

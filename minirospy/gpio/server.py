@@ -1,7 +1,7 @@
 """The process that holds one board: `python -m minirospy.gpio.server FOLDER NAME`.
 
 The first client starts it and it ends by itself shortly after the last one left; a lock file lets exactly one
-live. The pins are written to a file when they change, so the next server goes on where this one stopped.
+live. The board is written to a file when it changes, so the next server goes on where this one stopped.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from minirospy.gpio.model import BoardModel, OperationError, Pin
+from minirospy.gpio.model import BoardModel, Operation, OperationError
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import (
     VERSION,
@@ -23,13 +23,15 @@ from minirospy.gpio.protocol import (
     Done,
     Hello,
     Message,
+    MovePerson,
+    PersonMoved,
     ProtocolError,
     Refused,
     Request,
     Stream,
     Welcome,
-    decode_pins,
-    encode_pins,
+    decode_board,
+    encode_board,
     serialize,
 )
 
@@ -61,7 +63,7 @@ class _Server:
     def __init__(self, place: Place) -> None:
         self._place = place
         self._token = "" if place.uses_unix_socket else secrets.token_hex(16)
-        self._model = BoardModel(_saved(place))
+        self._model = _saved(place)
         self._clients: set[_Client] = set()
         self._abandoned = asyncio.Event()
         self._saving: asyncio.TimerHandle | None = None
@@ -94,7 +96,7 @@ class _Server:
         self._clients.add(client)
         if self._leaving is not None:
             self._leaving.cancel()
-        client.send(serialize(Welcome(VERSION, self._model.pins)))
+        client.send(serialize(Welcome(VERSION, self._model.pins, self._model.person)))
 
     def leave(self, client: _Client) -> None:
         self._clients.discard(client)
@@ -106,18 +108,22 @@ class _Server:
         if request.operation is None:
             return Done(request.number)
         try:
-            changes = self._model.apply(request.operation)
+            news = b"".join(map(serialize, self._apply(request.operation)))
         except OperationError as error:
             return Refused(request.number, str(error))
-        if changes:
-            now = time.time()
-            changed = [Changed(change.pin, change.state, change.edge, now) for change in changes]
-            news = b"".join(serialize(message) for message in changed)
+        if news:
             for client in list(self._clients):
                 client.send(news)
             if self._saving is None:
                 self._saving = asyncio.get_running_loop().call_later(SAVE_AFTER, self._save)
         return Done(request.number)
+
+    def _apply(self, operation: Operation | MovePerson) -> list[Message]:
+        """What everybody is to hear. Raises OperationError."""
+        if isinstance(operation, MovePerson):
+            return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
+        now = time.time()
+        return [Changed(*change, now) for change in self._model.apply(operation)]
 
     def _wait_for_clients(self) -> None:
         if self._leaving is not None:
@@ -130,7 +136,7 @@ class _Server:
             self._saving = None
         # A removed folder (a test's, a cleaned /tmp) is no reason to fail the clients.
         with contextlib.suppress(OSError):
-            _write_private(self._place.state_path, encode_pins(self._model.pins))
+            _write_private(self._place.state_path, encode_board(self._model.pins, self._model.person))
 
 
 class _Client(asyncio.Protocol):
@@ -184,11 +190,11 @@ class _Client(asyncio.Protocol):
             self._transport.abort()
 
 
-def _saved(place: Place) -> list[Pin] | None:
+def _saved(place: Place) -> BoardModel:
     try:
-        return decode_pins(place.state_path.read_bytes())
+        return BoardModel(*decode_board(place.state_path.read_bytes()))
     except (OSError, ProtocolError):
-        return None
+        return BoardModel()
 
 
 def _write_private(path: Path, data: bytes) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -38,7 +42,7 @@ def test_set_and_list(capsys: pytest.CaptureFixture[str]) -> None:
         (["press", "x"], 2, "invalid int value: 'x'"),
         (["press"], 2, "the following arguments are required: pin"),
         (["set", "7", "2"], 2, "invalid choice: 2"),
-        (["pres", "7"], 2, "did you mean press?"),
+        (["presss", "7"], 2, "did you mean press?"),
     ],
 )
 def test_complaints(
@@ -103,3 +107,94 @@ def test_a_real_raspberry_pi_is_told_of_the_real_library(
     assert model_name(file) == "Raspberry Pi 4 Model B Rev 1.4"
     warn_of_missing_library(file)
     assert "`pip install minirospy[pi]`" in capsys.readouterr().err
+
+
+def test_the_person(capsys: pytest.CaptureFixture[str]) -> None:
+    words = (["person"], ["person", "0.3", "-0.1"], ["person"], ["person", "away"], ["person"])
+    assert [main(line) for line in words] == [0] * 5
+    assert capsys.readouterr().out.splitlines() == [
+        "away",
+        "0.30 m ahead, 0.10 m right; nearest 0.17 m",
+        "away",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "complaint"),
+    [
+        (["person", "here"], 2, "metres are numbers"),
+        (["person", "away", "0"], 2, "metres are numbers"),
+        (["person", "nan"], 1, "a position is two lengths in metres"),
+        (["-b"], 2, "-b needs the name of a board"),
+        (["-b", "../x", "list"], 1, "the board's name [../x]"),
+    ],
+)
+def test_complaints_about_persons_and_boards(
+    words: list[str], status: int, complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == status
+    assert complaint in capsys.readouterr().err
+
+
+def test_several_boards(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    own = os.environ["MINIROSPY_BOARD"]
+    for words in (["press", "11"], ["-b", own + "-b", "get", "11"], ["-b", own, "get", "11"], ["boards"]):
+        assert main(words) == 0
+    monkeypatch.setenv("MINIROSPY_BOARD", own)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["0", "1"]
+    assert {own, own + "-b"} <= set(lines[2:])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_the_picture_of_a_person(encoding: str) -> None:
+    paper = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    with Board() as board:
+        board.move_person((0.5, 0.0))
+        Console(file=paper, width=80).print(render(board.state()))
+    paper.seek(0)
+    lines = paper.read().splitlines()
+    paper.close()
+    body, scanner = ("█", "▲") if encoding == "utf-8" else ("#", "^")
+    (top, *_, bottom) = [number for number, line in enumerate(lines) if body * 3 in line]
+    (foot,) = [number for number, line in enumerate(lines) if scanner in line]
+    # 0.1 m a line: the person's body reaches from 0.4 m to 0.6 m.
+    assert (foot - top, foot - bottom) == (6, 4)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal")
+def test_keys_press_buttons_and_move_the_person() -> None:
+    import pty
+
+    ours, theirs = pty.openpty()
+    code = "import sys; from minirospy.cli.board import main; sys.exit(main([]))"
+    with Board() as board:
+        child = subprocess.Popen([sys.executable, "-c", code], stdin=theirs, stdout=theirs, stderr=theirs)
+        os.close(theirs)
+
+        def type_until(keys: bytes, condition: Callable[[], bool]) -> None:
+            os.write(ours, keys)
+            while not condition():
+                # What it draws has to be read, or it waits; there is something to read after each change.
+                os.read(ours, 65536)
+
+        os.read(ours, 1)
+        type_until(b"1", lambda: board.get(11) == 1)
+        type_until(b"p", lambda: board.person == (0.6, 0.0))
+        type_until(b"\x1b[B\x1b[B\x1b[D", lambda: board.person == (0.5, 0.05))
+        type_until(b"\x1b[A\x1b[C", lambda: board.person == (0.55, 0.0))
+        type_until(b"p", lambda: board.person is None)
+        type_until(b"1", lambda: board.get(11) == 0)
+        os.write(ours, b"q")
+        drawing = threading.Thread(target=_read_all, args=(ours,))
+        drawing.start()
+        assert child.wait(10) == 0
+        drawing.join()
+        os.close(ours)
+
+
+def _read_all(terminal: int) -> None:
+    """Read until the other side is closed, which Linux tells as an error."""
+    with contextlib.suppress(OSError):
+        while os.read(terminal, 65536):
+            pass

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -118,6 +120,15 @@ def test_any_operation_is_carried_out_whole_or_refused(several: list[Operation])
             assert change.state == board.pins[change.pin]
             assert change.edge == (change.state.level != before[change.pin].level)
             assert change.state.level in {0, 1}
+
+
+def test_a_person_comes_walks_and_leaves() -> None:
+    board = BoardModel()
+    assert board.person is None
+    assert [board.move_person(where) for where in ((0.5, 0.0), (0.5, 0.0), None)] == [True, False, True]
+    with pytest.raises(OperationError, match="a position is two lengths in metres"):
+        board.move_person((math.nan, 0.0))
+    assert board.person is None
 
 
 @pytest.mark.parametrize("pin", BUTTONS)

@@ -13,13 +13,15 @@ from minirospy.gpio.protocol import (
     Done,
     Hello,
     Message,
+    MovePerson,
+    PersonMoved,
     ProtocolError,
     Refused,
     Request,
     Stream,
     Welcome,
-    decode_pins,
-    encode_pins,
+    decode_board,
+    encode_board,
     serialize,
 )
 
@@ -30,7 +32,12 @@ MESSAGES: list[Message] = [
     Request(3, Write(((7, 1), (6, 0)))),
     Request(4, Press(11)),
     Request(5, Force(3, 1)),
-    Welcome(VERSION, BoardModel().pins),
+    Welcome(VERSION, BoardModel().pins, None),
+    Welcome(VERSION, BoardModel().pins, (0.5, -1.0)),
+    Request(8, MovePerson((0.5, 0.0))),
+    Request(9, MovePerson(None)),
+    PersonMoved((0.5, 0.0)),
+    PersonMoved(None),
     Changed(7, BoardModel().pins[7], True, 12.5),
     Done(5),
     Refused(6, "there is no pin 99"),
@@ -54,10 +61,10 @@ def test_round_trip_in_pieces_of_any_size(size: int) -> None:
     assert got == MESSAGES
 
 
-def test_pins_are_kept_and_read_back() -> None:
+def test_a_board_is_kept_and_read_back() -> None:
     model = BoardModel()
     model.apply(Setup(7, 0, initial=1))
-    assert decode_pins(encode_pins(model.pins)) == model.pins
+    assert decode_board(encode_board(model.pins, (0.3, 0.0))) == (model.pins, (0.3, 0.0))
 
 
 @given(st.binary(max_size=60))
@@ -68,7 +75,9 @@ def test_any_bytes_are_messages_or_refused(data: bytes) -> None:
         pass
 
 
-@pytest.mark.parametrize("block", [b"", b"\x00", b"{}", serialize(Done(1)), serialize(Welcome(VERSION, []))])
-def test_a_spoilt_file_of_pins_is_refused(block: bytes) -> None:
+@pytest.mark.parametrize(
+    "block", [b"", b"\x00", b"{}", serialize(Done(1)), serialize(Welcome(VERSION, [], None))]
+)
+def test_a_spoilt_file_of_a_board_is_refused(block: bytes) -> None:
     with pytest.raises(ProtocolError):
-        decode_pins(block)
+        decode_board(block)

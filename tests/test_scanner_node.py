@@ -1,0 +1,99 @@
+"""The simulated scanner as a node: what it publishes, and the ways to move the person before it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from geometry_msgs.msg import Point
+from minirospy_msgs.srv import MovePerson
+from sensor_msgs.msg import LaserScan
+from sick_safetyscanners.msg import OutputPathsMsg, RawMicroScanDataMsg
+
+from minirospy import Node
+from minirospy.gpio.board import Board
+from minirospy.scanner import BEAMS
+
+NODE = Path(__file__).parents[1] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
+SECONDS = 20.0
+FREE, WARNING, PROTECTIVE = [True, True], [True, False], [False, False]
+
+
+@pytest.fixture
+def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
+    node = subprocess.Popen(
+        [sys.executable, NODE, "__ns:=/sick_safetyscanners", "_intrusion_data:=false"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    yield node
+    node.terminate()
+    said, _ = node.communicate(timeout=10)
+    assert "Traceback" not in said
+    assert node.returncode == 0
+
+
+async def until_paths_are(node: Node, wanted: list[bool]) -> None:
+    async for paths in node.subscribe("output_paths", OutputPathsMsg, queue_size=1):
+        if list(paths.status[:2]) == wanted:
+            return
+
+
+def test_whoever_moves_the_person_everybody_sees_them(scanner: subprocess.Popen[str]) -> None:
+    async def main() -> None:
+        with Board() as board:
+            async with Node("test", namespace="sick_safetyscanners", rosout=False) as node:
+                await until_paths_are(node, FREE)
+                board.move_person((0.5, 0.0))
+                await until_paths_are(node, WARNING)
+                await node.publish("person", Point(x=0.3))
+                await until_paths_are(node, PROTECTIVE)
+                assert board.person == (0.3, 0.0)
+                answer = await node.call("move_person", MovePerson, True, 2.0, -1.0)
+                assert (answer.success, answer.message) == (True, "the person is at x 2.00 m, y -1.00 m")
+                await until_paths_are(node, FREE)
+                answer = await node.call("move_person", MovePerson, True, 50.0, 0.0)
+                assert (answer.success, answer.message) == (
+                    False,
+                    "x and y are metres, within 40 m of the scanner",
+                )
+                assert board.person == (2.0, -1.0)
+                assert (await node.call("move_person", MovePerson, present=False)).success
+                assert board.person is None
+                await node.publish("person", Point(x=0.3))
+                await until_paths_are(node, PROTECTIVE)
+                await node.publish("person", Point(x=math.nan))
+                await until_paths_are(node, FREE)
+
+    asyncio.run(asyncio.wait_for(main(), SECONDS))
+
+
+def test_the_raw_data_tell_what_the_scan_tells(scanner: subprocess.Popen[str]) -> None:
+    async def main() -> None:
+        with Board() as board:
+            # Beside the reflector on the wall ahead.
+            board.move_person((0.0, 0.3))
+            async with Node("test", namespace="sick_safetyscanners", rosout=False) as node:
+                await until_paths_are(node, PROTECTIVE)
+                raw = await node.wait_for_message("raw_data", RawMicroScanDataMsg)
+                scan = await node.wait_for_message("scan", LaserScan)
+        values, points = raw.derived_values, raw.measurement_data.scan_points
+        assert raw.measurement_data.number_of_beams == values.number_of_beams == len(points) == BEAMS
+        assert math.radians(values.start_angle) == pytest.approx(scan.angle_min)
+        assert values.scan_time == 30
+        assert min(point.distance for point in points if point.valid) == pytest.approx(150, abs=25)
+        assert min(scan.ranges) == pytest.approx(0.15, abs=0.025)
+        assert [point.infinite for point in points] == [math.isinf(distance) for distance in scan.ranges]
+        assert any(point.reflector for point in points)
+        assert list(raw.general_system_state.safe_cut_off_path[:2]) == PROTECTIVE
+        assert list(raw.application_data.outputs.evaluation_path_outputs_eval_out[:2]) == PROTECTIVE
+        # Switched off by its parameter.
+        assert raw.intrusion_data.data == []
+
+    asyncio.run(asyncio.wait_for(main(), SECONDS))
