@@ -108,9 +108,12 @@ def test_goals_end_the_same_whoever_serves_and_whoever_asks(
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("client", STACKS)
-def test_over_our_master(run: Run, client: str, master: str) -> None:
-    serving = run("ours", "serve", master)
+@pytest.mark.parametrize(
+    ("server", "client"),
+    [*(("ours", stack) for stack in STACKS), ("asyncio", "ours"), ("asyncio", "asyncio")],
+)
+def test_over_our_master(run: Run, server: str, client: str, master: str) -> None:
+    serving = run(server, "serve", master)
     assert serving.stdout
     assert any(line.strip() == "ready" for line in serving.stdout)
     output, errors = run(client, "ask", master).communicate(timeout=100)
