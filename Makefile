@@ -8,14 +8,16 @@ BIN := $(VENV)/bin
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test interop lint bench clean help
+.PHONY: demo test interop lint guard bench fuzz clean help
 
 help:
 	@echo "make demo     the workshop's button lights its LED, on the virtual board"
 	@echo "make test     every test"
 	@echo "make interop  against Debian's real ROS 1, which it installs (needs apt-get and root)"
 	@echo "make lint     ruff and mypy"
+	@echo "make guard    whether it has become slower"
 	@echo "make bench    the benchmarks"
+	@echo "make fuzz     ten minutes of anything at all, sent to a master"
 	@echo "make clean    remove what the above made"
 
 demo: $(STAMP)
@@ -28,9 +30,15 @@ interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
 
+guard: $(STAMP)
+	@$(BIN)/python benchmarks/guard.py
+
 bench: $(STAMP)
 	@$(BIN)/python benchmarks/run.py
 	@$(BIN)/python benchmarks/messages.py
+
+fuzz: $(STAMP)
+	@$(BIN)/python tests/fuzz.py
 
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .

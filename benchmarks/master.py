@@ -1,7 +1,9 @@
 """The master under load, ours beside real rosmaster: CPU of a registration, memory of a node, look-ups.
 
     python benchmarks/master.py                           # ours, and rosmaster where it is installed
-    python benchmarks/master.py --sizes 100,1000,10000 --stacks ours
+    python benchmarks/master.py --sizes 100,1000,10000 --stacks "ours,ours without rosout"
+
+Ours runs under the interpreter that runs this file: rosmaster's (/usr/bin/python3) makes a fair comparison.
 
 Fake nodes of three publications and three subscriptions register by raw XML-RPC from one client, as in the case
 `master` of the workshop's benchmark; a dummy answers for all of them. CPU and memory are the master's alone.
@@ -26,11 +28,13 @@ from xmlrpc.client import ServerProxy, dumps
 
 import psutil
 
-BIN = Path(sys.executable).parent
+from minirospy.runtime.rpc_client import RpcClient
+
+OURS = [sys.executable, "-m", "minirospy.cli.master", "-q"]
 STACKS = {
-    "ours": [str(BIN / "roscore"), "--no-rosout", "-q"],
-    "ours without journal": [str(BIN / "roscore"), "--no-rosout", "--no-journal", "-q"],
-    "ours with rosout": [str(BIN / "roscore"), "-q"],
+    "ours": OURS,
+    "ours without journal": [*OURS, "--no-journal"],
+    "ours without rosout": [*OURS, "--no-rosout"],
     "rosmaster": ["/usr/bin/rosmaster", "--core"],
 }
 ANSWER = (
@@ -147,6 +151,10 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
         with ServerProxy(f"http://localhost:{port}") as proxy:
             times = [_timed(proxy.getSystemState, "/bench") for _ in range(3)]
             figures[f"getSystemState_by_xmlrpc.client_ms_{size}"] = statistics.median(times) * 1e3
+        ours = RpcClient(f"http://localhost:{port}", timeout=60.0)
+        times = [_timed(ours.call, "getSystemState", "/bench") for _ in range(5)]
+        figures[f"getSystemState_by_minirospy_ms_{size}"] = statistics.median(times) * 1e3
+        ours.close()
     figures |= _dead_subscribers(port)
     return figures
 

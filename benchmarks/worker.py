@@ -1,117 +1,247 @@
-"""One process of a benchmark: `worker.py ROLE`. Uses only the rospy API, so it runs on any rospy."""
+"""One process of a benchmark: `worker.py ROLE name=value ...`. Only the rospy API, so it runs on any rospy.
+
+A worker prints a line of JSON when it is ready, one when it has measured, and one with what it cost when it has
+been told to stop; the lines "go" and "stop" come to it on its standard input.
+"""
 
 import json
 import sys
 import threading
 import time
 
-import rospy
-from sensor_msgs.msg import Image
-from std_msgs.msg import UInt64
-from std_srvs.srv import SetBool, SetBoolResponse
+SCAN_POINTS = 1651
+IMAGES = {"vga": (640, 480), "6mb": (1920, 1080)}
 
 
 def say(**result):
     print(json.dumps(result), flush=True)
 
 
+def heard(word):
+    """Wait for a line; a driver that has gone ends the worker."""
+    for line in sys.stdin:
+        if line.strip() == word:
+            return
+    sys.exit("the driver is gone")
+
+
 def wait_until(condition):
-    end = time.monotonic() + 10
+    end = time.monotonic() + 20
     while not condition():
         if time.monotonic() > end:
-            sys.exit("the other process did not come")
+            sys.exit("the others did not come")
         time.sleep(0.005)
 
 
-def echo():
-    """Sends each ping back; offers a service."""
-    pong = rospy.Publisher("bench_pong", UInt64, queue_size=1, tcp_nodelay=True)
-    rospy.Subscriber("bench_ping", UInt64, pong.publish, tcp_nodelay=True)
-    rospy.Service("bench_service", SetBool, lambda request: SetBoolResponse(request.data, ""))
+def stop(cpu_start):
+    heard("stop")
+    say(cpu=time.process_time() - cpu_start)
+
+
+def start(options):
+    import rospy
+
+    rospy.init_node("bench_start")
+    say(ms=1000 * (time.monotonic() - float(options["begin"])))
+
+
+def message_of(kind):
+    if kind == "small":
+        from std_msgs.msg import UInt64
+
+        return UInt64()
+    if kind == "scan":
+        from sensor_msgs.msg import LaserScan
+
+        scan = LaserScan(range_max=40.0, angle_increment=4.8 / SCAN_POINTS)
+        scan.ranges = [1.0 + 0.01 * point for point in range(SCAN_POINTS)]
+        scan.intensities = [100.0 + point for point in range(SCAN_POINTS)]
+        return scan
+    from sensor_msgs.msg import Image
+
+    width, height = IMAGES[kind]
+    return Image(height=height, width=width, encoding="rgb8", step=3 * width, data=bytes(3 * width * height))
+
+
+def reader_of(kind):
+    """What a callback does with a message."""
+    if kind == "small":
+        return lambda message: message.data
+    if kind == "scan":
+        return lambda message: min(message.ranges)
+    return lambda message: (len(message.data), message.data[-1])
+
+
+def talk(options):
+    """Publishes one kind of message: as fast as it can, or ``hz`` times a second."""
+    import rospy
+
+    rospy.init_node("bench_talker")
+    kind, hz, seconds = options["kind"], float(options["hz"]), float(options["seconds"])
+    message = message_of(kind)
+    publisher = rospy.Publisher("bench", type(message), queue_size=1000 if kind in ("small", "scan") else 2)
+    wait_until(lambda: publisher.get_num_connections() >= int(options["listeners"]))
     say(ready=True)
-    sys.stdin.readline()
+    heard("go")
+    cpu_start, due = time.process_time(), time.monotonic()
+    end, published = due + seconds, 0
+    while time.monotonic() < end:
+        if hz:
+            due += 1 / hz
+            time.sleep(max(0.0, due - time.monotonic()))
+            if kind == "small":
+                message.data = time.monotonic_ns()
+            else:
+                message.header.stamp = rospy.Time.from_sec(time.time())
+        publisher.publish(message)
+        published += 1
+    say(published=published)
+    stop(cpu_start)
 
 
-def ping():
-    """Round trips of a small message, one after the other; then service calls and parameters."""
-    times = []
-    done = threading.Event()
-    sent = [0.0]
-    count = 3000
+def listen(options):
+    """Counts what comes, and how late."""
+    import rospy
 
-    def on_pong(message):
-        times.append(time.perf_counter() - sent[0])
+    rospy.init_node("bench_listener_" + options["id"])
+    kind, paced, seconds = options["kind"], float(options["hz"]), float(options["seconds"])
+    read = reader_of(kind)
+    count, late = [0], []
+
+    def on_message(message):
+        if paced and kind == "small":
+            late.append((time.monotonic_ns() - message.data) / 1000)
+        elif paced:
+            late.append(1e6 * (time.time() - message.header.stamp.to_sec()))
+        read(message)
+        count[0] += 1
+
+    rospy.Subscriber("bench", type(message_of(kind)), on_message, tcp_nodelay=bool(paced))
+    say(ready=True)
+    heard("go")
+    cpu_start = time.process_time()
+    wait_until(lambda: count[0])
+    begin, before = time.monotonic(), count[0]
+    time.sleep(seconds)
+    per_second = (count[0] - before) / (time.monotonic() - begin)
+    seen = -1
+    while seen != count[0]:
+        seen = count[0]
+        time.sleep(0.5)
+    say(per_s=per_second, delivered=seen, late_us=late)
+    stop(cpu_start)
+
+
+def echo(_options):
+    """Sends each ping back."""
+    import rospy
+    from std_msgs.msg import UInt64
+
+    rospy.init_node("bench_echo")
+    pong = rospy.Publisher("bench_pong", UInt64, queue_size=1)
+    rospy.Subscriber("bench_ping", UInt64, pong.publish, tcp_nodelay=True)
+    say(ready=True)
+    heard("go")
+    stop(time.process_time())
+
+
+def ping(options):
+    """Round trips of a small message: each pong's callback sends the next ping."""
+    import rospy
+    from std_msgs.msg import UInt64
+
+    rospy.init_node("bench_ping")
+    times, sent, done = [], [0], threading.Event()
+    count = int(options["count"])
+    ball = UInt64()
+
+    def serve():
+        sent[0] = time.perf_counter_ns()
+        publisher.publish(ball)
+
+    def on_pong(_message):
+        times.append((time.perf_counter_ns() - sent[0]) / 1000)
         if len(times) == count:
             done.set()
         else:
             serve()
 
-    def serve():
-        sent[0] = time.perf_counter()
-        publisher.publish(UInt64(len(times)))
-
-    publisher = rospy.Publisher("bench_ping", UInt64, queue_size=1, tcp_nodelay=True)
+    publisher = rospy.Publisher("bench_ping", UInt64, queue_size=1)
     subscriber = rospy.Subscriber("bench_pong", UInt64, on_pong, tcp_nodelay=True)
     wait_until(lambda: publisher.get_num_connections() and subscriber.get_num_connections())
+    say(ready=True)
+    heard("go")
+    cpu_start = time.process_time()
     serve()
-    if not done.wait(30):
+    if not done.wait(60):
         sys.exit("a ping was lost")
-    rospy.wait_for_service("bench_service", 10)
+    say(us=times[count // 10 :])
+    stop(cpu_start)
+
+
+def serve(_options):
+    """Offers a service, and keeps a latched message."""
+    import rospy
+    from std_msgs.msg import UInt64
+    from std_srvs.srv import SetBool, SetBoolResponse
+
+    rospy.init_node("bench_server")
+    rospy.Service("bench_service", SetBool, lambda request: SetBoolResponse(request.data, "ok"))
+    publisher = rospy.Publisher("bench_latched", UInt64, queue_size=1, latch=True)
+    publisher.publish(UInt64(7))
+    say(ready=True)
+    heard("go")
+    stop(time.process_time())
+
+
+def call(options):
+    """Service calls, parameters, and how long a new Subscriber waits for a latched message."""
+    import rospy
+    from std_msgs.msg import UInt64
+    from std_srvs.srv import SetBool
+
+    rospy.init_node("bench_client")
+    rospy.wait_for_service("bench_service", 20)
     single = rospy.ServiceProxy("bench_service", SetBool)
     persistent = rospy.ServiceProxy("bench_service", SetBool, persistent=True)
-    say(
-        round_trip_us=1e6 * sorted(times)[count // 2],
-        service_per_s=rate(lambda: single(True)),
-        persistent_service_per_s=rate(lambda: persistent(True)),
-        set_param_per_s=rate(lambda: rospy.set_param("/bench", 1)),
-        get_param_per_s=rate(lambda: rospy.get_param("/bench")),
-    )
+    seconds = float(options["seconds"])
 
+    def discover():
+        got = threading.Event()
+        begin = time.perf_counter()
+        subscriber = rospy.Subscriber("bench_latched", UInt64, lambda message: got.set())
+        if not got.wait(10):
+            sys.exit("no latched message")
+        took = time.perf_counter() - begin
+        subscriber.unregister()
+        time.sleep(0.02)
+        return 1000 * took
 
-def rate(call, seconds=1.0):
-    """How often ``call`` can be made in a second."""
-    count, start = 0, time.perf_counter()
-    while time.perf_counter() - start < seconds:
-        call()
-        count += 1
-    return count / (time.perf_counter() - start)
-
-
-def talk():
-    """Publishes small messages, then images, each as fast as it can for two seconds."""
-    number = rospy.Publisher("bench_number", UInt64, queue_size=1000)
-    image = rospy.Publisher("bench_image", Image, queue_size=2)
-    wait_until(lambda: number.get_num_connections() and image.get_num_connections())
-    picture = Image(height=480, width=640, step=1920, encoding="rgb8", data=bytes(921600))
-    for publisher, message in ((number, UInt64(1)), (image, picture)):
-        end = time.monotonic() + 2
-        while time.monotonic() < end:
-            publisher.publish(message)
-        time.sleep(0.3)
-    say(done=True)
-    sys.stdin.readline()
-
-
-def listen():
-    """Counts what comes while it comes."""
-    seen = {"bench_number": [], "bench_image": []}
-    for topic, data_class in (("bench_number", UInt64), ("bench_image", Image)):
-        rospy.Subscriber(
-            topic, data_class, lambda m, times: times.append(time.monotonic()), callback_args=seen[topic]
-        )
     say(ready=True)
-    sys.stdin.readline()
-    rates = {}
-    for topic, times in seen.items():
-        rates[topic + "_per_s"] = len(times) / max(1e-9, times[-1] - times[0]) if times else 0.0
-    say(**rates)
+    heard("go")
+    cpu_start = time.process_time()
+    say(
+        single=rate(lambda: single(True), seconds),
+        persistent=rate(lambda: persistent(True), seconds),
+        set_param=rate(lambda: rospy.set_param("/bench", 1), seconds),
+        get_param=rate(lambda: rospy.get_param("/bench"), seconds),
+        discovery_ms=sorted(discover() for _ in range(21))[10],
+    )
+    stop(cpu_start)
+
+
+def rate(step, seconds):
+    """How often ``step`` can be done in a second."""
+    for _ in range(20):
+        step()
+    count, begin = 0, time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        step()
+        count += 1
+    return count / (time.perf_counter() - begin)
 
 
 if __name__ == "__main__":
-    role = sys.argv[1]
-    rospy.init_node("bench_" + role)
-    if role == "start":
-        say(spawn_to_node_ms=1000 * (time.monotonic() - float(sys.argv[2])))
-    else:
-        {"echo": echo, "ping": ping, "talk": talk, "listen": listen}[role]()
-    rospy.signal_shutdown("done")
+    roles = (start, talk, listen, echo, ping, serve, call)
+    {role.__name__: role for role in roles}[sys.argv[1]](dict(word.split("=", 1) for word in sys.argv[2:]))
+    sys.modules["rospy"].signal_shutdown("done")

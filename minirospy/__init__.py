@@ -6,12 +6,12 @@ first used, so that a command which needs none of them starts at once.
 The way of a message, file by file::
 
     Bool.msg -> idl/parse -> spec -> idl/emit -> class
-    publish  -> client/topics (serialize, caller's thread) -> runtime/topics.Publication -> runtime/tcp.OutLink
+    publish  -> client/publisher (serialize, caller's thread) -> runtime/topics.Publication -> runtime/links.OutLink
              ==> TCP ==>
-    runtime/tcp.read_frames (worker) -> wire/framing -> runtime/topics.Subscription
-             -> client/topics (deserialize, user's function)
+    runtime/links.read_frames (worker) -> wire/framing -> runtime/topics.Subscription
+             -> client/subscriber (deserialize, user's function)
 
-and how the two ends find each other: client/topics -> runtime/node -> runtime/master -> graph/registry ->
+and how the two ends find each other: client/publisher -> runtime/node -> runtime/master -> graph/registry ->
 publisherUpdate -> runtime/slave -> runtime/topics -> graph/subscription (whom to connect) -> requestTopic
 -> wire/tcpros (headers).
 """

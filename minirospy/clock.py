@@ -58,9 +58,10 @@ class WallClock:
 class SimulatedClock:
     """A time that somebody sets: a simulator through /clock, or a test by hand."""
 
-    def __init__(self, now: int = 0) -> None:
+    def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
+        """``changed`` is notified of each time that is told."""
         self._now = now
-        self._changed = threading.Condition()
+        self._changed = changed or threading.Condition()
 
     def now(self) -> int:
         """What was set last; 0 until then."""

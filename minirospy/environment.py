@@ -9,15 +9,30 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
-from pathlib import Path
-from typing import NamedTuple
-from urllib.parse import urlsplit
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import UsageError
 
-__all__ = ["DEFAULT_MASTER_PORT", "Environment"]
+if TYPE_CHECKING:
+    from pathlib import Path
+
+__all__ = [
+    "DEFAULT_MASTER_PORT",
+    "DISTRO",
+    "ROS_VERSION",
+    "Environment",
+    "is_own_host",
+    "master_and_namespace",
+    "split_http_uri",
+]
 
 DEFAULT_MASTER_PORT = 11311
+
+DISTRO = "noetic\n"
+"""What /rosdistro says: the ROS 1 distribution whose behaviour is ours; with its line end, as ROS sets it."""
+
+ROS_VERSION = "1.17.0\n"
+"""What /rosversion says."""
 
 
 class Environment(NamedTuple):
@@ -26,7 +41,7 @@ class Environment(NamedTuple):
     ``host`` is the name that peers are told; ``bind_host`` the address that servers listen on
     (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
     that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
-    the networks whose machines may connect ("": all).
+    the networks whose machines may connect ("": all). ``transport`` "tcp" keeps topics off Unix sockets.
     """
 
     master_uri: str
@@ -38,27 +53,32 @@ class Environment(NamedTuple):
     ipv6: bool = False
     ports: range | None = None
     allow: str = ""
+    transport: str = ""
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """The record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
         Raises UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
-        more than a name or address, and on MINIROSPY_PORTS that is not like 40000-40100.
+        more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, and on a MINIROSPY_TRANSPORT
+        that there is not.
         """
+        from pathlib import Path
+
         environ = os.environ if environ is None else environ
         home = Path(environ.get("ROS_HOME") or Path.home() / ".ros")
-        uri = overrides.get("master_uri") or environ.get("ROS_MASTER_URI")
+        master_uri, namespace = master_and_namespace(environ, **overrides)
         return cls(
-            master_uri=_checked_uri(uri or f"http://localhost:{DEFAULT_MASTER_PORT}"),
+            master_uri=master_uri,
             host=overrides.get("host") or _advertised_host(environ),
-            namespace="/" + (overrides.get("namespace") or environ.get("ROS_NAMESPACE") or "").strip("/"),
+            namespace=namespace,
             home=home,
             log_dir=Path(environ.get("ROS_LOG_DIR") or home / "log"),
             package_path=tuple(Path(p) for p in environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p),
             ipv6=environ.get("ROS_IPV6") == "on",
             ports=_port_range(environ.get("MINIROSPY_PORTS", "")),
             allow=environ.get("MINIROSPY_ALLOW", ""),
+            transport=_checked_transport(environ.get("MINIROSPY_TRANSPORT", "")),
         )
 
     @property
@@ -78,37 +98,63 @@ class Environment(NamedTuple):
     @property
     def master_address(self) -> tuple[str, int]:
         """(host, port) of the master."""
-        parts = urlsplit(self.master_uri)
-        return parts.hostname or "localhost", parts.port or DEFAULT_MASTER_PORT
+        host, port, _ = split_http_uri(self.master_uri)
+        return host, port
 
     @property
     def master_is_local(self) -> bool:
         """Whether the master's host is this machine, so that a tool may start one."""
-        host = self.master_address[0]
-        if host in {"localhost", "::1", self.host, socket.gethostname()} or host.startswith("127."):
-            return True
-        try:
-            address = socket.gethostbyname(host)
-            if address.startswith("127."):
-                return True
-            # Only an address of this machine can be bound.
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-                probe.bind((address, 0))
-        except OSError:
-            return False
+        return is_own_host(self.master_address[0], self.host)
+
+
+def master_and_namespace(
+    environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
+) -> tuple[str, str]:
+    """The master's URI and the namespace of names: all that a tool needs which only asks. As Environment.read."""
+    uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
+    return _checked_uri(uri), "/" + (namespace or environ.get("ROS_NAMESPACE") or "").strip("/")
+
+
+def split_http_uri(uri: str) -> tuple[str, int, str]:
+    """(host, port, path) of ``http://host:port/path``. Raises ValueError.
+
+    By hand: importing urllib.parse takes a command a twentieth of its time.
+    """
+    scheme, _, rest = uri.partition("://")
+    address, slash, path = rest.partition("/")
+    host, _, port = address.rpartition(":")
+    if host.startswith("[") and host.endswith("]"):
+        host = host[1:-1]
+    if scheme.lower() != "http" or host[:1] in ("", "[") or not (port.isascii() and port.isdecimal()):
+        raise ValueError(f"[{uri}] is not of the form http://host:port")
+    if not 0 < int(port) < 65536:
+        raise ValueError(f"[{uri}]: a port lies between 1 and 65535")
+    return host.lower(), int(port), slash + path or "/"
+
+
+def is_own_host(host: str, own: str = "localhost") -> bool:
+    """Whether a name or address is this machine's (which peers are told is ``own``)."""
+    if host in {"localhost", "::1", own, socket.gethostname()} or host.startswith("127."):
         return True
+    try:
+        address = socket.gethostbyname(host)
+        if address.startswith("127."):
+            return True
+        # Only an address of this machine can be bound.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((address, 0))
+    except OSError:
+        return False
+    return True
 
 
 def _checked_uri(uri: str) -> str:
     try:
-        parts = urlsplit(uri)
-        usable = parts.scheme == "http" and bool(parts.hostname) and bool(parts.port)
-    except ValueError:
-        usable = False
-    if not usable:
+        split_http_uri(uri)
+    except ValueError as error:
         raise UsageError(
             f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311"
-        )
+        ) from error
     return uri
 
 
@@ -117,6 +163,12 @@ def _checked_host(host: str, variable: str) -> str:
     if "/" in host or host.count(":") == 1 or host != host.strip() or "[" in host:
         raise UsageError(f"{variable} [{host}] must be a name or an address alone, without http:// and port")
     return host
+
+
+def _checked_transport(name: str) -> str:
+    if name.lower() not in ("", "auto", "tcp"):
+        raise UsageError(f"MINIROSPY_TRANSPORT [{name}] is neither 'tcp' nor 'auto'")
+    return name.lower()
 
 
 def _port_range(text: str) -> range | None:

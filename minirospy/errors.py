@@ -40,7 +40,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 __all__ = [
@@ -103,7 +102,11 @@ class NotFoundError(MinirospyError):
         names = sorted(set(known))
         # A name without its package or namespace is what people forget most.
         tails = [each for each in names if each.rpartition("/")[2] == name]
-        self.nearest: list[str] = tails[:3] or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+        if not tails:
+            import difflib
+
+            tails = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+        self.nearest = tails[:3]
 
     def __str__(self) -> str:
         text = f"{self.kind} [{self.name}] not found"
@@ -129,16 +132,18 @@ class MasterUnreachableError(MinirospyError):
 
 
 class NodeUnreachableError(MinirospyError):
-    """The node ``name``, registered at ``uri``, does not answer."""
+    """The node (or another ``kind``: "service") ``name``, registered at ``uri``, does not answer."""
 
-    def __init__(self, name: str, uri: str, why: str = "") -> None:
-        super().__init__(name, uri, why)
+    def __init__(self, name: str, uri: str, why: str = "", kind: str = "node") -> None:
+        super().__init__(name, uri, why, kind)
         self.name = name
         self.uri = uri
         self.why = why
+        self.kind = kind
 
     def __str__(self) -> str:
-        return f"node [{self.name}] does not answer at {self.uri}" + (f" ({self.why})" if self.why else "")
+        why = f" ({self.why})" if self.why else ""
+        return f"{self.kind} [{self.name}] does not answer at {self.uri}{why}"
 
 
 class RpcError(MinirospyError):

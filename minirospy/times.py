@@ -89,6 +89,9 @@ class TVal:
 class Time(TVal):
     """A point in time since the epoch; never negative."""
 
+    # What is pickled has to be found by other ROS 1 programs, and what they have pickled by this one.
+    __module__ = "genpy.rostime"
+
     __slots__: list[str] = []
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
@@ -134,6 +137,8 @@ class Time(TVal):
 
 class Duration(TVal):
     """A span of time; may be negative, then with negative ``secs`` and ``nsecs`` counted up."""
+
+    __module__ = "genpy.rostime"
 
     __slots__: list[str] = []
 

@@ -33,10 +33,14 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
         text=True,
     )
     yield node
-    node.terminate()
-    said, _ = node.communicate(timeout=10)
-    assert "Traceback" not in said
-    assert node.returncode == 0
+    with Board() as board:
+        board.move_person((0.5, 0.0))
+        node.terminate()
+        said, _ = node.communicate(timeout=10)
+        assert "Traceback" not in said
+        assert node.returncode == 0
+        # The room is empty when it closes.
+        assert board.person is None
 
 
 async def until_paths_are(node: Node, wanted: list[bool]) -> None:

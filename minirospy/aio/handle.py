@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Generator
-from io import BytesIO
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -15,8 +14,9 @@ from minirospy.errors import (
     RpcError,
     SerializationError,
 )
+from minirospy.wire.framing import Pieces
 
-__all__ = ["Handle", "registered", "serialized"]
+__all__ = ["Handle", "pieces_of", "registered", "serialized"]
 
 _T = TypeVar("_T")
 _H = TypeVar("_H", bound="Handle")
@@ -54,10 +54,14 @@ async def registered(
         log.critical("unable to register %s with master: %s", what, error)
 
 
-def serialized(message: Any) -> bytes:
-    buffer = BytesIO()
+def pieces_of(message: Any) -> Pieces:
+    pieces = Pieces()
     try:
-        message.serialize(buffer)
+        message.serialize(pieces)
     except SerializationError as error:
         raise ROSSerializationException(str(error)) from error
-    return buffer.getvalue()
+    return pieces
+
+
+def serialized(message: Any) -> bytes:
+    return b"".join(pieces_of(message))

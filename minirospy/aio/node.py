@@ -22,6 +22,7 @@ from minirospy.errors import (
     ROSInitException,
     ROSInterruptException,
     RpcError,
+    RpcFault,
     RpcRefused,
     ServiceException,
     WireError,
@@ -419,6 +420,8 @@ class Node:
                     self.log.warning("%s. Will keep trying.", error)
                     told = True
                 await self.sleep(0.25)
+            except RpcFault:
+                return  # a master, though one that lacks this call, as that of @foxglove/ros1
             else:
                 return
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import struct
 import weakref
 from collections import deque
 from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from minirospy.aio.handle import Handle, registered, serialized
+from minirospy.aio.handle import Handle, pieces_of, registered
 from minirospy.errors import (
     MasterUnreachableError,
     ROSException,
@@ -19,9 +18,10 @@ from minirospy.errors import (
     RpcError,
 )
 from minirospy.idl.message import args_kwds_to_message
+from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.topics import Publication
 from minirospy.runtime.topics import Subscription as RuntimeSubscription
-from minirospy.wire.framing import CHUNK
+from minirospy.wire.framing import CHUNK, Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
 
 _M = TypeVar("_M")
-_LENGTH = struct.Struct("<I")
 _JOIN_SECONDS = 1.0
 
 
@@ -47,6 +46,7 @@ class Subscription(Handle, Generic[_M]):
         """How many messages gave way to newer ones."""
         self._node = node
         self._message_class = message_class
+        self._misfits = Complaints(node.log)
         self._takes_memoryview = getattr(message_class, "_takes_memoryview", False)
         self._queue: deque[tuple[bytes | memoryview, Header]] = deque(maxlen=queue_size)
         self._arrived = asyncio.Event()
@@ -124,7 +124,7 @@ class Subscription(Handle, Generic[_M]):
         try:
             message.deserialize(frame if self._takes_memoryview else bytes(frame))
         except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
-            self._node.log.error(
+            self._misfits.error(
                 "a message on %s from %s does not fit %s: %s",
                 self.topic,
                 header.get("callerid"),
@@ -229,7 +229,7 @@ class SubscribedTopic:
             await self._registration
             await self._node._node.unsubscribe(self.subscription)
 
-    def _deliver(self, frame: memoryview, header: Header) -> None:
+    def _deliver(self, frame: Frame, header: Header) -> None:
         # A small frame lies in a buffer that the next receive reuses.
         kept = frame if len(frame) > CHUNK else bytes(frame)
         for handle in list(self._handles):
@@ -272,8 +272,7 @@ class PublishedTopic:
         if self.publication.links or self.publication.latch:
             if self._has_header:
                 message.header.seq = next(self._sequence)
-            body = serialized(message)
-            self.publication.publish(_LENGTH.pack(len(body)) + body)
+            self.publication.publish(pieces_of(message).frame())
 
     def links_changed(self) -> None:
         self._changed.set()

@@ -11,6 +11,7 @@ from typing import Any
 
 from minirospy import names
 from minirospy.client.core import get_ros_root, parse_rosrpc_uri
+from minirospy.client.identity import private_parameters
 from minirospy.client.log import (
     DEBUG,
     ERROR,
@@ -49,7 +50,7 @@ from minirospy.client.params import (
     search_param,
     set_param,
 )
-from minirospy.client.process import private_parameters, process
+from minirospy.client.process import process
 from minirospy.client.services import Service, ServiceProxy, wait_for_service
 from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, sleep
 from minirospy.client.topics import (

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -23,6 +24,7 @@ __all__ = [
     "add_preshutdown_hook",
     "add_shutdown_hook",
     "get_ros_root",
+    "get_rostime_cond",
     "is_initialized",
     "is_rostime_initialized",
     "is_shutdown_requested",
@@ -75,7 +77,7 @@ def add_client_shutdown_hook(h: Callable[[], object]) -> None:
 
 def register_signals() -> None:
     """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
-    process.take_signals()
+    process.signals.take()
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
@@ -115,6 +117,11 @@ def is_wallclock() -> bool:
     return not isinstance(process.clock, SimulatedClock)
 
 
+def get_rostime_cond() -> threading.Condition:
+    """What is notified of each simulated time."""
+    return process.time_changed
+
+
 def is_rostime_initialized() -> bool:
     """Whether the time may be asked for."""
     return process.has_time
@@ -131,7 +138,7 @@ def set_rostime(t: Any) -> None:
         raise ValueError(f"must be Time instance: {t.__class__}")
     clock = process.clock
     if not isinstance(clock, SimulatedClock):
-        clock = process.clock = SimulatedClock()
+        clock = process.clock = SimulatedClock(changed=process.time_changed)
     clock.set(t.to_nsec())
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from minirospy.client.process import process
-from minirospy.runtime.slave import SlaveApi
 
 __all__ = ["Registration", "TopicManager", "get_topic_manager"]
 
@@ -53,6 +52,8 @@ class TopicManager:
     def _ask(self, method: str) -> list[Any]:
         if process.node is None:
             return []
+        from minirospy.runtime.slave import SlaveApi
+
         return list(getattr(SlaveApi(process.node), method)(process.name)[2])
 
 

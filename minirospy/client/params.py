@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import datetime
 import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from minirospy.client.process import process, warn_of_illegal_name
+from minirospy.client.identity import warn_of_illegal_name
+from minirospy.client.process import process
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 
 __all__ = [
@@ -21,7 +21,7 @@ __all__ = [
     "set_param",
 ]
 
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _T = TypeVar("_T")
 
 
@@ -158,7 +158,7 @@ def _as_rospy(value: Any) -> Any:
         return {key: _as_rospy(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_as_rospy(item) for item in value]
-    if isinstance(value, bytes | datetime.datetime):
+    if isinstance(value, bytes) or _is_date(value):
         # Imported here: http.client and its kin cost more than all else of this module.
         import xmlrpc.client
 
@@ -186,8 +186,14 @@ def _check_sendable(value: Any) -> None:
     elif isinstance(value, list | tuple):
         for item in value:
             _check_sendable(item)
-    elif not (isinstance(value, float | bytes | bytearray | datetime.datetime) or _is_wrapper(value)):
+    elif not (isinstance(value, float | bytes | bytearray) or _is_date(value) or _is_wrapper(value)):
         raise TypeError(f"cannot marshal {type(value)} objects")
+
+
+def _is_date(value: object) -> bool:
+    import datetime
+
+    return isinstance(value, datetime.datetime)
 
 
 def _is_wrapper(value: object) -> bool:

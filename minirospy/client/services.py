@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
 from io import BytesIO
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from minirospy.client.process import process, warn_of_illegal_name
+from minirospy.client.identity import warn_of_illegal_name
+from minirospy.client.process import process
 from minirospy.clock import wait_for_event
 from minirospy.errors import (
     CallFailed,
@@ -26,10 +28,13 @@ from minirospy.errors import (
 )
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.service import to_response
-from minirospy.runtime.services import ServiceClient, ServiceServer
 from minirospy.times import Duration
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.runtime.services import ServiceServer
 
 __all__ = ["Service", "ServiceProxy", "wait_for_service"]
 
@@ -214,6 +219,41 @@ class ServiceProxy(Generic[_S]):
             client.close()
 
     def _connect(self) -> ServiceClient:
+        ahead = self._connect_ahead()
+        try:
+            return self._connect_by_master(ahead)
+        finally:
+            if ahead and not ahead.header:
+                ahead.close()
+
+    def _connect_ahead(self) -> ServiceClient | None:
+        """A connection to where the service was last, begun while the master is asked where it is now.
+
+        Only within this machine: elsewhere to connect may take its time.
+        """
+        from minirospy.runtime.service_client import parse_service_uri
+
+        if self.uri and process.node:
+            with contextlib.suppress(OSError, WireError):
+                if parse_service_uri(self.uri)[0] in ("127.0.0.1", process.node.environment.host):
+                    return self._client_of(self.uri, waits=False)
+        return None
+
+    def _client_of(self, uri: str, *, waits: bool) -> ServiceClient:
+        from minirospy.runtime.service_client import ServiceClient
+
+        return ServiceClient(
+            uri,
+            self.resolved_name,
+            self.md5sum,
+            process.name,
+            persistent=self.persistent,
+            headers=self._headers,
+            waits=waits,
+        )
+
+    def _connect_by_master(self, ahead: ServiceClient | None) -> ServiceClient:
+        before = self.uri
         try:
             self.uri = uri = process.master.lookup_service(self.resolved_name)
         except RpcRefused as error:
@@ -221,14 +261,12 @@ class ServiceProxy(Generic[_S]):
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
-            return ServiceClient(
-                uri,
-                self.resolved_name,
-                self.md5sum,
-                process.name,
-                persistent=self.persistent,
-                headers=self._headers,
-            )
+            if ahead and uri == before:
+                # It may have begun with a server that was about to end: then once more.
+                with contextlib.suppress(OSError, WireError):
+                    ahead.finish()
+                    return ahead
+            return self._client_of(uri, waits=True)
         except HandshakeRefused as error:
             raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error
         except (OSError, WireError) as error:
@@ -300,6 +338,8 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 def _probe(name: str, timeout: float) -> str | None:
     """Why the service cannot be called yet; None where it can."""
+    from minirospy.runtime.service_client import ServiceClient
+
     try:
         uri = process.master.lookup_service(name)
     except RpcRefused:

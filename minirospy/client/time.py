@@ -10,18 +10,36 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from minirospy import times
+from minirospy import errors, times
+from minirospy.client.life import ROSInterruptException
 from minirospy.client.process import process
 from minirospy.clock import SimulatedClock
-from minirospy.errors import ROSInitException, ROSTimeMovedBackwardsException
+from minirospy.errors import ROSInitException
 
-__all__ = ["Duration", "Rate", "Time", "Timer", "TimerEvent", "get_rostime", "get_time", "sleep"]
+__all__ = [
+    "Duration",
+    "ROSTimeMovedBackwardsException",
+    "Rate",
+    "Time",
+    "Timer",
+    "TimerEvent",
+    "get_rostime",
+    "get_time",
+    "sleep",
+]
 
 _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
+class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
+    """Simulated time jumped back while somebody slept, by ``time`` seconds; a KeyboardInterrupt, too, as in rospy."""
+
+
 class Duration(times.Duration):
     """A span of time, ``secs`` and ``nsecs``; may be negative."""
+
+    # What is pickled has to be found by other ROS 1 programs, and what they have pickled by this one.
+    __module__ = "rospy.rostime"
 
     __slots__: list[str] = []
 
@@ -31,6 +49,8 @@ class Duration(times.Duration):
 
 class Time(times.Time):
     """A point in time, ``secs`` and ``nsecs`` since the epoch."""
+
+    __module__ = "rospy.rostime"
 
     __slots__: list[str] = []
 
@@ -70,8 +90,7 @@ def sleep(duration: float | times.Duration) -> None:
     simulated time jumps back.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
-    if nanoseconds > 0:
-        _sleep(nanoseconds)
+    _sleep(nanoseconds)
 
 
 class Rate:
@@ -206,12 +225,14 @@ def follow_clock_topic(clock: SimulatedClock) -> None:
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
     """Sleep until ``stop`` is set, quietly; without it, until the node shuts down."""
-    if stop is not None:
-        if nanoseconds > 0:
-            process.clock.sleep(nanoseconds, stop)
+    if nanoseconds <= 0:
         return
-    down = threading.Event() if process.knows_of_shutdown() else process.shutting_down
-    if nanoseconds > 0 and not process.clock.sleep(nanoseconds, down):
+    end = stop or (threading.Event() if process.knows_of_shutdown() else process.shutting_down)
+    try:
+        is_over = process.clock.sleep(nanoseconds, end)
+    except errors.ROSTimeMovedBackwardsException as error:
+        raise ROSTimeMovedBackwardsException(error.time) from None
+    if not is_over and not stop:
         process.check_interrupted_sleep()
 
 

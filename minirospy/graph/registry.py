@@ -74,6 +74,8 @@ class Registry:
     """Who publishes, subscribes and serves what. Tables keep the order of registration."""
 
     def __init__(self) -> None:
+        self.changes = 0
+        """Grows whenever publishers, subscribers or services may have changed."""
         self._nodes: dict[str, _Node] = {}
         self._publishers: dict[str, dict[str, str]] = {}
         self._subscribers: dict[str, dict[str, str]] = {}
@@ -243,6 +245,7 @@ class Registry:
 
     def _clear(self, entry: _Node) -> list[str]:
         """Take a node out of every table; the topics that it published."""
+        self.changes += 1
         published = entry.names(_PUBLISHES)
         for topic in published:
             _remove(self._publishers, topic, entry.name)
@@ -253,11 +256,13 @@ class Registry:
         return published
 
     def _enter(self, node: str, name: str, kind: int) -> _Node:
+        self.changes += 1
         entry = self._nodes[node]
         entry.add(intern(name), kind)
         return entry
 
     def _leave(self, node: str, name: str, kind: int) -> None:
+        self.changes += 1
         entry = self._nodes[node]
         entry.discard(name, kind)
         if not entry.entries:

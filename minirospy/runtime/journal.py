@@ -52,7 +52,7 @@ class Left(NamedTuple):
 class Journal:
     """An open journal. ``snapshot`` gives the records that make up the present state, for a rewrite.
 
-    Call :meth:`take_up` or :meth:`start_empty` after opening; then :meth:`append` never raises: where the
+    :meth:`open` gives what was left, :meth:`rewrite` begins anew; then :meth:`append` never raises: where the
     disk fails, the master goes on without, says so, and tries again with a whole rewrite half a minute later.
     """
 

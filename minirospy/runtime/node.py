@@ -15,7 +15,7 @@ from typing import Any
 
 from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable, WireError
-from minirospy.runtime import tcp
+from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
@@ -74,6 +74,11 @@ class Node:
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
         self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
+        self._nearby = tcp.Listener(self._accept)
+        self.this_host = ""
+        """What :func:`local.this_host` says, where this node talks by Unix sockets too."""
+        self.unix_name = ""
+        """Where topics are served to processes of this machine; "" where they are not."""
         self._watching: asyncio.Task[None] | None = None
         self._closed = False
 
@@ -87,6 +92,8 @@ class Node:
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
+        if self.environment.transport != "tcp":
+            self._open_nearby()
         self._server = RpcServer(
             SlaveApi(self).dispatch,
             bind_host=host,
@@ -118,6 +125,7 @@ class Node:
             return_exceptions=True,
         )
         await self._listener.close()
+        await self._nearby.close()
         for table in (self.publications, self.subscriptions, self.services):
             for part in table.values():
                 part.close()
@@ -179,6 +187,7 @@ class Node:
             newest=newest,
             tcp_nodelay=tcp_nodelay,
             on_loop=on_loop,
+            this_host=self.this_host,
         )
 
     async def subscribe(self, subscription: Subscription) -> None:
@@ -271,6 +280,14 @@ class Node:
             self._listener.tell_refusal(f"Could not process inbound connection: {why}{fields}")
             await tcp.send_header(sock, {"error": why})
             sock.close()
+
+    def _open_nearby(self) -> None:
+        """Serve topics by a Unix socket too, where there are such sockets."""
+        self.this_host = local.this_host()
+        if self.this_host:
+            sock = local.bind()
+            self.unix_name = local.name_of(sock)
+            self._nearby.listen(sock)
 
     def _check_own_address(self) -> None:
         environment = self.environment

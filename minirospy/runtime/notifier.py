@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass, field
+from functools import partial
 
 from minirospy.errors import RpcError, RpcUnreachable
 from minirospy.graph.parameters import ParameterUpdate
@@ -20,10 +22,32 @@ _log = logging.getLogger(__name__)
 _MASTER = "/master"
 _CALLS_AT_ONCE = 200
 _CALLS_TO_SUSPECTS = 50
+_MOST_SUSPECTS = 10000
 _LONG_LIST = 200
 _SECONDS_PER_PUBLISHER = 50e-6
+_TICK = 0.001
 
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
+
+
+@dataclass(eq=False, slots=True)
+class _Node:
+    """What one node is still to be told: the newest of each topic and parameter."""
+
+    uri: str
+    notices: dict[object, Notice] = field(default_factory=dict)
+    pauses: dict[object, float] = field(default_factory=dict)
+    """Until when no more is said of a topic."""
+    timer: asyncio.TimerHandle | None = None
+
+
+@dataclass(eq=False, slots=True)
+class _Line:
+    """Nodes that wait for their call; ``most`` are called at once."""
+
+    most: int
+    under_way: int = 0
+    waiting: deque[_Node] = field(default_factory=deque)
 
 
 class Notifier:
@@ -39,83 +63,117 @@ class Notifier:
         self._publishers = publishers
         self._timeout = timeout
         self._rpc = AsyncRpcClient()
-        self._waiting: dict[str, dict[object, Notice]] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
-        self._slots = asyncio.Semaphore(_CALLS_AT_ONCE)
-        self._suspect_slots = asyncio.Semaphore(_CALLS_TO_SUSPECTS)
+        self._nodes: dict[str, _Node] = {}
+        self._line = _Line(_CALLS_AT_ONCE)
+        self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
+        self._starts_soon = False
+        self._closed = False
         # The last update that was written: the subscribers of one topic all get the same bytes.
-        self._last: tuple[str, int, bytes] = ("", 0, b"")
+        self._last: tuple[str, list[str], bytes] = ("", [], b"")
 
     def send(self, notice: Notice) -> None:
         """Call the node that the notice is for, soon."""
         if isinstance(notice, PublisherUpdate):
             key: object = notice.topic
-            if self._last[0] == notice.topic:
-                self._last = ("", 0, b"")
         else:
             key = (notice.key,) if isinstance(notice, ParameterUpdate) else object()
-        waiting = self._waiting.get(notice.uri)
-        if waiting is None:
-            waiting = self._waiting[notice.uri] = {}
-            task = asyncio.get_running_loop().create_task(self._serve(notice.uri, waiting))
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+        node = self._nodes.get(notice.uri)
+        if node is None:
+            node = self._nodes[notice.uri] = _Node(notice.uri)
+            self._line_up(node)
+        elif node.timer and key not in node.pauses:
+            # It pauses on account of another topic.
+            node.timer.cancel()
+            node.timer = None
+            self._line_up(node)
         if isinstance(notice, ParameterUpdate):
             # Behind what was said of its parents and children meanwhile.
-            waiting.pop(key, None)
-        waiting[key] = notice
+            node.notices.pop(key, None)
+        node.notices[key] = notice
 
     async def close(self) -> None:
         """Give up what waits."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._closed = True
+        for node in self._nodes.values():
+            if node.timer:
+                node.timer.cancel()
         await self._rpc.close()
 
-    async def _serve(self, uri: str, waiting: dict[object, Notice]) -> None:
-        loop = asyncio.get_running_loop()
-        pauses: dict[object, float] = {}
-        try:
-            while waiting or pauses:
-                pauses = {key: end for key, end in pauses.items() if end > loop.time()}
-                key = next((key for key in waiting if key not in pauses), None)
-                if key is None:
-                    if pauses:
-                        await asyncio.sleep(min(pauses.values()) - loop.time())
-                    continue
-                notice = waiting.pop(key)
-                async with self._suspect_slots if uri in self._suspects else self._slots:
-                    count = await self._call(uri, notice)
-                if count > _LONG_LIST:
-                    pauses[key] = loop.time() + count * _SECONDS_PER_PUBLISHER
-        finally:
-            del self._waiting[uri]
+    def _line_up(self, node: _Node) -> None:
+        (self._suspect_line if node.uri in self._suspects else self._line).waiting.append(node)
+        self._start_soon()
 
-    async def _call(self, uri: str, notice: Notice) -> int:
-        """Call the node; how many publishers it was told of."""
-        count = 0
+    def _start_soon(self) -> None:
+        # Not at once: who registers gets its answer first.
+        if not self._starts_soon:
+            self._starts_soon = True
+            asyncio.get_running_loop().call_soon(self._start)
+
+    def _start(self) -> None:
+        self._starts_soon = False
+        for line in (self._line, self._suspect_line):
+            while line.waiting and line.under_way < line.most and not self._closed:
+                self._call(line.waiting.popleft(), line)
+
+    def _call(self, node: _Node, line: _Line) -> None:
+        """Tell a node the first thing that need not wait."""
+        key = next((key for key in node.notices if key not in node.pauses), None)
+        if key is None:
+            self._pause(node)
+            return
+        notice, count = node.notices.pop(key), 0
         if isinstance(notice, PublisherUpdate):
             count, body = self._update(notice.topic)
         elif isinstance(notice, ParameterUpdate):
             body = serialize_call("paramUpdate", [_MASTER, notice.key, notice.value])
         else:
             body = serialize_call("shutdown", [_MASTER, f"[{notice.name}] Reason: {notice.reason}"])
-        try:
-            # Nobody asks what it answers.
-            await self._rpc.post(uri, body, self._timeout)
-            self._suspects.discard(uri)
-        except RpcError as error:
-            if isinstance(error, RpcUnreachable):
-                if len(self._suspects) > 10000:
-                    self._suspects.clear()
-                self._suspects.add(uri)
-            _log.info("%s to %s: %s", type(notice).__name__, uri, error)
-        return count
+        line.under_way += 1
+        self._rpc.begin(node.uri, body, self._timeout, partial(self._called, node, line, notice, count))
+
+    def _called(self, node: _Node, line: _Line, notice: Notice, count: int, answer: bytes | RpcError) -> None:
+        """A call is done, which told of ``count`` publishers; nobody asks what was answered."""
+        line.under_way -= 1
+        if isinstance(answer, RpcUnreachable):
+            if len(self._suspects) > _MOST_SUSPECTS:
+                self._suspects.clear()
+            self._suspects.add(node.uri)
+        else:
+            self._suspects.discard(node.uri)
+        if isinstance(answer, RpcError):
+            _log.info("%s to %s: %s", type(notice).__name__, node.uri, answer)
+        if self._closed:
+            return
+        if isinstance(notice, PublisherUpdate) and count > _LONG_LIST:
+            node.pauses[notice.topic] = asyncio.get_running_loop().time() + count * _SECONDS_PER_PUBLISHER
+        self._go_on(node)
+        if line.waiting:
+            self._start_soon()
+
+    def _go_on(self, node: _Node) -> None:
+        node.timer = None
+        if node.pauses:
+            now = asyncio.get_running_loop().time()
+            node.pauses = {key: end for key, end in node.pauses.items() if end > now}
+        if node.notices:
+            self._line_up(node)
+        else:
+            self._pause(node)
+
+    def _pause(self, node: _Node) -> None:
+        """Nothing is to be said now: until the first pause ends, if there is one."""
+        if node.pauses:
+            loop = asyncio.get_running_loop()
+            # A timer may be early by as much as the clock's resolution.
+            node.timer = loop.call_at(min(node.pauses.values()) + _TICK, self._go_on, node)
+        else:
+            del self._nodes[node.uri]
 
     def _update(self, topic: str) -> tuple[int, bytes]:
-        if self._last[0] != topic:
-            publishers: list[Any] = self._publishers(topic)
+        """How many publish a topic, and the call that tells of them."""
+        publishers = self._publishers(topic)
+        if self._last[:2] != (topic, publishers):
             body = serialize_call("publisherUpdate", [_MASTER, topic, publishers])
-            self._last = (topic, len(publishers), body)
-        return self._last[1:]
+            self._last = (topic, publishers, body)
+        return len(publishers), self._last[2]

@@ -1,21 +1,24 @@
 """The /rosout node: gathers the log lines of all nodes, republishes them on /rosout_agg and keeps them in a file.
 
-Source: http://wiki.ros.org/rosout.
+As every node of ROS it lists its loggers and sets their levels: here those of the master, its process. Source:
+http://wiki.ros.org/rosout.
 """
 
 from __future__ import annotations
 
 import contextlib
 import logging
+from io import BytesIO
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Any
 
 from minirospy.environment import Environment
-from minirospy.errors import DeserializationError
+from minirospy.errors import DeserializationError, ServiceException
 from minirospy.runtime.node import Node
+from minirospy.runtime.services import AsyncHandler, LoopServiceServer
 from minirospy.runtime.topics import Publication
-from minirospy.wire.framing import serialize_frame
+from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
@@ -23,6 +26,13 @@ __all__ = ["RosoutNode"]
 
 _LOG_BYTES = 100 * 1024 * 1024
 _LEVELS = {1: "DEBUG", 2: "INFO", 4: "WARN", 8: "ERROR", 16: "FATAL"}
+_LOGGER_LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "error": logging.ERROR,
+    "fatal": logging.CRITICAL,
+}
 
 
 class RosoutNode:
@@ -51,6 +61,7 @@ class RosoutNode:
         await self._node.subscribe(
             self._node.make_subscription("/rosout", type_, self._on_message, on_loop=True)
         )
+        await self._serve_loggers()
 
     async def close(self) -> None:
         """Leave the graph. Idempotent."""
@@ -58,7 +69,45 @@ class RosoutNode:
         if self._handler:
             self._handler.close()
 
-    def _on_message(self, frame: memoryview, header: Header) -> None:
+    async def _serve_loggers(self) -> None:
+        from roscpp.msg import Logger
+        from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelRequest
+
+        async def get_loggers(body: bytes, header: Header) -> bytes:
+            names = [name for name in logging.root.manager.loggerDict if name.startswith("minirospy")]
+            return _bytes_of(
+                GetLoggersResponse([Logger(_ros_name(name), _level(name)) for name in sorted(names)])
+            )
+
+        async def set_level(body: bytes, header: Header) -> bytes:
+            request = SetLoggerLevelRequest()
+            try:
+                request.deserialize(body)
+            except DeserializationError as error:
+                raise ServiceException(str(error)) from error
+            level = _LOGGER_LEVELS.get(request.level.lower())
+            if level is None:
+                raise ServiceException(f"[{request.level}] is none of the levels {', '.join(_LOGGER_LEVELS)}")
+            _logger(request.logger).setLevel(level)
+            return b""
+
+        await self._serve("get_loggers", GetLoggers, get_loggers)
+        await self._serve("set_logger_level", SetLoggerLevel, set_level)
+
+    async def _serve(self, name: str, class_: Any, handler: AsyncHandler) -> None:
+        await self._node.serve(
+            LoopServiceServer(
+                f"/rosout/{name}",
+                InterfaceType(class_._type, class_._md5sum),
+                self._node.name,
+                handler,
+                request_type=class_._request_class._type,
+                response_type=class_._response_class._type,
+                workers=self._node.workers,
+            )
+        )
+
+    def _on_message(self, frame: Frame, header: Header) -> None:
         assert self._aggregated
         body = bytes(frame)
         self._aggregated.publish(serialize_frame(body))
@@ -77,3 +126,26 @@ class RosoutNode:
             f"[{message.file}:{message.line}({message.function})] [topics: {', '.join(message.topics)}] {message.msg}"
         )
         handler.emit(logging.LogRecord("rosout", logging.INFO, "", 0, line, None, None))
+
+
+def _bytes_of(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def _ros_name(name: str) -> str:
+    """What a logger of Python is called here: ``ros`` and what is below it, as in the nodes of roscpp."""
+    return "ros" + name.removeprefix("minirospy")
+
+
+def _logger(ros_name: str) -> logging.Logger:
+    is_ours = ros_name == "ros" or ros_name.startswith("ros.")
+    return logging.getLogger("minirospy" + ros_name[3:] if is_ours else ros_name)
+
+
+def _level(name: str) -> str:
+    level = logging.getLogger(name).getEffectiveLevel()
+    return next(
+        word for word, number in reversed(_LOGGER_LEVELS.items()) if number <= max(level, logging.DEBUG)
+    )

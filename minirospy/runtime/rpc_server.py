@@ -11,7 +11,7 @@ import contextlib
 import errno
 import logging
 import socket
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Sequence
 from enum import Enum
 from itertools import islice
@@ -20,6 +20,7 @@ from typing import Any
 from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.runtime import tcp
 from minirospy.runtime.access import Access
+from minirospy.runtime.complaints import Complaints
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
 from minirospy.wire.xmlrpc import parse_call, serialize_fault
 from minirospy.wire.xmlrpc import serialize_response as serialize_value
@@ -38,12 +39,20 @@ _MOST_HELD = 256 * 1024 * 1024
 _LARGE = 1024 * 1024
 """Of requests that are not whole yet, a server holds so much; beyond that the large ones are refused."""
 
+_PROGRESS = 65536
+"""Bytes that have moved set the time limit anew: a large value may be long under way by a poor radio."""
+
 _MOST_UNREAD = 256 * 1024
 """Bytes of answers that wait for a client to read them, before it gets no more."""
 
-_RECEIVE = 65536
+_RECEIVE = 16384
+"""Bytes at a time: what one client pipelines is taken apart before the next one has its turn."""
+
+_END_OF_HEAD = b"\r\n\r\n"
 _ACCEPTS_AT_ONCE = 32
-_REFUSALS_TOLD = 10
+_ANSWERS_AT_ONCE = 400
+"""Of requests that came together, before others have their turn."""
+
 
 Dispatch = Callable[[str, Sequence[Any]], Any]
 """Method name and arguments in, value out, or an awaitable of it; raises RpcFault."""
@@ -51,13 +60,14 @@ Dispatch = Callable[[str, Sequence[Any]], Any]
 
 class _State(Enum):
     OPEN = "it is served"
+    BUSY = "it asked much at once: nothing more is read from it before that is answered"
     FULL = "it does not read its answers: nothing is read from it"
     CLOSING = "it ends once it has read its answers"
     REFUSED = "it is heard out, without an answer"
     ENDED = "the socket is closed"
 
 
-_OPEN, _FULL, _CLOSING, _REFUSED, _ENDED = _State
+_OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = _State
 
 
 class RpcServer:
@@ -91,6 +101,11 @@ class RpcServer:
         self._most = most_idle
         self._access = access
         self._sock: socket.socket | None = None
+        # Until when a request has to be whole, or an answer taken; idle connections are not in here.
+        self._deadlines: dict[_Connection, float] = {}
+        self._sweep: asyncio.TimerHandle | None = None
+        self._complaints = Complaints(_log)
+        self._strangers = Complaints(_log, 10)
 
     @property
     def clients(self) -> int:
@@ -101,6 +116,8 @@ class RpcServer:
         """Listen; with port 0 ``port`` tells the one that was free. Raises OSError."""
         sock = tcp.bind(self._bind_host, self.port, self._ports)
         try:
+            # Those that are accepted take it over.
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             sock.listen(1000)
         except BaseException:
             sock.close()
@@ -118,6 +135,30 @@ class RpcServer:
         self._sock = None
         for connection in list(self.connections):
             connection.end()
+        if self._sweep:
+            self._sweep.cancel()
+
+    def limit(self, connection: _Connection, seconds: float) -> None:
+        """Hang up on ``connection`` after so long."""
+        loop = asyncio.get_running_loop()
+        end = self._deadlines[connection] = loop.time() + seconds
+        if self._sweep is None or end < self._sweep.when():
+            if self._sweep:
+                self._sweep.cancel()
+            self._sweep = loop.call_at(end, self._end_late)
+
+    def unlimit(self, connection: _Connection) -> None:
+        """It has done what it had to do in time. Idempotent."""
+        self._deadlines.pop(connection, None)
+
+    def _end_late(self) -> None:
+        self._sweep = None
+        loop = asyncio.get_running_loop()
+        now = loop.time()
+        for connection in [each for each, end in self._deadlines.items() if end <= now]:
+            connection.end()
+        if self._deadlines:
+            self._sweep = loop.call_at(min(self._deadlines.values()), self._end_late)
 
     def _watch(self) -> None:
         if self._sock is not None:
@@ -145,7 +186,6 @@ class RpcServer:
     def _serve(self, peer: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
         try:
             peer.setblocking(False)
-            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except OSError:
             # It has gone already.
             peer.close()
@@ -153,6 +193,14 @@ class RpcServer:
         if self._most is not None and len(self.connections) >= self._most:
             self._end_longest_silent()
         self.connections[_Connection(self, peer, loop)] = None
+
+    def tell_refusal(self, sock: socket.socket, why: str) -> None:
+        """Log that a request was refused; a flood of them is summed up."""
+        try:
+            name = sock.getpeername()
+        except OSError:
+            name = ()
+        self._complaints.warning("a request from %s was refused: %s", name[0] if name else "a client", why)
 
     def _end_longest_silent(self) -> None:
         """One goes that asks nothing, or else the one that was silent longest."""
@@ -167,8 +215,9 @@ class RpcServer:
             if self._access.allows(address, peer.getsockname()[0]):
                 return True
         self.refused += 1
-        if self.refused <= _REFUSALS_TOLD:
-            _log.warning("a connection from %s was refused: only %s may connect", address, self._access)
+        self._strangers.warning(
+            "a connection from %s was refused: only %s may connect", address, self._access
+        )
         return False
 
 
@@ -176,10 +225,11 @@ class _Connection:
     """One client: feed, take messages, answer them in order."""
 
     __slots__ = (
-        "_deadline",
         "_fd",
+        "_has_deadline",
         "_held",
         "_loop",
+        "_moved",
         "_out",
         "_reader",
         "_server",
@@ -197,8 +247,10 @@ class _Connection:
         self._reader = HttpReader()
         self._state: _State = _OPEN
         self._out = bytearray()
-        self._waiting: deque[HttpMessage] = deque()
-        self._deadline: asyncio.TimerHandle | None = None
+        self._waiting: list[HttpMessage] = []
+        self._has_deadline = False
+        # Bytes since the time limit was set.
+        self._moved = 0
         self._task: asyncio.Task[None] | None = None
         self._held = 0
         loop.add_reader(self._fd, self._readable)
@@ -220,8 +272,7 @@ class _Connection:
         self._server.connections.pop(self, None)
         self._hold(0)
         self._waiting.clear()
-        if self._deadline:
-            self._deadline.cancel()
+        self._server.unlimit(self)
         if self._task:
             self._task.cancel()
 
@@ -239,20 +290,27 @@ class _Connection:
                 return
             if self._reader.wants_continue:
                 self._write(self._reader.continue_line())
-        if messages and self._deadline:
-            self._deadline.cancel()
-            self._deadline = None
-        self._waiting.extend(messages)
+        if self._has_deadline and messages:
+            self._has_deadline = False
+            self._server.unlimit(self)
+        self._moved += len(data)
+        self._waiting += messages
         self._answer_waiting()
         self._set_deadline()
 
-    def _readable(self) -> None:
+    def _receive(self) -> bytes | None:
+        """What has come; b"" at the end, None where nothing has."""
         try:
-            data = self._sock.recv(_RECEIVE)
+            return self._sock.recv(_RECEIVE)
         except (BlockingIOError, InterruptedError):
-            return
+            return None
         except OSError:
-            data = b""
+            return b""
+
+    def _readable(self) -> None:
+        data = self._receive()
+        if data is None:
+            return
         if self._state is _REFUSED:
             # Whatever it still says.
             if not data:
@@ -260,6 +318,9 @@ class _Connection:
             return
         if data:
             self._server.connections.move_to_end(self)
+            if data.endswith(_END_OF_HEAD):
+                # Clients in Python send the body right behind its head: mostly it is there by now.
+                data += self._receive() or b""
             self.received(data)
         elif self._out and self._state is _OPEN:
             # It asks no more, but waits for what it asked.
@@ -269,8 +330,22 @@ class _Connection:
             self.end()
 
     def _answer_waiting(self) -> None:
+        left = _ANSWERS_AT_ONCE
         while self._waiting and self._task is None and self._state is _OPEN:
-            self._answer(self._waiting.popleft())
+            if not left:
+                self._state = _BUSY
+                self._loop.remove_reader(self._fd)
+                self._loop.call_soon(self._go_on)
+                return
+            left -= 1
+            self._answer(self._waiting.pop(0))
+
+    def _go_on(self) -> None:
+        if self._state is _BUSY:
+            self._state = _OPEN
+            self._loop.add_reader(self._fd, self._readable)
+            self._answer_waiting()
+            self._set_deadline()
 
     def _answer(self, message: HttpMessage) -> None:
         """Answer at once, or start a task for a method that has to wait."""
@@ -316,6 +391,7 @@ class _Connection:
         """Answer with an error, and take nothing more."""
         self._waiting.clear()
         self._hold(0)
+        self._server.tell_refusal(self._sock, text)
         self._write(serialize_error(status, text))
         if self._state is _FULL:
             self._loop.add_reader(self._fd, self._readable)
@@ -367,6 +443,8 @@ class _Connection:
             return
         del self._out[:sent]
         if self._out:
+            self._moved += sent
+            self._set_deadline()
             return
         self._loop.remove_writer(self._fd)
         if self._state is _CLOSING:
@@ -390,19 +468,18 @@ class _Connection:
 
     def _set_deadline(self) -> None:
         """A request that has begun, or an answer that waits, has a time limit; an idle connection has none."""
-        if self._state is _ENDED or self._state is _REFUSED:
-            return
-        if self._reader.is_idle and not self._out:
-            if self._deadline:
-                self._deadline.cancel()
-                self._deadline = None
-        elif self._deadline is None:
-            self._limit(_REQUEST_SECONDS)
+        if self._out or not self._reader.is_idle:
+            is_due = not self._has_deadline
+            if is_due and self._state is not _ENDED and self._state is not _REFUSED:
+                self._limit(_REQUEST_SECONDS)
+        elif self._has_deadline and self._state is not _REFUSED:
+            self._has_deadline = False
+            self._server.unlimit(self)
 
     def _limit(self, seconds: float) -> None:
-        if self._deadline:
-            self._deadline.cancel()
-        self._deadline = self._loop.call_later(seconds, self.end)
+        self._has_deadline = True
+        self._moved = 0
+        self._server.limit(self, seconds)
 
 
 def is_address_in_use(error: OSError) -> bool:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import RpcFault
+from minirospy.runtime.local import PROTOCOL
 
 if TYPE_CHECKING:
     from minirospy.runtime.node import Node
@@ -93,14 +94,15 @@ class SlaveApi:
         port = self._node.tcpros_port
         for publication in self._node.publications.values():
             for out in publication.links:
-                what = f"TCPROS connection on port {port} to [{out.address} on socket {out.number}]"
-                rows.append([out.number, out.peer, "o", "TCPROS", publication.topic, True, what])
+                what = f"{out.transport} connection on port {port} to [{out.address} on socket {out.number}]"
+                rows.append([out.number, out.peer, "o", out.transport, publication.topic, True, what])
         for subscription in self._node.subscriptions.values():
             for link in subscription.links:
                 what = (
-                    f"TCPROS connection on port {link.local_port} to [{link.address} on socket {link.number}]"
+                    f"{link.transport} connection on port {link.local_port} to "
+                    f"[{link.address} on socket {link.number}]"
                 )
-                rows.append([link.number, link.uri, "i", "TCPROS", subscription.topic, True, what])
+                rows.append([link.number, link.uri, "i", link.transport, subscription.topic, True, what])
         return [_SUCCESS, "bus info", rows]
 
     def get_master_uri(self, caller_id: str) -> list[Any]:
@@ -150,9 +152,12 @@ class SlaveApi:
         if _text(topic, "topic") not in self._node.publications:
             return [_ERROR, f"Not a publisher of [{topic}]", []]
         offered = protocols if isinstance(protocols, list) else []
+        host, port = self._node.environment.host, self._node.tcpros_port
+        name = self._node.unix_name
+        if name and [PROTOCOL, self._node.this_host] in offered:
+            return [_SUCCESS, f"ready on {name}", [PROTOCOL, name, host, port]]
         if not any(isinstance(entry, list) and entry[:1] == ["TCPROS"] for entry in offered):
             return [_FAILURE, "no supported protocol implementations", []]
-        host, port = self._node.environment.host, self._node.tcpros_port
         return [_SUCCESS, f"ready on {host}:{port}", ["TCPROS", host, port]]
 
     def shutdown(self, caller_id: str, reason: str = "") -> list[Any]:

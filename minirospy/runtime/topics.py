@@ -17,10 +17,11 @@ from urllib.parse import urlsplit
 
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
-from minirospy.runtime import tcp
+from minirospy.runtime import local, sockets, tcp
+from minirospy.runtime.links import OutLink, read_frames, watch_frames
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
-from minirospy.wire.framing import CHUNK
+from minirospy.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import (
     InterfaceType,
@@ -38,12 +39,12 @@ _SETTLE_SECONDS = 10.0
 """A master that has forgotten everything hears of all nodes again within this."""
 
 _TELL_AFTER = 3
-"""A publisher that cannot be reached is told of at this failure: one that just leaves has left by then."""
+"""A publisher that refuses is told of at this failure: one that just leaves has left by then."""
 
 _WORKED_SECONDS = 5.0
 """A link that lived so long, or brought a message, was a good one."""
 
-Deliver = Callable[[memoryview, Header], None]
+Deliver = Callable[[Frame, Header], None]
 """What is called with each message's bytes and its publisher's connection header."""
 
 
@@ -59,7 +60,7 @@ class Publication:
         latch: bool = False,
         headers: Mapping[str, str] | None = None,
         tcp_nodelay: bool = False,
-        on_link: Callable[[tcp.OutLink, bool], None] | None = None,
+        on_link: Callable[[OutLink, bool], None] | None = None,
     ) -> None:
         """``queue_size`` frames may wait for a slow subscriber (0: any number; None: publish waits itself).
 
@@ -71,15 +72,15 @@ class Publication:
         self.latch = latch
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
-        self.links: tuple[tcp.OutLink, ...] = ()
+        self.links: tuple[OutLink, ...] = ()
         self.expected = 0
         """How many subscribers the master knew when this was registered."""
         self._on_link = on_link
         self._closed = False
-        self._latched: bytes | None = None
+        self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
 
-    def publish(self, frame: bytes) -> None:
+    def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
         if self.latch:
             # A subscriber that joins at this moment gets the frame once: either here or on joining.
@@ -104,13 +105,14 @@ class Publication:
         if self._closed:
             sock.close()
             return None
-        tcp.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
-        link = tcp.OutLink(
+        sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
+        link = OutLink(
             sock,
             asyncio.get_running_loop(),
             fields.get("callerid", peer),
             self.queue_size or 0,
             self._link_closed,
+            split=fields.get("split_frames") == "1",
         )
         link.open()
         for other in self.links:
@@ -132,7 +134,7 @@ class Publication:
         for link in self.links:
             link.close()
 
-    def _link_closed(self, link: tcp.OutLink) -> None:
+    def _link_closed(self, link: OutLink) -> None:
         self.links = tuple(other for other in self.links if other is not link)
         if self._on_link:
             self._on_link(link, False)
@@ -149,7 +151,7 @@ class InLink:
     received: int = 0
     received_bytes: int = 0
     closed: bool = field(default=False)
-    latched: bytes | memoryview | None = None
+    latched: Frame | None = None
     """The last message of a publisher that latches."""
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
@@ -160,17 +162,22 @@ class InLink:
         return self.sock.fileno()
 
     @property
+    def transport(self) -> str:
+        """The protocol's name."""
+        return "TCPROS" if self.sock.family in sockets.FAMILIES else local.PROTOCOL
+
+    @property
     def local_port(self) -> int:
-        """The port at this end; 0 once it is closed."""
+        """The port at this end; 0 where it has none, or is closed."""
         try:
-            return int(self.sock.getsockname()[1])
+            return int(self.sock.getsockname()[1]) if self.transport == "TCPROS" else 0
         except OSError:
             return 0
 
     def close(self) -> None:
         """Have the reader end; it closes the socket."""
         self.closed = True
-        tcp.hang_up(self.sock)
+        sockets.hang_up(self.sock)
 
 
 class Subscription:
@@ -194,10 +201,13 @@ class Subscription:
         newest: int = 0,
         tcp_nodelay: bool = False,
         on_loop: bool = False,
+        this_host: str = "",
     ) -> None:
+        """``this_host``: what :func:`local.this_host` says, where publishers of this machine may be reached so."""
         self.topic = topic
         self.type = type_
         self.newest = newest
+        self._this_host = this_host
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[InLink, ...] = ()
         self._caller_id = caller_id
@@ -296,7 +306,7 @@ class Subscription:
             for tell in self.on_connected:
                 tell()
             if self._on_loop:
-                tcp.watch_frames(
+                watch_frames(
                     asyncio.get_running_loop(),
                     link.sock,
                     lambda frame: self._deliver(frame, link.header),
@@ -306,15 +316,23 @@ class Subscription:
                 self._workers.start(self._read, link, asyncio.get_running_loop())
 
     async def _open_link(self, uri: str) -> InLink:
-        answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, [["TCPROS"]])
-        host, port = _tcpros_address(answer, uri, self.topic)
-        sock = await tcp.connect(host, port)
+        protocols: list[list[str]] = [["TCPROS"]]
+        if self._this_host:
+            # Behind TCPROS: what others see first is what they know.
+            protocols.append([local.PROTOCOL, self._this_host])
+        answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
+        sock, address = await self._reach(answer, uri)
         try:
-            tcp.tune(sock, nodelay=self.tcp_nodelay)
-            await tcp.send_header(
-                sock,
-                subscriber_header(self.topic, self.type, self._caller_id, tcp_nodelay=self.tcp_nodelay),
+            sockets.tune(sock, nodelay=self.tcp_nodelay)
+            fields = subscriber_header(
+                self.topic,
+                self.type,
+                self._caller_id,
+                tcp_nodelay=self.tcp_nodelay,
+                # Elsewhere a peer is told what ROS 1 knows, and no more.
+                split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
+            await tcp.send_header(sock, fields)
             header = await tcp.receive_header(sock)
             check_publisher(header, self.topic, self.type)
         except BaseException:
@@ -322,23 +340,35 @@ class Subscription:
             raise
         # Others leave the topic out; user code reads it.
         header.setdefault("topic", self.topic)
-        return InLink(uri, f"{host}:{port}", sock, header)
+        return InLink(uri, address, sock, header)
+
+    async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
+        """A socket that is connected to the publisher which gave this answer, and its address."""
+        nearby = local.parse_answer(answer) if self._this_host else None
+        if nearby:
+            with contextlib.suppress(OSError):
+                return local.connect(nearby.name), nearby.name
+            # Something between the two, such as a sandbox, keeps them apart.
+            host, port = nearby.host, nearby.port
+        else:
+            host, port = _tcpros_address(answer, uri, self.topic)
+        return await tcp.connect(host, port), f"{host}:{port}"
 
     def _read(self, link: InLink, loop: asyncio.AbstractEventLoop) -> None:
         deliver, header = self._deliver, link.header
 
-        def on_frame(frame: memoryview) -> None:
+        def on_frame(frame: Frame) -> None:
             link.received += 1
             link.received_bytes += len(frame)
             deliver(frame, header)
 
-        def on_latched_frame(frame: memoryview) -> None:
+        def on_latched_frame(frame: Frame) -> None:
             # A small frame lies in a buffer that the next receive reuses.
             link.latched = frame if len(frame) > CHUNK else bytes(frame)
             on_frame(frame)
 
         try:
-            tcp.read_frames(
+            read_frames(
                 link.sock,
                 on_latched_frame if header.get("latching") == "1" else on_frame,
                 self,
@@ -367,8 +397,13 @@ class Subscription:
         if not action:
             return
         _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
-        nameless = isinstance(error, socket.gaierror) or isinstance(error.__cause__, socket.gaierror)
-        if (nameless or self._plan.failures(uri) >= _TELL_AFTER) and uri not in self._told:
+        cause = error.__cause__ or error
+        nameless = isinstance(cause, socket.gaierror)
+        # Who just leaves refuses, or hangs up; silence or a closed way is the address's fault, or a firewall's.
+        at_once = "timed out" in str(error) or (
+            isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
+        )
+        if (at_once or self._plan.failures(uri) >= _TELL_AFTER) and uri not in self._told:
             self._told.add(uri)
             _log.warning(
                 "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",

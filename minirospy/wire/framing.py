@@ -2,17 +2,34 @@
 
 The reader owns the buffer that a socket receives into, so that bytes are moved once:
 ``n = sock.recv_into(reader.space()); for frame in reader.received(n): ...``
-Source: http://wiki.ros.org/ROS/TCPROS.
+
+To a subscriber whose header says ``split_frames=1`` a large message that ends with a byte array is sent as a
+split frame: the length with its highest bit set, 4 bytes with the array's size, then the message as ever. So the
+subscriber reads the array into an object of its own, which becomes the field without another copy.
+Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from typing import Any, NamedTuple, SupportsIndex, overload
 
 from minirospy.errors import WireError
 
-__all__ = ["CHUNK", "MAX_FRAME", "FrameReader", "serialize_frame"]
+__all__ = [
+    "CHUNK",
+    "MAX_FRAME",
+    "SPLIT",
+    "Frame",
+    "FrameReader",
+    "LargeFrame",
+    "Pieces",
+    "SplitFrame",
+    "begins_split",
+    "serialize_frame",
+    "split_sizes",
+]
 
 CHUNK = 64 * 1024
 """Bytes that one receive asks for while messages are small."""
@@ -20,8 +37,12 @@ CHUNK = 64 * 1024
 MAX_FRAME = 1024 * 1024 * 1024
 """A longer frame is refused: it is garbage, or not for us."""
 
+SPLIT = 1 << 31
+"""The bit of a length that says: the size of the array at the end follows."""
+
 _FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
+_TWO_LENGTHS = struct.Struct("<II")
 
 
 def serialize_frame(body: bytes) -> bytes:
@@ -29,14 +50,116 @@ def serialize_frame(body: bytes) -> bytes:
     return _LENGTH.pack(len(body)) + body
 
 
+class LargeFrame(NamedTuple):
+    """A message to be sent that is not worth joining: the pieces, in order, and their size together."""
+
+    pieces: tuple[bytes, ...]
+    size: int
+
+    def buffers(self, *, split: bool) -> list[bytes]:
+        """What goes into the socket, as a split frame where that is asked for and this message allows it."""
+        first, *others = self.pieces
+        if split and len(others) == 1 and begins_split(first, len(others[0])):
+            return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
+        return [_LENGTH.pack(self.size), *self.pieces]
+
+
+class Pieces(list[Any]):
+    """What a message's ``serialize`` writes to: the bytes are joined once, and large ones never."""
+
+    __slots__ = ()
+    write = list.append
+
+    def frame(self) -> bytes | LargeFrame:
+        """All that was written as one frame."""
+        size = len(self[0]) if len(self) == 1 else sum(map(len, self))
+        if size < CHUNK:
+            self.insert(0, _LENGTH.pack(size))
+            frame = b"".join(self)
+            if len(frame) == size + 4:
+                return frame
+            # The len() of an array is not in bytes.
+            return serialize_frame(frame[4:])
+        joined: list[bytes] = []
+        small: list[bytes] = []
+        for piece in self:
+            # What is not bytes may be changed by its owner before it is sent.
+            whole = piece if isinstance(piece, bytes) else bytes(piece)
+            if len(whole) < CHUNK:
+                small.append(whole)
+            else:
+                joined += [b"".join(small), whole] if small else [whole]
+                small = []
+        if small:
+            joined.append(b"".join(small))
+        return LargeFrame(tuple(joined), sum(map(len, joined)))
+
+
+class SplitFrame(bytes):
+    """A message in two parts, for ``deserialize``: bytes of the first that end where those of ``tail`` begin.
+
+    Length and slices are those of the whole; the slice that is ``tail`` is that object, uncopied. ``bytes(frame)``
+    joins. A memoryview of it sees the first part alone.
+    """
+
+    tail: bytes
+
+    def __new__(cls, head: bytes, tail: bytes) -> SplitFrame:
+        frame = super().__new__(cls, head)
+        frame.tail = tail
+        return frame
+
+    def __len__(self) -> int:
+        return super().__len__() + len(self.tail)
+
+    def __bytes__(self) -> bytes:
+        return super().__getitem__(slice(None)) + self.tail
+
+    @overload
+    def __getitem__(self, key: SupportsIndex) -> int: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> bytes: ...
+
+    def __getitem__(self, key: SupportsIndex | slice) -> int | bytes:
+        head = super().__len__()
+        if isinstance(key, slice):
+            start, stop, step = key.indices(len(self))
+            if step == 1 and start >= head:
+                return self.tail[start - head : max(start, stop) - head]
+            if step == 1 and stop <= head:
+                return super().__getitem__(slice(start, stop))
+        return bytes(self)[key]
+
+
+Frame = memoryview | bytes
+"""A message's bytes as they are delivered."""
+
+
+def begins_split(head: bytes, tail: int) -> bool:
+    """Whether ``head`` ends with the length of a byte array of ``tail`` bytes: there a message may be split."""
+    return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
+
+
+def split_sizes(size: int, tail: int) -> tuple[int, int]:
+    """(bytes before the array, bytes of the array) of a split frame. Raises WireError."""
+    if not CHUNK <= tail <= size - 4:
+        raise WireError(f"a split message of {size} bytes says that it ends with an array of {tail}")
+    return size - tail, tail
+
+
 class FrameReader:
     """Bytes in, frames out.
 
     A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
-    than CHUNK comes in a buffer of its own, which nobody writes again.
+    than CHUNK comes in a buffer of its own, which nobody writes again. With ``gathers`` false such a frame is
+    left to the caller instead: :attr:`begun` says what has come of it.
     """
 
-    def __init__(self, limit: int = MAX_FRAME) -> None:
+    def __init__(self, limit: int = MAX_FRAME, *, gathers: bool = True) -> None:
+        self.begun: tuple[int, bytes] | None = None
+        """The length in front of a large frame, and the bytes that came with it; to be set to None by the caller."""
+        self._gathers = gathers
         self._limit = limit
         self._small = memoryview(bytearray(CHUNK))
         self._start = 0
@@ -44,6 +167,11 @@ class FrameReader:
         self._large: bytearray | None = None
         self._filled = 0
         self._wanted = 0
+
+    def put_back(self, data: bytes) -> None:
+        """Begin with these few bytes, where nothing is held."""
+        self._end = len(data)
+        self._small[: self._end] = data
 
     def space(self) -> memoryview:
         """Where the next bytes go; never empty."""
@@ -76,7 +204,11 @@ class FrameReader:
             stop = at + 4 + length
             if stop > end:
                 if length > CHUNK - 4:
-                    self._begin_large(length, at + 4)
+                    if self._gathers:
+                        self._begin_large(length, at + 4)
+                    else:
+                        self.begun = length, bytes(small[at + 4 : end])
+                        self._start = self._end = 0
                     return
                 break
             self._start = stop

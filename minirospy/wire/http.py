@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
+from functools import lru_cache
 from typing import NamedTuple
 
 from minirospy.errors import RpcProtocolError
 
 __all__ = [
     "MAX_BODY",
+    "HttpHead",
     "HttpMessage",
     "HttpReader",
     "serialize_error",
@@ -24,6 +26,7 @@ MAX_BODY = 64 * 1024 * 1024
 """Bytes that a body may have: a parameter may hold a robot's whole description."""
 
 _MAX_HEAD = 64 * 1024
+_SHORT_HEAD = 512
 _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 _REASONS = {
     400: "Bad Request",
@@ -34,50 +37,70 @@ _REASONS = {
 }
 
 
-class HttpMessage(NamedTuple):
-    """A request or an answer. ``start`` is its first line, ``headers`` have lower-case names."""
+class HttpHead(NamedTuple):
+    """What stands in front of a body. ``start`` is the first line, ``headers`` have lower-case names."""
 
     start: str
     headers: dict[str, str]
+    method: str
+    """A request's method."""
+    keep_alive: bool
+    """Whether the connection serves another request after this one."""
+    plain_length: int
+    """The length of the body, where nothing but a Content-Length tells of it; else -1."""
+
+
+class HttpMessage(NamedTuple):
+    """A request or an answer."""
+
+    head: HttpHead
     body: bytes
+
+    @property
+    def start(self) -> str:
+        """The first line."""
+        return self.head.start
 
     @property
     def keep_alive(self) -> bool:
         """Whether the connection serves another request after this one."""
-        connection = self.headers.get("connection", "").lower()
-        if "HTTP/1.0" in self.start:
-            return "keep-alive" in connection
-        return "close" not in connection
+        return self.head.keep_alive
 
     @property
     def method(self) -> str:
         """A request's method."""
-        return self.start.partition(" ")[0]
+        return self.head.method
 
     @property
     def status(self) -> int:
         """An answer's status code; 0 where there is none."""
-        parts = self.start.split(" ", 2)
+        parts = self.head.start.split(" ", 2)
         return int(parts[1]) if len(parts) > 1 and re.fullmatch(r"[0-9]{3}", parts[1]) else 0
 
 
 class HttpReader:
-    """Bytes in, whole messages out, several of them where they were pipelined."""
+    """Bytes in, whole messages out, several of them where they were pipelined.
+
+    Nearly always a message comes in one piece, or as its head and then its body, and alone: that costs little.
+    """
+
+    __slots__ = ("_buffer", "_ended", "_head", "_in_body", "_max_body", "_parser", "wants_continue")
 
     def __init__(self, max_body: int = MAX_BODY) -> None:
         self._max_body = max_body
+        # The head whose body comes next, in one piece perhaps.
+        self._head: HttpHead | None = None
+        self._parser: Generator[HttpMessage | None, None, None] | None = None
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
-        self._parser = self._parse()
         self.wants_continue = False
         """Whether the peer waits for :meth:`continue_line` before it sends its body."""
-        next(self._parser)
 
     @property
     def is_idle(self) -> bool:
         """Whether no message has begun."""
-        return not self._buffer and not self._in_body
+        return self._head is None and not self._buffer and not self._in_body
 
     @property
     def held(self) -> int:
@@ -89,18 +112,32 @@ class HttpReader:
 
         Raises RpcProtocolError.
         """
-        if self.is_idle:
-            # Nearly always a request comes in one piece, and alone.
-            message = self._whole(data)
-            if message:
-                return [message]
+        head = self._head
+        if head is not None:
+            self._head = None
+            if len(data) == head.plain_length:
+                return [HttpMessage(head, data)]
+        elif self.is_idle:
+            end = data.find(b"\r\n\r\n")
+            if 0 < end <= _MAX_HEAD:
+                first = _parse_head(data[:end])
+                if first.plain_length >= 0:
+                    self._check(first.plain_length)
+                    length = len(data) - end - 4
+                    if length == first.plain_length:
+                        return [HttpMessage(first, data[end + 4 :])]
+                    if not length:
+                        self._head = first
+                        return []
         if data:
             self._buffer += data
         else:
             self._ended = True
+        if self._parser is None or head is not None:
+            self._parser = self._parse(head)
         messages: list[HttpMessage] = []
         while True:
-            message = self._parser.send(None)
+            message = next(self._parser)
             if message is None:
                 return messages
             messages.append(message)
@@ -110,34 +147,24 @@ class HttpReader:
         self.wants_continue = False
         return _CONTINUE
 
-    def _parse(self) -> Generator[HttpMessage | None, None, None]:
-        yield None
+    def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
+        """The messages in the buffer, and None where it has to be filled; ``head`` has been taken out already."""
         while True:
-            head = yield from self._until(b"\r\n\r\n")
-            start, headers = _parse_head(head)
-            self.wants_continue = headers.get("expect", "").lower() == "100-continue"
+            if head is None:
+                head = _parse_head((yield from self._until(b"\r\n\r\n")))
+            self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
             self._in_body = True
-            body = yield from self._body(start, headers)
+            body = yield from self._body(head)
             self._in_body = self.wants_continue = False
-            yield HttpMessage(start, headers, body)
+            yield HttpMessage(head, body)
+            head = None
 
-    def _whole(self, data: bytes) -> HttpMessage | None:
-        end = data.find(b"\r\n\r\n")
-        if not 0 < end <= _MAX_HEAD:
-            return None
-        start, headers = _parse_head(data[:end])
-        if "transfer-encoding" in headers or "expect" in headers or "content-length" not in headers:
-            return None
-        length = _length(headers["content-length"])
-        self._check(length)
-        return HttpMessage(start, headers, data[end + 4 :]) if len(data) - end - 4 == length else None
-
-    def _body(self, start: str, headers: dict[str, str]) -> Generator[None, None, bytes]:
-        if "chunked" in headers.get("transfer-encoding", "").lower():
+    def _body(self, head: HttpHead) -> Generator[None, None, bytes]:
+        if "chunked" in head.headers.get("transfer-encoding", "").lower():
             return (yield from self._chunks())
-        length = headers.get("content-length")
+        length = head.headers.get("content-length")
         if length is None:
-            if start.startswith("HTTP/"):
+            if head.start.startswith("HTTP/"):
                 # An answer without a length goes on until the peer ends.
                 while not self._ended:
                     self._check(len(self._buffer))
@@ -219,8 +246,18 @@ def serialize_error(status: int, text: str) -> bytes:
     ).encode() + body
 
 
-def _parse_head(head: bytes) -> tuple[str, dict[str, str]]:
-    start, *lines = head.decode("latin-1").split("\r\n")
+def _parse_head(data: bytes) -> HttpHead:
+    # A client's heads differ in nothing but the length.
+    return _short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
+
+
+@lru_cache(maxsize=256)
+def _short_head(data: bytes) -> HttpHead:
+    return _read_head(data)
+
+
+def _read_head(data: bytes) -> HttpHead:
+    start, *lines = data.decode("latin-1").split("\r\n")
     if not _is_start_line(start):
         raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
     headers: dict[str, str] = {}
@@ -233,7 +270,13 @@ def _parse_head(head: bytes) -> tuple[str, dict[str, str]]:
         if name == "content-length" and headers.get(name, value) != value:
             raise RpcProtocolError("two Content-Lengths")
         headers[name] = value
-    return start, headers
+    connection = headers.get("connection", "").lower()
+    keep_alive = "keep-alive" in connection if "HTTP/1.0" in start else "close" not in connection
+    length = headers.get("content-length")
+    plain_length = -1
+    if length is not None and "transfer-encoding" not in headers and "expect" not in headers:
+        plain_length = _length(length)
+    return HttpHead(start, headers, start.partition(" ")[0], keep_alive, plain_length)
 
 
 def _length(text: str) -> int:

@@ -38,10 +38,11 @@ class InterfaceType(NamedTuple):
 
 
 def subscriber_header(
-    topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False
+    topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
 ) -> Header:
-    """What a subscriber opens with."""
+    """What a subscriber opens with; ``split_frames`` says that it understands them (``wire/framing``)."""
     return {
+        **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
         "md5sum": type_.md5sum,
         "message_definition": type_.definition,

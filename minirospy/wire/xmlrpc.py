@@ -1,22 +1,22 @@
 """XML-RPC: calls and answers as bytes, and back.
 
-Pure; parses with expat and refuses what a caller could hurt with: document types (and so entities), nesting
-beyond 64 levels, a million elements. Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that
-ROS uses.
+Pure; parses with expat, and what is plain without it (``wire/xmlrpc_plain.py``). Refuses what a caller could hurt
+with: document types (and so entities), nesting beyond 64 levels, a million elements. Source:
+http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
-from xml.parsers import expat
 
 from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.wire.xmlrpc_plain import read_plain
 
 __all__ = [
     "Call",
     "DateTime",
+    "Serialized",
     "parse_call",
     "parse_response",
     "serialize_call",
@@ -44,6 +44,10 @@ class Call(NamedTuple):
     args: list[Any]
 
 
+class Serialized(bytes):
+    """An answer that is XML already."""
+
+
 def serialize_call(method: str, args: Sequence[Any]) -> bytes:
     """A call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
     parts = [_HEAD, "<methodCall><methodName>", _escape(method), "</methodName><params>"]
@@ -57,6 +61,8 @@ def serialize_call(method: str, args: Sequence[Any]) -> bytes:
 
 def serialize_response(value: Any) -> bytes:
     """A successful answer as XML."""
+    if type(value) is Serialized:
+        return value
     parts = [_HEAD, "<methodResponse><params><param>"]
     _write(value, parts, 0)
     parts.append("</param></params></methodResponse>\n")
@@ -73,9 +79,9 @@ def serialize_fault(code: int, text: str) -> bytes:
 
 def parse_call(body: bytes) -> Call:
     """The call in ``body``. Raises RpcProtocolError."""
-    plain = _PLAIN_CALL.fullmatch(body)
-    if plain:
-        return Call(plain[1].decode(), [text.decode() for text in _PLAIN_VALUE.findall(plain[2])])
+    plain = read_plain(body)
+    if plain and plain[0] is not None:
+        return Call(plain[0], plain[1])
     reader = _Reader(body)
     if reader.root != "methodCall" or reader.method is None:
         raise RpcProtocolError("not an XML-RPC method call")
@@ -84,6 +90,9 @@ def parse_call(body: bytes) -> Call:
 
 def parse_response(body: bytes) -> Any:
     """The value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
+    plain = read_plain(body)
+    if plain and plain[0] is None and len(plain[1]) == 1:
+        return plain[1][0]
     reader = _Reader(body)
     if reader.root != "methodResponse":
         raise RpcProtocolError("not an XML-RPC answer")
@@ -96,44 +105,6 @@ def parse_response(body: bytes) -> Any:
     if len(reader.params) != 1:
         raise RpcProtocolError("an XML-RPC answer without a value")
     return reader.params[0]
-
-
-# --- calls of nothing but plain strings, as nearly all that a master gets: read without a parser, the same
-
-_SPACE = rb"[ \t\r\n]*"
-# No references, nor "]]>", and no characters that XML changes or forbids.
-_TEXT = rb"[\t\n !-%'-;=?-~]*"
-_PLAIN_VALUE = re.compile(rb"<value>(?:<string>)?(" + _TEXT + rb")(?:</string>)?</value>")
-_PLAIN_PARAM = (
-    rb"<param>"
-    + _SPACE
-    + rb"<value>(?:<string>"
-    + _TEXT
-    + rb"</string>|"
-    + _TEXT
-    + rb")</value>"
-    + _SPACE
-    + rb"</param>"
-)
-_PLAIN_CALL = re.compile(
-    rb"(?:<\?xml version=(?:'1\.0'|\"1\.0\")(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))? ?\?>)?"
-    + _SPACE
-    + rb"<methodCall>"
-    + _SPACE
-    + rb"<methodName>("
-    + _TEXT
-    + rb")</methodName>"
-    + _SPACE
-    + rb"<params>("
-    + _SPACE
-    + rb"(?:"
-    + _PLAIN_PARAM
-    + _SPACE
-    + rb"){0,20})</params>"
-    + _SPACE
-    + rb"</methodCall>"
-    + _SPACE
-)
 
 
 # --- values to XML
@@ -287,6 +258,8 @@ class _Reader:
     """
 
     def __init__(self, body: bytes) -> None:
+        from xml.parsers import expat
+
         self.root = ""
         self.method: str | None = None
         self.params: list[Any] = []

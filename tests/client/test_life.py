@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import multiprocessing
+import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from minirospy.errors import RpcRefused
@@ -41,33 +44,261 @@ def signalled(script: str, number: int) -> tuple[int, str, str, float]:
     return process.returncode, output, errors, time.monotonic() - begun
 
 
-DEAF = {
-    "time.sleep": "time.sleep(60)",
-    "a lock": "threading.Event().wait()",
-    "a busy loop": "while True: pass",
-    "input": "sys.stdin.readline()",
-    "publishing": "while True: pub.publish(True); time.sleep(0.01)",
-    "a thread without end": "threading.Thread(target=time.sleep, args=(60,)).start()",
+SECONDS = 2.0
+"""A second is what is promised; a machine that tests may be busy."""
+
+HEAR = {
+    # What a program is about; what it says from the signal on.
+    "time.sleep": ("ready(); time.sleep(60)", "hook finally atexit"),
+    "a lock": ("ready(); threading.Event().wait()", "hook finally atexit"),
+    "a busy loop": ("ready()\nwhile True: pass", "hook finally atexit"),
+    "input": ("ready(); sys.stdin.readline()", "hook finally atexit"),
+    "a socket": ("pair = socket.socketpair(); ready(); pair[0].recv(1)", "hook finally atexit"),
+    "publishing": ("ready()\nwhile True: pub.publish(True); time.sleep(0.01)", "hook finally atexit"),
+    "another program": ("ready(); subprocess.call(['sleep', '60'])", "hook finally atexit"),
+    "C code": ("ready(); ctypes.CDLL(None).pause()", "hook finally atexit"),
+    # Python cannot interrupt it: the process ends without its main thread.
+    "C code that goes on": (
+        "ready()\nlock = ctypes.create_string_buffer(64)\n"
+        "for _ in range(2): ctypes.CDLL(None).pthread_mutex_lock(lock)",
+        "hook atexit",
+    ),
+    "a slow loop that asks": (
+        "while not rospy.is_shutdown(): ready(); time.sleep(60)",
+        "hook finally atexit",
+    ),
+    "a slow loop that asks and catches": (
+        "while not rospy.is_shutdown():\n"
+        "    try: ready(); time.sleep(60)\n"
+        "    except Exception as error: print(type(error).__name__)\n"
+        "print('behind')",
+        "hook ROSInterruptException behind finally atexit",
+    ),
+    "a loop that catches": (
+        "while True:\n    try: ready(); time.sleep(60)\n    except Exception: print('caught')",
+        "hook caught finally atexit",
+    ),
+    "a loop that catches everything": (
+        "while True:\n    try: ready(); time.sleep(60)\n    except: print('caught')",
+        "hook caught caught atexit",
+    ),
+    "a loop that catches what ends rospy.sleep": (
+        "while True:\n    try: ready(); rospy.sleep(60)\n    except Exception: print('caught')",
+        "hook caught finally atexit",
+    ),
+    "a thread without end": (
+        "def work():\n    threading.main_thread().join()\n    ready()\n    time.sleep(60)\n"
+        "threading.Thread(target=work).start()",
+        "hook atexit",
+    ),
+    "spin beside a slow thread that asks": (
+        "def work():\n    while not rospy.is_shutdown(): ready(); time.sleep(60)\n"
+        "threading.Thread(target=work).start()\nready(); rospy.spin()",
+        "hook finally atexit",
+    ),
+    "spin beside a thread that cleans up": (
+        "def work():\n    while not rospy.is_shutdown(): time.sleep(0.01)\n    time.sleep(1)\n    print('cleaned')\n"
+        "threading.Thread(target=work).start()\nready(); rospy.spin()",
+        "hook finally cleaned atexit",
+    ),
+    "a thread that sleeps": (
+        "threading.Thread(target=lambda: rospy.sleep(60)).start()\nready(); rospy.spin()",
+        "hook finally atexit",
+    ),
+    "a pool of threads": (
+        "concurrent.futures.ThreadPoolExecutor().submit(time.sleep, 60)\nready(); rospy.spin()",
+        "hook finally atexit",
+    ),
+    "a child process": (
+        "multiprocessing.get_context('fork').Process(target=time.sleep, args=(60,)).start()\nready(); rospy.spin()",
+        "hook finally atexit",
+    ),
+    "a child process that asks": (
+        "def work():\n    while not rospy.is_shutdown(): time.sleep(0.01)\n    print('cleaned', flush=True)\n"
+        "multiprocessing.get_context('fork').Process(target=work).start()\nready(); rospy.spin()",
+        "hook finally cleaned atexit",
+    ),
+    "slow clean-up": (
+        "try: ready(); rospy.spin()\nfinally:\n    time.sleep(1)\n    print('cleaned')",
+        "hook cleaned finally atexit",
+    ),
 }
+SIGNALS = [signal.SIGINT, signal.SIGTERM] + ([signal.SIGHUP] if sys.platform != "win32" else [])
 
 
 @POSIX_ONLY
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("what", DEAF)
-def test_a_program_that_never_hears_of_the_shutdown_ends(master: str, what: str, number: int) -> None:
+@pytest.mark.parametrize(
+    ("what", "number"), [(what, SIGNALS[index % len(SIGNALS)]) for index, what in enumerate(HEAR)]
+)
+def test_a_signal_ends_every_program(master: str, what: str, number: int) -> None:
+    body, says = HEAR[what]
     script = f"""
-import sys, threading, time, rospy
+import atexit, concurrent.futures, ctypes, multiprocessing, os, socket, subprocess, sys, threading, time
+import rospy
 from std_msgs.msg import Bool
+
+def ready(once=["ready"]):
+    while once:
+        print(once.pop(), flush=True)
+
 rospy.init_node("deaf")
 pub = rospy.Publisher("t", Bool, queue_size=1)
-rospy.on_shutdown(lambda: print("hook", flush=True))
-print("ready", flush=True)
-{DEAF[what]}
+rospy.on_shutdown(lambda: print("hook"))
+atexit.register(print, "atexit")
+try:
+{textwrap.indent(body, "    ")}
+finally:
+    if rospy.is_shutdown():
+        print("finally")
 """
     status, output, errors, seconds = signalled(script, number)
-    assert (status, output) == (0, "hook\n")
-    assert errors == "" or what == "a thread without end"
-    assert seconds < 1.0
+    assert (status, "".join(output.split()), errors) == (0, "".join(says.split()), "")
+    assert seconds < SECONDS
+    assert not is_known(master, "/deaf")
+
+
+@POSIX_ONLY
+@pytest.mark.parametrize("numbers", [[signal.SIGINT] * 2, [signal.SIGTERM] * 3, SIGNALS], ids=str)
+@pytest.mark.parametrize("waits", ["rospy.spin()", "while not rospy.is_shutdown(): rospy.sleep(60)"])
+def test_signals_in_quick_succession(master: str, waits: str, numbers: list[int]) -> None:
+    process = start(f'import rospy; rospy.init_node("often"); print("ready", flush=True)\n{waits}')
+    for number in numbers:
+        process.send_signal(number)
+    assert process.communicate(timeout=8) == ("", "")
+    assert process.returncode == 0
+    assert not is_known(master, "/often")
+
+
+@POSIX_ONLY
+def test_a_second_signal_ends_a_clean_up(master: str) -> None:
+    process = start("""
+import time, rospy
+rospy.init_node("slow")
+print("ready", flush=True)
+try:
+    rospy.spin()
+finally:
+    while True:
+        try:
+            print("cleans", flush=True)
+            time.sleep(60)
+        except BaseException:
+            pass
+""")
+    process.send_signal(signal.SIGTERM)
+    assert process.stdout
+    assert process.stdout.readline() == "cleans\n"
+    begun = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    assert process.communicate(timeout=8) == ("cleans\n", "")
+    assert process.returncode == 0
+    assert time.monotonic() - begun < SECONDS
+
+
+@POSIX_ONLY
+def test_a_signal_at_any_moment_of_init_node(master: str) -> None:
+    """It may come between any two steps: nothing is printed, and nothing stays behind in the master."""
+    script = """
+import os, signal, sys
+import rospy
+at, steps = int(sys.argv[1]), 0
+
+def count(frame, event, argument):
+    global steps
+    if event == "call" and signal.getsignal(signal.SIGTERM) != signal.SIG_DFL:
+        steps += 1
+        if steps == at:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+sys.setprofile(count)
+rospy.init_node("early", argv=[])
+sys.setprofile(None)
+print(steps)
+rospy.spin()
+"""
+    counting = subprocess.Popen(
+        [sys.executable, "-c", script, "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert counting.stdout
+    steps = int(counting.stdout.readline())
+    counting.terminate()
+    assert counting.communicate(timeout=8) == ("", "")
+    for tenth in range(10):
+        done = subprocess.run(
+            [sys.executable, "-c", script, str(1 + steps * tenth // 10)],
+            capture_output=True,
+            text=True,
+            timeout=8,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, ""), f"after {tenth} tenths"
+        assert not is_known(master, "/early")
+
+
+@POSIX_ONLY
+def test_nohup(master: str) -> None:
+    """What ignores SIGHUP goes on when the terminal is closed."""
+    process = start("""
+import signal, rospy
+signal.signal(signal.SIGHUP, signal.SIG_IGN)
+rospy.init_node("stays")
+print("ready", flush=True)
+input()
+print("still there")
+""")
+    process.send_signal(signal.SIGHUP)
+    assert process.communicate("\n", timeout=8) == ("still there\n", "")
+
+
+@POSIX_ONLY
+def test_a_master_that_does_not_answer(master: str) -> None:
+    """Leaving the graph is tried, but not for long."""
+    script = """
+import os, sys, rospy
+from minirospy.runtime.node import Node
+
+async def never(self):
+    import asyncio
+    await asyncio.sleep(60)
+
+rospy.init_node("left")
+Node._unregister_all = never
+print("ready", flush=True)
+rospy.spin()
+print("spun")
+"""
+    status, output, errors, seconds = signalled(script, signal.SIGTERM)
+    assert (status, output, errors) == (0, "spun\n", "")
+    assert seconds < SECONDS
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux has process namespaces")
+def test_the_first_process_of_a_container(master: str) -> None:
+    """The kernel gives it no signal that it does not handle."""
+    unshare = ["unshare", "--pid", "--fork", "--kill-child"]
+    if (
+        not shutil.which("unshare")
+        or subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode
+    ):
+        pytest.skip("needs the right to make a process namespace")
+    script = """
+import os, time, rospy
+rospy.init_node("first")
+rospy.on_shutdown(lambda: print("hook", flush=True))
+print(os.getpid(), flush=True)
+time.sleep(60)
+"""
+    process = subprocess.Popen(
+        [*unshare, sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout
+    assert process.stdout.readline() == "1\n"
+    begun = time.monotonic()
+    for child in psutil.Process(process.pid).children():
+        child.terminate()
+    assert process.communicate(timeout=8) == ("hook\n", "")
+    assert process.returncode == 0
+    assert time.monotonic() - begun < SECONDS
 
 
 @POSIX_ONLY
@@ -75,10 +306,12 @@ def test_a_loop_that_asks_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
 rospy.init_node("asks")
+rospy.is_shutdown()
+time.sleep(0.9)
 print("ready", flush=True)
 while not rospy.is_shutdown():
     time.sleep(0.9)
-time.sleep(0.6)
+time.sleep(0.2)
 print("cleaned up", flush=True)
 """
     status, output, errors, _ = signalled(script, signal.SIGINT)

@@ -114,6 +114,24 @@ def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
         assert hear(client) == "service [/s] unavailable"
 
 
+def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
+    """It begins to connect to where the service was last; who answers is whom the master names."""
+    client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))
+    servers = []
+    for name in ("one", "two"):
+        servers.append(start(started, SERVER, name))
+        assert hear(servers[-1]) == "ready"
+        for _ in range(2):
+            say(client)
+            assert hear(client) == name
+    # The first lives on, and serves whoever comes to it.
+    assert servers[0].poll() is None
+    servers[1].kill()
+    servers[1].wait()
+    say(client)
+    assert hear(client).startswith("unable to connect to service: ")
+
+
 def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
     """rospy waits until the handler has returned."""
     server = start(started, SERVER, "server")

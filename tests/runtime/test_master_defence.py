@@ -23,7 +23,7 @@ from minirospy.runtime.access import Access, listening_lines
 from minirospy.runtime.loop import LoopThread
 from minirospy.runtime.master import Master
 from minirospy.runtime.node import Node
-from minirospy.wire.xmlrpc import parse_response, serialize_call, serialize_response
+from minirospy.wire.xmlrpc import parse_response, serialize_response
 
 DOCS = Path(__file__).parents[2] / "docs" / "master.md"
 
@@ -419,12 +419,3 @@ def test_any_call_is_answered(calls: list[tuple[str, list[Any]]]) -> None:
             assert again.dispatch(question, ["/x"]) == master.dispatch(question, ["/x"])
 
     asyncio.run(test())
-
-
-def test_serialized_calls_of_plain_strings_are_read_as_expat_reads_them() -> None:
-    from minirospy.wire import xmlrpc
-
-    call = serialize_call("registerPublisher", ["/a", "/t", "a/B", "http://x:1/"])
-    assert xmlrpc._PLAIN_CALL.fullmatch(call)
-    reader = xmlrpc._Reader(call)
-    assert xmlrpc.parse_call(call) == (reader.method, reader.params)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 import socket
 import struct
 import threading
@@ -29,6 +30,12 @@ BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
 
 
+@pytest.fixture(params=["auto", "tcp"])
+def transport(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes of this machine talk by any transport, or by TCP alone."""
+    monkeypatch.setenv("MINIROSPY_TRANSPORT", request.param)
+
+
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
     """Run a scene on a loop of its own."""
     loop = new_event_loop()
@@ -46,7 +53,13 @@ async def eventually(condition: Callable[[], object]) -> None:
 
 
 def environment(master: Master) -> Environment:
-    return Environment.read({"ROS_MASTER_URI": f"http://127.0.0.1:{master.port}", "ROS_IP": "127.0.0.1"})
+    return Environment.read(
+        {
+            "ROS_MASTER_URI": f"http://127.0.0.1:{master.port}",
+            "ROS_IP": "127.0.0.1",
+            "MINIROSPY_TRANSPORT": os.environ.get("MINIROSPY_TRANSPORT", ""),
+        }
+    )
 
 
 @contextlib.asynccontextmanager
@@ -125,6 +138,7 @@ async def subscribe_to(
     return subscription
 
 
+@pytest.mark.usefixtures("transport")
 def test_messages_go_from_node_to_node() -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -141,6 +155,7 @@ def test_messages_go_from_node_to_node() -> None:
     run(scene)
 
 
+@pytest.mark.usefixtures("transport")
 def test_a_publisher_that_closes_the_connection_is_connected_again() -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -255,6 +270,7 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     assert advice in lines[0]
 
 
+@pytest.mark.usefixtures("transport")
 def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
     begun, go_on = threading.Event(), threading.Event()
     bodies: list[bytes] = []
@@ -334,6 +350,7 @@ async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
     return sock
 
 
+@pytest.mark.usefixtures("transport")
 def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -458,6 +475,7 @@ def test_nodes_meet_over_ipv6() -> None:
     run(scene)
 
 
+@pytest.mark.usefixtures("transport")
 def test_a_subscription_that_is_closed_in_the_middle_of_connecting_leaves_no_link() -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -472,6 +490,7 @@ def test_a_subscription_that_is_closed_in_the_middle_of_connecting_leaves_no_lin
     run(scene)
 
 
+@pytest.mark.usefixtures("transport")
 def test_a_publication_that_is_closed_takes_no_more_subscribers() -> None:
     async def scene() -> None:
         async with graph("/a") as (_, (a,)):

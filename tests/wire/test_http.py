@@ -26,6 +26,23 @@ def test_requests_come_out_whole_in_any_pieces(bodies: list[bytes], step: int) -
     assert all(message.method == "POST" and message.keep_alive for message in messages)
 
 
+@given(st.lists(st.binary(max_size=30), min_size=1, max_size=3), st.data())
+def test_heads_and_bodies_may_come_one_by_one(bodies: list[bytes], data: st.DataObject) -> None:
+    """As Python's clients send them; some pieces are split once more, or come with the next."""
+    pieces = []
+    for body in bodies:
+        request = serialize_request("localhost:11311", "/RPC2", body)
+        at = data.draw(st.sampled_from([0, 5, len(request) - len(body), len(request) - len(body) // 2]))
+        pieces += [request[:at], request[at:]] if data.draw(st.booleans()) else [request]
+    if len(pieces) > 1 and data.draw(st.booleans()):
+        at = data.draw(st.integers(1, len(pieces) - 1))
+        pieces[at - 1 : at + 1] = [pieces[at - 1] + pieces[at]]
+    reader = HttpReader()
+    found = [message.body for piece in pieces if piece for message in reader.feed(piece)]
+    assert found == bodies
+    assert reader.is_idle
+
+
 @pytest.mark.parametrize("step", [1, 7, 1000])
 def test_chunked_bodies(step: int) -> None:
     data = (

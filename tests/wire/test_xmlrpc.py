@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.wire import xmlrpc as xmlrpc_module
 from minirospy.wire.xmlrpc import (
     Call,
     parse_call,
@@ -113,56 +112,6 @@ def test_any_bytes_are_read_or_refused(body: bytes) -> None:
             parse_response(text)
         except (RpcProtocolError, RpcFault):
             pass
-
-
-PLAIN = st.lists(
-    st.sampled_from(
-        [
-            b"<?xml version='1.0'?>",
-            b'<?xml version="1.0" encoding="UTF-8"?>',
-            b"<methodCall>",
-            b"<methodName>",
-            b"getPid",
-            b"</methodName>",
-            b"<params>",
-            b"<param>",
-            b"<value>",
-            b"<string>",
-            b"</string>",
-            b"</value>",
-            b"</param>",
-            b"</params>",
-            b"</methodCall>",
-            b"\r\n",
-            b" a ]]> ",
-            b"\t&amp;",
-            b"\xc3\xa4",
-            b"\x01",
-        ]
-    ),
-    max_size=6,
-).map(b"".join)
-
-
-@given(st.tuples(PLAIN, PLAIN, PLAIN, PLAIN))
-def test_the_short_way_for_plain_calls_reads_what_the_parser_reads(parts: tuple[bytes, ...]) -> None:
-    head, name, text, tail = parts
-    for body in (
-        head
-        + b"<methodCall><methodName>"
-        + name
-        + b"</methodName><params><param><value>"
-        + text
-        + b"</value></param>"
-        b"</params></methodCall>" + tail,
-        b"<?xml version='1.0'?>\n<methodCall><methodName>x</methodName><params><param><value><string>"
-        + text
-        + b"</string>"
-        b"</value></param>\r\n<param><value>" + name + b"</value></param></params></methodCall>",
-    ):
-        if xmlrpc_module._PLAIN_CALL.fullmatch(body):
-            reader = xmlrpc_module._Reader(body)
-            assert parse_call(body) == (reader.method, reader.params)
 
 
 def test_dates_in_any_form() -> None:

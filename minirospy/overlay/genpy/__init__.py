@@ -1,6 +1,7 @@
 """genpy, filled in by minirospy: what generated messages and user code import of it."""
 
 from genpy import base as base
+from genpy import dynamic as dynamic
 from genpy import message as message
 from genpy import rostime as rostime
 from minirospy.idl.genpy import register_unicode_errors, struct_I

@@ -1,99 +1,52 @@
 """rospy.core, filled in by minirospy."""
 
-from logging import NullHandler
+from logging import NullHandler as NullHandler
 
-from rosgraph_msgs.msg import Log
+from rosgraph_msgs.msg import Log as Log
 
-from minirospy.client import get_node_uri, is_shutdown, signal_shutdown
-from minirospy.client.core import (
-    add_client_shutdown_hook,
-    add_preshutdown_hook,
-    add_shutdown_hook,
-    get_ros_root,
-    is_initialized,
-    is_shutdown_requested,
-    is_topic,
-    parse_rosrpc_uri,
-    register_signals,
-    rospydebug,
-    rospyerr,
-    rospyinfo,
-    rospywarn,
-)
-from minirospy.client.log import (
-    logdebug,
-    logdebug_once,
-    logdebug_throttle,
-    logdebug_throttle_identical,
-    logerr,
-    logerr_once,
-    logerr_throttle,
-    logerr_throttle_identical,
-    logfatal,
-    logfatal_once,
-    logfatal_throttle,
-    logfatal_throttle_identical,
-    loginfo,
-    loginfo_once,
-    loginfo_throttle,
-    loginfo_throttle_identical,
-    logout,
-    logwarn,
-    logwarn_once,
-    logwarn_throttle,
-    logwarn_throttle_identical,
-)
-from minirospy.client.msproxy import xmlrpcapi
+from minirospy.client import get_node_uri as get_node_uri
+from minirospy.client import is_shutdown as is_shutdown
+from minirospy.client import signal_shutdown as signal_shutdown
+from minirospy.client.core import add_client_shutdown_hook as add_client_shutdown_hook
+from minirospy.client.core import add_preshutdown_hook as add_preshutdown_hook
+from minirospy.client.core import add_shutdown_hook as add_shutdown_hook
+from minirospy.client.core import get_ros_root as get_ros_root
+from minirospy.client.core import is_initialized as is_initialized
+from minirospy.client.core import is_shutdown_requested as is_shutdown_requested
+from minirospy.client.core import is_topic as is_topic
+from minirospy.client.core import parse_rosrpc_uri as parse_rosrpc_uri
+from minirospy.client.core import register_signals as register_signals
+from minirospy.client.core import rospydebug as rospydebug
+from minirospy.client.core import rospyerr as rospyerr
+from minirospy.client.core import rospyinfo as rospyinfo
+from minirospy.client.core import rospywarn as rospywarn
+from minirospy.client.log import logdebug as logdebug
+from minirospy.client.log import logdebug_once as logdebug_once
+from minirospy.client.log import logdebug_throttle as logdebug_throttle
+from minirospy.client.log import logdebug_throttle_identical as logdebug_throttle_identical
+from minirospy.client.log import logerr as logerr
+from minirospy.client.log import logerr_once as logerr_once
+from minirospy.client.log import logerr_throttle as logerr_throttle
+from minirospy.client.log import logerr_throttle_identical as logerr_throttle_identical
+from minirospy.client.log import logfatal as logfatal
+from minirospy.client.log import logfatal_once as logfatal_once
+from minirospy.client.log import logfatal_throttle as logfatal_throttle
+from minirospy.client.log import logfatal_throttle_identical as logfatal_throttle_identical
+from minirospy.client.log import loginfo as loginfo
+from minirospy.client.log import loginfo_once as loginfo_once
+from minirospy.client.log import loginfo_throttle as loginfo_throttle
+from minirospy.client.log import loginfo_throttle_identical as loginfo_throttle_identical
+from minirospy.client.log import logout as logout
+from minirospy.client.log import logwarn as logwarn
+from minirospy.client.log import logwarn_once as logwarn_once
+from minirospy.client.log import logwarn_throttle as logwarn_throttle
+from minirospy.client.log import logwarn_throttle_identical as logwarn_throttle_identical
+from minirospy.client.msproxy import xmlrpcapi as xmlrpcapi
 from rospy import names as _names
-from rospy.names import *  # noqa: F403
+from rospy.impl.passing import passing_on
 
 MASTER_NAME = "master"
 ROSRPC = "rosrpc://"
 logerror = logerr
 
-__all__ = [
-    "MASTER_NAME",
-    "ROSRPC",
-    "Log",
-    "NullHandler",
-    "add_client_shutdown_hook",
-    "add_preshutdown_hook",
-    "add_shutdown_hook",
-    "get_node_uri",
-    "get_ros_root",
-    "is_initialized",
-    "is_shutdown",
-    "is_shutdown_requested",
-    "is_topic",
-    "logdebug",
-    "logdebug_once",
-    "logdebug_throttle",
-    "logdebug_throttle_identical",
-    "logerr",
-    "logerr_once",
-    "logerr_throttle",
-    "logerr_throttle_identical",
-    "logerror",
-    "logfatal",
-    "logfatal_once",
-    "logfatal_throttle",
-    "logfatal_throttle_identical",
-    "loginfo",
-    "loginfo_once",
-    "loginfo_throttle",
-    "loginfo_throttle_identical",
-    "logout",
-    "logwarn",
-    "logwarn_once",
-    "logwarn_throttle",
-    "logwarn_throttle_identical",
-    "parse_rosrpc_uri",
-    "register_signals",
-    "rospydebug",
-    "rospyerr",
-    "rospyinfo",
-    "rospywarn",
-    "signal_shutdown",
-    "xmlrpcapi",
-]  # fmt: skip
-__all__ += _names.__all__
+__getattr__, __dir__ = passing_on(__name__, _names)

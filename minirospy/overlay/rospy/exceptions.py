@@ -1,12 +1,12 @@
 """rospy.exceptions, filled in by minirospy."""
 
+from minirospy.client.life import ROSInterruptException
+from minirospy.client.time import ROSTimeMovedBackwardsException
 from minirospy.errors import (
     ROSException,
     ROSInitException,
     ROSInternalException,
-    ROSInterruptException,
     ROSSerializationException,
-    ROSTimeMovedBackwardsException,
     TransportException,
     TransportInitError,
     TransportTerminated,

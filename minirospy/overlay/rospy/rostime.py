@@ -1,6 +1,7 @@
 """rospy.rostime, filled in by minirospy."""
 
 from minirospy.client.core import (
+    get_rostime_cond,
     is_rostime_initialized,
     is_wallclock,
     set_rostime_initialized,
@@ -11,6 +12,6 @@ from minirospy.client.core import set_rostime as _set_rostime  # noqa: F401 - te
 from minirospy.client.time import Duration, Time, get_rostime, get_time
 
 __all__ = [
-    "Duration", "Time", "get_rostime", "get_time", "is_rostime_initialized", "is_wallclock", "set_rostime_initialized",
-    "switch_to_wallclock", "wallsleep",
+    "Duration", "Time", "get_rostime", "get_rostime_cond", "get_time", "is_rostime_initialized", "is_wallclock",
+    "set_rostime_initialized", "switch_to_wallclock", "wallsleep",
 ]  # fmt: skip

@@ -1,19 +1,13 @@
 """rospy.service, filled in by minirospy."""
 
-from minirospy.client.services import Service, ServiceProxy
-from minirospy.errors import ServiceException
+from minirospy.client.services import Service as Service
+from minirospy.client.services import ServiceProxy as ServiceProxy
+from minirospy.errors import ServiceException as ServiceException
 from rospy import core as _core
-from rospy.core import *  # noqa: F403
-from rospy.impl.registration import Registration
-from rospy.impl.transport import BIDIRECTIONAL, INBOUND, OUTBOUND
+from rospy.impl.passing import passing_on
+from rospy.impl.registration import Registration as Registration
+from rospy.impl.transport import BIDIRECTIONAL as BIDIRECTIONAL
+from rospy.impl.transport import INBOUND as INBOUND
+from rospy.impl.transport import OUTBOUND as OUTBOUND
 
-__all__ = [
-    "BIDIRECTIONAL",
-    "INBOUND",
-    "OUTBOUND",
-    "Registration",
-    "Service",
-    "ServiceException",
-    "ServiceProxy",
-]
-__all__ += _core.__all__
+__getattr__, __dir__ = passing_on(__name__, _core)

@@ -43,7 +43,7 @@ class Sleeper(threading.Thread):
         try:
             self.outcome = "returned", self.sleep()
         except rospy.ROSTimeMovedBackwardsException as error:
-            self.outcome = type(error).__name__, str(error), error.time
+            self.outcome = type(error).__name__, str(error), error.time, isinstance(error, KeyboardInterrupt)
         except rospy.ROSException as error:
             self.outcome = type(error).__name__, str(error)
 

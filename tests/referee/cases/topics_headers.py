@@ -43,6 +43,8 @@ def answer(sock):
     return fields
 
 
+# Of ours: as ROS 1 and no more.
+os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[])
 got = []
 arrived = threading.Event()

@@ -1,0 +1,149 @@
+"""Who a node is: its name, its namespace, and what the command line and the environment say of it.
+
+Source: http://wiki.ros.org/Names, http://wiki.ros.org/Remapping%20Arguments.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from minirospy import names
+from minirospy.environment import Environment
+from minirospy.errors import ROSInitException, RpcError, UsageError
+from minirospy.wire.xmlrpc import serialize_call
+
+__all__ = ["Identity", "private_parameters", "warn_of_illegal_name"]
+
+_UNNAMED = "unnamed"
+
+
+class Identity:
+    """A name, and how others' names look from there. Before :meth:`_take_name` that of a program without a node."""
+
+    def __init__(self) -> None:
+        self.remappings: dict[str, str] = {}
+        """By resolved names; empty before init_node."""
+        self._name: str | None = None
+        self._arguments: names.Arguments | None = None
+        self._environment: Environment | None = None
+        self._is_named = False
+
+    @property
+    def environment(self) -> Environment:
+        """The environment that the process started in."""
+        if self._environment is None:
+            self._environment = _read_environment()
+        return self._environment
+
+    @property
+    def arguments(self) -> names.Arguments:
+        """The command line: that of init_node, before it that of the process."""
+        if self._arguments is None:
+            self._arguments = names.parse_arguments(sys.argv)
+        return self._arguments
+
+    @property
+    def name(self) -> str:
+        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        if self._name is None:
+            self._name = names.join(self.environment.namespace, _UNNAMED)
+        return self._name
+
+    def resolve(self, name: str, caller_id: str | None = None) -> str:
+        """The global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        node_name = caller_id or self.name
+        if name and names.is_private(name):
+            # As rospy reads it: `~` keeps a slash behind it, and `~/x` is `/x`.
+            resolved = names.join(node_name, names.canonicalize(name)[1:])
+        else:
+            resolved = names.resolve(name, node_name)
+        return self.remappings.get(resolved, resolved)
+
+    def resolve_topic(self, name: str) -> str:
+        """The same for a topic, which keeps the name that it was made with.
+
+        Before init_node it has the remappings of the process's command line, but cannot be private:
+        raises ValueError.
+        """
+        if self._is_named:
+            return self.resolve(name)
+        if names.is_private(name):
+            raise ValueError("~name topics cannot be created before init_node() has been called")
+        return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
+
+    def remap(self, name: str, caller_id: str | None = None) -> str:
+        """What the command line says in place of ``name``, as it is spelt there; else ``name`` itself."""
+        mapped = self.arguments.remappings.get(name)
+        return name if mapped is None else names.resolve(mapped, caller_id or self.name)
+
+    def reload_arguments(self, argv: Sequence[str]) -> None:
+        """Take ``argv`` for the command line."""
+        self._arguments = names.parse_arguments(argv)
+
+    def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
+        """Read the environment, and be the node ``name`` of the command line ``argv``. Raises ROSInitException."""
+        arguments = self._arguments = names.parse_arguments(argv)
+        self._is_named = True
+        try:
+            self._environment = _read_environment()
+        except UsageError as error:
+            raise ROSInitException(str(error)) from error
+        if "__name" in arguments.special:
+            name = arguments.special["__name"]
+        elif anonymous:
+            name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
+        self._name = names.resolve(name, names.join(self.environment.namespace, _UNNAMED))
+        self.remappings = arguments.resolved_remappings(self._name)
+
+    def forget_name(self) -> None:
+        """Topics are resolved as before :meth:`take_name`."""
+        self._is_named = False
+
+
+def private_parameters(arguments: names.Arguments) -> dict[str, Any]:
+    """The values of ``_param:=value``, read as YAML. Raises ROSInitException on what is none."""
+    if arguments.wrong:
+        raise ROSInitException(
+            f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="
+        )
+    if not arguments.parameters:
+        return {}
+    import yaml
+
+    values = {}
+    for key, text in arguments.parameters.items():
+        try:
+            values[key] = yaml.safe_load(text)
+            serialize_call("setParam", (key, values[key]))
+        except (yaml.YAMLError, RpcError) as error:
+            why = " ".join(str(error).split())
+            raise ROSInitException(f"invalid command-line parameters: [_{key}:={text}]: {why}") from error
+    return values
+
+
+def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
+    """Warn, as rospy does, of a name that is not one of the graph; the master refuses it later, or does not."""
+    if not names.is_legal_name(name):
+        warnings.warn(
+            f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",
+            stacklevel=stacklevel,
+        )
+
+
+def _read_environment() -> Environment:
+    """The environment, and what the process's own command line says in place of it.
+
+    As in rospy, the ``argv`` that a program hands to init_node has no say in this, but for ``__name``.
+    """
+    special: Mapping[str, str] = names.parse_arguments(sys.argv).special
+    hosts = [value for key, value in special.items() if key in {"__ip", "__hostname"}]
+    return Environment.read(
+        master_uri=special.get("__master", ""),
+        host=hosts[0] if hosts else "",
+        namespace=special.get("__ns", ""),
+    )

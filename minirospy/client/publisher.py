@@ -1,0 +1,292 @@
+"""Publisher as rospy has it: messages become bytes here, in the thread that publishes.
+
+Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+import warnings
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from minirospy.client.process import process
+from minirospy.client.topic import (
+    AnyMsg,
+    Shared,
+    Topic,
+    interface_type,
+    register_with_master,
+    unregister_from_master,
+)
+from minirospy.clock import wait_for_event
+from minirospy.errors import ROSException, ROSSerializationException, SerializationError
+from minirospy.idl.message import args_kwds_to_message
+from minirospy.runtime.workers import InOrder
+from minirospy.wire.framing import LargeFrame, Pieces
+from minirospy.wire.tcpros import ANY
+
+if TYPE_CHECKING:
+    from minirospy.runtime.links import OutLink
+
+__all__ = ["Published", "Publisher", "SubscribeListener"]
+
+_log = logging.getLogger("rosout")
+_signals = process.signals
+_M = TypeVar("_M", bound=Any)
+
+
+class SubscribeListener:
+    """Told when subscribers come and go; override what you need."""
+
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
+    ) -> None:
+        """A subscriber has come: ``topic_publish`` reaches all, ``peer_publish`` only this one."""
+
+    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
+        """A subscriber has gone; ``num_peers`` are left."""
+
+
+class Publisher(Topic[_M]):
+    """Publishes messages of ``data_class`` on a topic.
+
+    ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
+    number; None: ``publish`` itself waits until all are written). ``latch``: whoever joins later gets
+    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is told of
+    subscribers, in a thread of the library, one event after the other. Raises ValueError on a bad name, class
+    or queue_size.
+    """
+
+    impl: Published | None
+
+    def __init__(
+        self,
+        name: str,
+        data_class: type[_M],
+        subscriber_listener: SubscribeListener | None = None,
+        tcp_nodelay: bool = False,
+        latch: bool = False,
+        headers: Mapping[str, str] | None = None,
+        queue_size: int | None = None,
+    ) -> None:
+        super().__init__(name, data_class, "pub")
+        if queue_size is None:
+            warnings.warn(
+                "The publisher should be created with an explicit keyword argument 'queue_size'. Please see "
+                "http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers for more information.",
+                SyntaxWarning,
+                stacklevel=2,
+            )
+        size = _checked_size(queue_size)
+        fields = dict(headers or {})
+        with process.lock:
+            state = process.published.get(self.resolved_name)
+            if state is None:
+                state = process.published[self.resolved_name] = Published(self.resolved_name, data_class)
+            state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
+        self.impl = state
+        process.when_ready(state.register)
+
+    def publish(self, *args: Any, **kwds: Any) -> None:
+        """Publish a message, or the message that these field values make.
+
+        Raises ROSException before init_node and after unregister, ROSSerializationException or TypeError on
+        values that do not fit. Waits for no subscriber longer than a few milliseconds, except with ``queue_size=None``.
+        """
+        state = self.impl
+        if state is None:
+            raise ROSException("publish() to an unregistered() handle")
+        if len(args) == 1 and args[0].__class__ is self.data_class and not kwds:
+            state.publish(args[0])
+        else:
+            state.check_initialized()
+            if len(args) == 1 and isinstance(args[0], AnyMsg):
+                # As with rospy, bytes are taken for what their sender says that they are.
+                state.publish(args[0])
+            else:
+                state.publish(args_kwds_to_message(self.data_class, args, kwds))
+
+    def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> bool:
+        """Wait until so many subscribers are connected; False where ``timeout`` seconds were not enough.
+
+        What is published before a subscriber is connected does not reach it, unless the topic is latched.
+        Raises ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
+        """
+        if self.impl is None:
+            raise ROSException("wait_for_subscribers() on an unregistered() handle")
+        return self.impl.wait_for_subscribers(count, timeout)
+
+
+class Published(Shared):
+    """One published topic of the process: what its Publishers share."""
+
+    def __init__(self, topic: str, data_class: type[Any]) -> None:
+        # asyncio comes with it.
+        from minirospy.runtime.topics import Publication
+
+        super().__init__(topic, data_class)
+        self.publication = Publication(topic, interface_type(data_class), on_link=self._on_link)
+        self._handles: set[Publisher[Any]] = set()
+        self._listeners: list[SubscribeListener] = []
+        self._events: InOrder | None = None
+        self._waiting: list[Callable[[], None]] = []
+        self._was_heard = False
+        self._sequence = itertools.count(1)
+        self._has_header = bool(getattr(data_class, "_has_header", False))
+        self._registered = False
+
+    def join(
+        self,
+        handle: Publisher[Any],
+        listener: SubscribeListener | None,
+        queue_size: int | None,
+        latch: bool,
+        headers: Mapping[str, str] | None,
+        tcp_nodelay: bool,
+    ) -> None:
+        publication = self.publication
+        if ANY not in (handle.md5sum, publication.type.md5sum) and handle.md5sum != publication.type.md5sum:
+            _log.error(
+                "topic [%s] is published as [%s] by this process already: subscribers will not understand "
+                "what its Publisher of [%s] sends",
+                self.resolved_name,
+                self.type,
+                handle.type,
+            )
+        self._handles.add(handle)
+        if listener:
+            self._listeners.append(listener)
+        publication.queue_size = queue_size
+        publication.latch = publication.latch or latch
+        publication.tcp_nodelay = publication.tcp_nodelay or tcp_nodelay
+        publication.headers.update(headers or {})
+
+    def register(self) -> None:
+        """Tell the master, once."""
+        if self._registered or not self._handles or not process.node or process.is_shutdown():
+            return
+        self._registered = True
+        # Before the master knows: a subscriber may come at once, and a publish() before it answers counts.
+        register_with_master("publication", self.publication.topic, process.node.advertise(self.publication))
+
+    def leave(self, handle: Publisher[Any]) -> None:
+        with process.lock:
+            self._handles.discard(handle)
+            is_last = not self._handles
+            if is_last:
+                del process.published[self.publication.topic]
+        if is_last and process.node and not process.is_shutdown():
+            unregister_from_master(process.node.unadvertise(self.publication))
+
+    def check_initialized(self) -> None:
+        """Raise ROSException before init_node."""
+        if not self._registered and not process.is_shutdown():
+            raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
+
+    def publish(self, message: Any) -> None:
+        """Send a message to every subscriber."""
+        publication = self.publication
+        if not self._registered:
+            self.check_initialized()
+        elif publication.links or publication.latch:
+            publication.publish(self._frame(message))
+            if _signals.late:
+                _signals.take_late()
+        elif not self._was_heard:
+            self._was_heard = True
+            self._tell_unheard()
+
+    def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
+        """See :meth:`Publisher.wait_for_subscribers`."""
+        self.check_initialized()
+        enough = threading.Event()
+
+        def look() -> None:
+            if len(self.publication.links) >= count or process.is_shutdown():
+                enough.set()
+
+        with process.interrupting(enough.set):
+            self._waiting.append(look)
+            try:
+                look()
+                wait_for_event(enough, timeout)
+            finally:
+                self._waiting.remove(look)
+        if process.is_shutdown():
+            raise process.interrupted("rospy shutdown")
+        return enough.is_set()
+
+    @property
+    def connections(self) -> tuple[OutLink, ...]:
+        """The links to subscribers."""
+        return self.publication.links
+
+    def _tell_unheard(self) -> None:
+        """The first message went to nobody: worth a warning only where somebody wants it, and is on the way.
+
+        That most topics have no subscriber at first, or ever, is in order.
+        """
+        if self.publication.expected and not process.is_shutdown():
+            _log.warning(
+                "the first message on %s went to nobody: %d known to the master, not connected yet. "
+                "wait_for_subscribers() waits for them, latch=True keeps the last message for them",
+                self.resolved_name,
+                self.publication.expected,
+            )
+        else:
+            _log.debug("the first message on %s went to nobody: it has no subscriber yet", self.resolved_name)
+
+    def _frame(self, message: Any) -> bytes | LargeFrame:
+        if self._has_header and not isinstance(message, AnyMsg):
+            message.header.seq = next(self._sequence)
+        pieces = Pieces()
+        try:
+            message.serialize(pieces)
+        except SerializationError as error:
+            if not self._has_header or getattr(message.header, "frame_id", "") is not None:
+                raise ROSSerializationException(str(error)) from error
+            # What rospy makes of None.
+            message.header.frame_id = "0"
+            pieces.clear()
+            try:
+                message.serialize(pieces)
+            except SerializationError as again:
+                raise ROSSerializationException(str(again)) from again
+        return pieces.frame()
+
+    def _on_link(self, link: OutLink, is_up: bool) -> None:
+        self._was_heard = True
+        for look in list(self._waiting):
+            look()
+        if not self._listeners or not process.node:
+            return
+        if self._events is None:
+            self._events = InOrder(process.node.workers)
+        topic = self.publication.topic
+
+        def publish_to_all(*args: Any, **kwds: Any) -> None:
+            for handle in list(self._handles)[:1]:
+                handle.publish(*args, **kwds)
+
+        def publish_to_peer(*args: Any, **kwds: Any) -> None:
+            for handle in list(self._handles)[:1]:
+                link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
+
+        for listener in self._listeners:
+            if is_up:
+                self._events.start(listener.peer_subscribe, topic, publish_to_all, publish_to_peer)
+            else:
+                self._events.start(listener.peer_unsubscribe, topic, len(self.publication.links))
+
+
+def _checked_size(queue_size: Any) -> int | None:
+    """A Publisher's queue_size as rospy reads it: less than nothing is no limit. Raises ValueError."""
+    if queue_size is None:
+        return None
+    try:
+        return max(0, int(queue_size))
+    except (TypeError, ValueError):
+        raise ValueError(f"queue_size must be an integer or None: {queue_size!r}") from None

@@ -1,0 +1,149 @@
+"""SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK: the node shuts down, and its process ends.
+
+The handler runs in the main thread. Beside it a thread watches (:mod:`minirospy.client.ending`), which hears of a
+signal also where the main thread is in C code and runs no handler.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Any
+
+from minirospy.client.ending import EndWatch, is_over
+from minirospy.client.life import Life, where
+from minirospy.errors import ROSInterruptException
+
+__all__ = ["Signals"]
+
+_ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+
+class Signals:
+    """The signals of this process, once :meth:`take` was called in its main thread."""
+
+    def __init__(self, life: Life) -> None:
+        self._life = life
+        self._before: dict[int, Any] = {}
+        self._is_inherited = False
+        self._count = 0
+        self._watch: EndWatch | None = None
+        self._is_sending: Callable[[FrameType | None], bool] = lambda _: False
+        self.late = 0
+        """A signal that came while the main thread was sending; who has sent takes it."""
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether a signal has asked the program to end."""
+        return self._count > 0
+
+    def take(self) -> None:
+        """Let the signals shut the node down. Only the main thread may take signals; without effect in another."""
+        if threading.current_thread() is not threading.main_thread():
+            return
+        from minirospy.runtime.links import is_sending
+
+        self._is_sending = is_sending
+        self._is_inherited = False
+        for name in _ENDING:
+            number = getattr(signal, name, None)
+            if number is None or (handler := signal.getsignal(number)) == self._on_signal:
+                continue
+            if name == "SIGHUP" and handler == signal.SIG_IGN:
+                # As nohup has it.
+                continue
+            self._before[number] = handler
+            signal.signal(number, self._on_signal)
+        self._watching().listen(frozenset(self._before), self._on_signal)
+
+    def take_late(self) -> None:
+        """Act on a signal that came while the main thread was sending."""
+        if threading.current_thread() is threading.main_thread() and self.late:
+            self._on_signal(self.late, None)
+
+    def end_quietly(self) -> None:
+        """A program, or a thread of it, that does not catch what tells it of its end, ends without a traceback."""
+        before, before_in_thread = sys.excepthook, threading.excepthook
+
+        def end_of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+            if self._is_end(error):
+                raise SystemExit(0)
+            before(kind, error, trace)
+
+        def end_of_thread(arguments: Any) -> None:
+            if not self._is_end(arguments.exc_value):
+                before_in_thread(arguments)
+
+        sys.excepthook, threading.excepthook = end_of_main, end_of_thread
+
+    def at_exit(self) -> None:
+        """The program has ended: what it has printed goes out now, or, to a reader that does not read, never."""
+        if not self._watch:
+            return
+        if not self._count:
+            self._watch.let_go()
+            return
+        with self._watch.at_once(), contextlib.suppress(OSError, ValueError, AttributeError):
+            sys.stdout.flush()
+
+    def begin_in_fork(self) -> None:
+        """This process is a copy: its signals are its own."""
+        self._is_inherited = True
+        self._count = self.late = 0
+        if self._watch:
+            self._watch.let_go()
+            self._watch = None
+
+    def _is_end(self, error: BaseException | None) -> bool:
+        """Whether it told of the end, or came of that: an interrupted wait may find its lock not taken."""
+        while error is not None:
+            if isinstance(error, ROSInterruptException) and self._life.is_shutdown():
+                return True
+            if isinstance(error, KeyboardInterrupt) and self._count:
+                return True
+            error = error.__context__ if isinstance(error, RuntimeError) else None
+        return False
+
+    def _watching(self) -> EndWatch:
+        if self._watch is None:
+            self._watch = EndWatch(self._life, lambda: self.late)
+        return self._watch
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        watch = self._watching()
+        if self._is_sending(frame):
+            # A hook that publishes would wait for the lock that this very thread holds. publish() takes the signal
+            # when it has sent; for the other senders the watch sends it again. A loop that only publishes is nearly
+            # always caught in the sending: the watch alone would try for seconds.
+            self.late = number
+            watch.handled(0)
+            return
+        was_late, self.late = self.late, 0
+        order = watch.take_order()
+        if order is EndWatch.AGAIN and not was_late:
+            return
+        if self._is_inherited and not self._life.listener().asks:
+            # A worker of the program, which never asks is_shutdown(), ends as any child process does.
+            signal.signal(number, self._before[number])
+            signal.raise_signal(number)
+            return
+        if isinstance(order, BaseException):
+            self._life.listener().knows = True
+            self._life.told_at = where(frame)
+            raise order
+        self._count += 1
+        watch.handled(number)
+        if not self._life.is_shutdown_requested:
+            self._life.signal_shutdown(f"signal-{number}")
+            previous = self._before.get(number)
+            if callable(previous):
+                with contextlib.suppress(KeyboardInterrupt):
+                    previous(number, frame)
+        elif self._count == 2 and not self._life.is_leaving and not is_over(frame):
+            # The program did not end at the first: now it is interrupted as any Python program. Once: another
+            # would come into the clean-up of the library's own functions. If it does not help, the watch ends it.
+            raise KeyboardInterrupt

@@ -1,0 +1,253 @@
+"""Subscriber as rospy has it: bytes become messages here, in the worker that has read them.
+
+Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import traceback
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from minirospy.client.process import process
+from minirospy.client.topic import Shared, Topic, interface_type, register_with_master, unregister_from_master
+from minirospy.clock import wait_for_event
+from minirospy.errors import MasterUnreachableError, ROSException, RpcError
+from minirospy.runtime.complaints import Complaints
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
+
+if TYPE_CHECKING:
+    from minirospy.client.statistics import StatisticsPublisher
+    from minirospy.runtime.topics import InLink, Subscription
+
+__all__ = ["Subscribed", "Subscriber", "wait_for_message"]
+
+_log = logging.getLogger("rosout")
+_M = TypeVar("_M", bound=Any)
+_WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
+"""Topics that are not counted: the counts themselves, and what their times come from."""
+
+
+class Subscriber(Topic[_M]):
+    """Calls ``callback(message)`` with each message of a topic.
+
+    ``callback_args`` is handed to the callback as second argument. ``queue_size``: while the callback is
+    busy, keep only so many messages, the newest (None: all, in order). ``buff_size`` is accepted and not
+    needed: freshness does not depend on it. Subscribers of one topic in a process share the connections;
+    they keep as many messages as the one that asks for most. One that comes later to a latched topic gets
+    its last message at once, before the constructor returns. Raises ValueError on a bad name or class,
+    ROSException on a bad size.
+    """
+
+    impl: Subscribed | None
+
+    def __init__(
+        self,
+        name: str,
+        data_class: type[_M],
+        callback: Callable[..., object] | None = None,
+        callback_args: Any = None,
+        queue_size: int | None = None,
+        buff_size: int = 65536,
+        tcp_nodelay: bool = False,
+    ) -> None:
+        super().__init__(name, data_class, "sub")
+        self.callback = callback
+        self.callback_args = callback_args
+        if queue_size is not None:
+            if not isinstance(queue_size, int):
+                raise ROSException("queue size must be an integer")
+            if queue_size == 0:
+                raise ROSException("queue size may not be set to zero")
+        if not isinstance(buff_size, int):
+            raise ROSException("buffer size must be an integer")
+        if buff_size <= 0:
+            raise ROSException("buffer size must be a positive integer")
+        self._newest = max(0, queue_size or 0)
+        with process.lock:
+            state = process.subscribed.get(self.resolved_name)
+            if state is None:
+                state = process.subscribed[self.resolved_name] = Subscribed(self.resolved_name, data_class)
+            # Looked up before joining: what comes from now on is delivered in the usual way.
+            latched = state.latched()
+            state.join(self, tcp_nodelay)
+        self.impl = state
+        process.when_ready(state.register)
+        state.replay(self, latched)
+
+    def unregister(self) -> None:
+        """Stop listening; the connections end with the last Subscriber of the topic in this process."""
+        super().unregister()
+        self.callback = self.callback_args = None
+
+
+def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
+    """The next message of ``topic``; ``timeout`` in seconds, or a Duration.
+
+    Raises ROSException after ``timeout``, ROSInterruptException where the node shuts down.
+    """
+    if timeout is not None and hasattr(timeout, "to_sec"):
+        timeout = timeout.to_sec()
+    got: list[_M] = []
+    arrived = threading.Event()
+
+    def on_message(message: _M) -> None:
+        got.append(message)
+        arrived.set()
+
+    with process.interrupting(arrived.set):
+        subscriber = Subscriber(topic, topic_type, on_message)
+        try:
+            wait_for_event(arrived, timeout)
+        finally:
+            subscriber.unregister()
+    if got:
+        return got[0]
+    if process.is_shutdown():
+        raise process.interrupted("rospy shutdown")
+    raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
+
+
+class _Callback(NamedTuple):
+    """A subscriber's function with the argument that it wants beside the message."""
+
+    function: Callable[..., object]
+    args: Any
+
+
+class _Receiver(NamedTuple):
+    """A message class, whether it can be read from a memoryview (genpy's cannot), and who wants it."""
+
+    data_class: type[Any]
+    takes_memoryview: bool
+    callbacks: tuple[_Callback, ...]
+
+
+class Subscribed(Shared):
+    """One subscribed topic of the process: what its Subscribers share."""
+
+    def __init__(self, topic: str, data_class: type[Any]) -> None:
+        super().__init__(topic, data_class)
+        self.subscription: Subscription | None = None
+        self._tcp_nodelay = False
+        self._handles: list[Subscriber[Any]] = []
+        self._receivers: tuple[_Receiver, ...] = ()
+        self._statistics: StatisticsPublisher | None = None
+        self._misfits = Complaints(_log)
+        self._registered = False
+
+    @property
+    def connections(self) -> tuple[InLink, ...]:
+        """The links to publishers."""
+        return self.subscription.links if self.subscription else ()
+
+    def join(self, handle: Subscriber[Any], tcp_nodelay: bool) -> None:
+        self._tcp_nodelay = self._tcp_nodelay or tcp_nodelay
+        self._handles.append(handle)
+        self._update()
+
+    def leave(self, handle: Subscriber[Any]) -> None:
+        with process.lock:
+            self._handles.remove(handle)
+            self._update()
+            is_last = not self._handles
+            if is_last:
+                del process.subscribed[self.resolved_name]
+        if is_last and process.node and self.subscription and not process.is_shutdown():
+            unregister_from_master(process.node.unsubscribe(self.subscription))
+
+    def register(self) -> None:
+        """Tell the master, once."""
+        if self._registered or not self._handles or not process.node or process.is_shutdown():
+            return
+        self._registered = True
+        self.subscription = process.node.make_subscription(
+            self.resolved_name,
+            interface_type(self.data_class),
+            self._deliver,
+            newest=self._newest(),
+            tcp_nodelay=self._tcp_nodelay,
+        )
+        if self.resolved_name not in _WITHOUT_STATISTICS:
+            process.node.workers.start(self._look_for_statistics)
+        register_with_master("subscription", self.resolved_name, process.node.subscribe(self.subscription))
+
+    def _newest(self) -> int:
+        """How many messages to keep: as many as the Subscriber that asks for most."""
+        sizes = [handle._newest for handle in self._handles]
+        return 0 if 0 in sizes else max(sizes, default=0)
+
+    def _look_for_statistics(self) -> None:
+        """Count what comes where the parameter says so. In a worker: no Subscriber waits for the answer."""
+        try:
+            is_on = process.master.get_param("/enable_statistics")
+        except (MasterUnreachableError, RpcError):
+            return
+        if is_on:
+            from minirospy.client.statistics import StatisticsPublisher
+
+            self._statistics = StatisticsPublisher(self.resolved_name)
+
+    def _update(self) -> None:
+        """Group the callbacks by class, so that a message is deserialised once for all of a class."""
+        if self.subscription:
+            self.subscription.newest = self._newest()
+        by_class: dict[type[Any], list[_Callback]] = {}
+        for handle in self._handles:
+            callbacks = by_class.setdefault(handle.data_class, [])
+            if handle.callback is not None:
+                callbacks.append(_Callback(handle.callback, handle.callback_args))
+        self._receivers = tuple(
+            _Receiver(cls, getattr(cls, "_takes_memoryview", False), tuple(callbacks))
+            for cls, callbacks in by_class.items()
+            if callbacks
+        )
+
+    def latched(self) -> list[tuple[Frame, Header]]:
+        """The last message of each latched publisher, with the header of its link."""
+        return [(link.latched, link.header) for link in self.connections if link.latched is not None]
+
+    def replay(self, handle: Subscriber[Any], latched: list[tuple[Frame, Header]]) -> None:
+        """Give a Subscriber the messages that came before it did."""
+        if handle.callback is None:
+            return
+        callbacks = (_Callback(handle.callback, handle.callback_args),)
+        receiver = _Receiver(handle.data_class, False, callbacks)
+        for frame, header in latched:
+            self._deliver(frame, header, (receiver,))
+
+    def _deliver(self, frame: Frame, header: Header, receivers: tuple[_Receiver, ...] | None = None) -> None:
+        statistics = None if receivers else self._statistics
+        for data_class, takes_memoryview, callbacks in receivers or self._receivers:
+            message = data_class()
+            try:
+                message.deserialize(frame if takes_memoryview else bytes(frame))
+            except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
+                self._misfits.error(
+                    "a message on %s from %s does not fit %s: %s",
+                    self.resolved_name,
+                    header.get("callerid"),
+                    data_class._type,
+                    error,
+                )
+                continue
+            message._connection_header = header
+            if statistics:
+                statistics.count(message, header, len(frame))
+                statistics = None
+            for callback in callbacks:
+                _call(callback, message)
+
+
+def _call(callback: _Callback, message: Any) -> None:
+    try:
+        if callback.args is None:
+            callback.function(message)
+        else:
+            callback.function(message, callback.args)
+    except Exception:  # noqa: BLE001 - the user's function: its fault must not end the connection
+        if not process.is_shutdown():
+            _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

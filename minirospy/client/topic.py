@@ -1,0 +1,137 @@
+"""What publishers and subscribers share: the topic, its message class, and telling the master.
+
+Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, Generic, TypeVar
+
+from minirospy.client.identity import warn_of_illegal_name
+from minirospy.client.process import process
+from minirospy.errors import MasterUnreachableError, ROSException, RpcError
+from minirospy.idl.message import Message
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+__all__ = ["AnyMsg", "Shared", "Topic", "interface_type", "register_with_master", "unregister_from_master"]
+
+_log = logging.getLogger("rosout")
+_M = TypeVar("_M", bound=Any)
+
+
+class AnyMsg(Message):
+    """A message of any type: its bytes, and in ``_connection_header`` what the publisher told of them."""
+
+    _md5sum = ANY
+    _type = ANY
+    _has_header = False
+    _takes_memoryview = True
+    _full_text = ""
+    _slot_types: list[str] = []
+    __slots__ = ["_buff"]
+
+    def __init__(self, *args: object) -> None:
+        if args:
+            raise ROSException("AnyMsg does not accept arguments")
+        self._buff: bytes | None = None
+
+    def serialize(self, buff: Any) -> None:
+        """Write the bytes that were received."""
+        if self._buff is None:
+            raise ROSException("AnyMsg is not initialized")
+        buff.write(self._buff)
+
+    def deserialize(self, str: Any) -> AnyMsg:
+        """Take the bytes."""
+        self._buff = bytes(str)
+        return self
+
+
+class Topic(Generic[_M]):
+    """What Publisher and Subscriber share: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
+
+    ``impl`` is what all handles of the topic in this process share, None once unregistered.
+    """
+
+    impl: Shared | None
+
+    def __init__(self, name: str, data_class: type[_M], reg_type: str) -> None:
+        if not name or not isinstance(name, str):
+            raise ValueError("topic name is not a non-empty string")
+        if data_class is None:
+            raise ValueError("topic parameter 'data_class' is not initialized")
+        if not isinstance(data_class, type):
+            raise ValueError(f"data_class [{data_class}] is not a class")
+        if not hasattr(data_class, "_md5sum") or not hasattr(data_class, "serialize"):
+            raise ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
+        self.resolved_name = process.resolve_topic(name)
+        warn_of_illegal_name(name, stacklevel=4)
+        self.name = self.resolved_name
+        self.data_class = data_class
+        self.type: str = data_class._type
+        self.md5sum: str = data_class._md5sum
+        self.reg_type = reg_type
+
+    def get_num_connections(self) -> int:
+        """How many nodes are connected: subscribers of a Publisher, publishers of a Subscriber."""
+        return self.impl.get_num_connections() if self.impl else 0
+
+    def unregister(self) -> None:
+        """Stop; the topic's connections end with its last handle in this process. Idempotent.
+
+        As with rospy the handle then keeps its ``name`` only.
+        """
+        shared, self.impl = self.impl, None
+        if shared:
+            shared.leave(self)
+            self.resolved_name = self.type = self.md5sum = self.data_class = None  # type: ignore[assignment]
+
+
+class Shared:
+    """What the handles of one topic in this process share: the ``impl`` that user code sees of rospy's."""
+
+    def __init__(self, topic: str, data_class: type[Any]) -> None:
+        self.resolved_name = self.name = topic
+        self.data_class = data_class
+        self.type: str = data_class._type
+
+    @property
+    def connections(self) -> tuple[Any, ...]:
+        """The links to the other ends."""
+        raise NotImplementedError
+
+    def leave(self, handle: Any) -> None:
+        """One handle less; the last ends the topic."""
+        raise NotImplementedError
+
+    def get_num_connections(self) -> int:
+        """How many links there are."""
+        return len(self.connections)
+
+    def has_connections(self) -> bool:
+        """Whether there is a link."""
+        return bool(self.connections)
+
+
+def interface_type(data_class: type[Any]) -> InterfaceType:
+    """What a connection header tells of a message class."""
+    return InterfaceType(data_class._type, data_class._md5sum, getattr(data_class, "_full_text", ""))
+
+
+def register_with_master(what: str, topic: str, registration: Any) -> None:
+    """Run a registration; a master that says no is logged, as in rospy, and the program goes on."""
+    try:
+        process.run(registration)
+    except MasterUnreachableError as error:
+        _log.critical("unable to register %s [%s] with master: %s. Will keep trying.", what, topic, error)
+    except RpcError as error:
+        _log.critical("unable to register %s [%s] with master: %s", what, topic, error)
+
+
+def unregister_from_master(unregistration: Any) -> None:
+    """Run the end of a registration; a master that is not there has forgotten it anyway."""
+    try:
+        process.run(unregistration)
+    except (MasterUnreachableError, RpcError) as error:
+        _log.debug("unregistering: %s", error)

@@ -1,0 +1,213 @@
+"""A service's client that blocks its caller, and what both ends read and write.
+
+Without asyncio, which a command that calls one service would wait for. Source: http://wiki.ros.org/ROS/TCPROS
+("Services").
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import struct
+from collections.abc import Mapping
+from urllib.parse import urlsplit
+
+from minirospy.errors import CallFailed, WireError
+from minirospy.runtime import sockets
+from minirospy.wire.framing import MAX_FRAME
+from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
+from minirospy.wire.tcpros import check_service, service_client_header
+
+__all__ = ["ANSWER", "LENGTH", "PeerEndedError", "Reader", "ServiceClient", "checked", "parse_service_uri"]
+
+ANSWER = struct.Struct("<BI")
+"""Whether the call went well, and the length of what follows."""
+
+LENGTH = struct.Struct("<I")
+"""The length of a request."""
+
+_RECEIVE = 16 * 1024
+_MOST = 1024 * 1024
+
+
+class ServiceClient:
+    """A connection to one service, used by one thread at a time; it blocks the thread that calls.
+
+    ``timeout`` bounds connecting and the handshake; a call itself may take as long as its handler does,
+    until :meth:`hang_up` ends it from another thread.
+    """
+
+    def __init__(
+        self,
+        uri: str,
+        service: str,
+        md5sum: str,
+        caller_id: str,
+        *,
+        persistent: bool = False,
+        probe: bool = False,
+        headers: Mapping[str, str] | None = None,
+        timeout: float = sockets.HANDSHAKE_SECONDS,
+        waits: bool = True,
+    ) -> None:
+        """Connect to ``uri`` (rosrpc://host:port) and exchange headers.
+
+        With ``waits`` false the server's header is left for :meth:`finish`, so that the caller can do something
+        else meanwhile. Raises HandshakeRefused where the server says no, OSError or WireError where it cannot be
+        talked to.
+        """
+        self.header: Header = {}
+        self._uri = uri
+        fields = service_client_header(
+            service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
+        )
+        # Made before connecting, so that the server finds it when it looks at the connection for the first time.
+        header = serialize_header(fields)
+        self._sock = _connected(parse_service_uri(uri), timeout)
+        try:
+            self._sock.sendall(header)
+            self._reader = Reader(self._sock)
+            self._poll = select.poll() if hasattr(select, "poll") else None
+            if self._poll:
+                self._poll.register(self._sock, select.POLLIN)
+        except BaseException:
+            self._sock.close()
+            raise
+        if waits:
+            self.finish()
+
+    def finish(self) -> None:
+        """Receive the server's header. Raises as the constructor does; the connection is closed then."""
+        try:
+            self.header = self._receive_header()
+            check_service(self.header)
+            self._sock.settimeout(None)
+        except BaseException:
+            self._sock.close()
+            raise
+
+    def call(self, request: bytes) -> bytes:
+        """The response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
+        self._sock.sendall(LENGTH.pack(len(request)) + request)
+        ok, length = ANSWER.unpack(self._reader.take(ANSWER.size))
+        body = self._reader.take(checked(length))
+        if not ok:
+            raise CallFailed(body)
+        return body
+
+    def has_ended(self) -> bool:
+        """Whether the server has hung up: a request that is sent now would not be read."""
+        # Nothing comes unasked: what can be read is the end. A poll object of its own, since each call looks.
+        return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
+
+    def hang_up(self) -> None:
+        """End a call that is under way in another thread."""
+        sockets.hang_up(self._sock)
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        with contextlib.suppress(OSError):
+            self._sock.close()
+
+    def _receive_header(self) -> Header:
+        try:
+            (length,) = LENGTH.unpack(self._reader.take(4))
+            if length > MAX_HEADER:
+                raise WireError(f"{self._uri} does not speak TCPROS")
+            return parse_header(self._reader.take(length))
+        except PeerEndedError as error:
+            raise WireError(
+                "connection from sender terminated before handshake header received. "
+                f"{error.received} bytes were received. Please check sender for additional details."
+            ) from error
+
+
+def parse_service_uri(uri: str) -> tuple[str, int]:
+    """(host, port) of ``rosrpc://host:port``. Raises WireError."""
+    try:
+        parts = urlsplit(uri)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if parts.scheme != "rosrpc" or not host or not port:
+        raise WireError(f"protocol uri is invalid: {uri}")
+    # "localhost" may name IPv6 first, where no server of ROS 1 listens.
+    return ("127.0.0.1" if host == "localhost" else host), port
+
+
+def checked(length: int) -> int:
+    """The length of a request or response, where it is allowed. Raises WireError."""
+    if length > MAX_FRAME:
+        raise WireError(f"a body of {length} bytes is over the limit of {MAX_FRAME}")
+    return length
+
+
+class PeerEndedError(WireError):
+    """The peer has ended in the middle, after ``received`` bytes of what was to be read."""
+
+    def __init__(self, received: int) -> None:
+        super().__init__(received)
+        self.received = received
+
+    def __str__(self) -> str:
+        return "unable to receive data from sender, check sender's logs for details"
+
+
+class Reader:
+    """Exact reads from a blocking socket; what came beyond them is kept for the next.
+
+    A small request or answer arrives whole: so one receive takes length and body together.
+    """
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._receive = sock.recv
+        self._rest = b""
+
+    def take(self, count: int, *, at_end_ok: bool = False) -> bytes:
+        """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
+        data = self._rest
+        while len(data) < count:
+            more = self._receive(min(max(count - len(data), _RECEIVE), _MOST))
+            if not more:
+                if at_end_ok and not data:
+                    return b""
+                raise PeerEndedError(len(data))
+            data = data + more if data else more
+            if count > _MOST:
+                return self._take_large(data, count)
+        self._rest = data[count:]
+        return data[:count]
+
+    def _take_large(self, data: bytes, count: int) -> bytes:
+        parts = [data]
+        missing = count - len(data)
+        while missing > 0:
+            more = self._receive(min(missing, _MOST))
+            if not more:
+                raise PeerEndedError(count - missing)
+            parts.append(more)
+            missing -= len(more)
+        whole = b"".join(parts)
+        self._rest = whole[count:]
+        return whole[:count]
+
+
+def _connected(address: tuple[str, int], timeout: float) -> socket.socket:
+    """A tuned blocking socket. Raises OSError."""
+    try:
+        socket.inet_pton(socket.AF_INET, address[0])
+    except OSError:
+        sock = socket.create_connection(address, timeout)
+        sockets.tune(sock)
+        return sock
+    # Most services are found by an address: no resolver has to be asked.
+    sock = socket.socket()
+    try:
+        sockets.tune(sock)
+        sock.settimeout(timeout)
+        sock.connect(address)
+    except BaseException:
+        sock.close()
+        raise
+    return sock

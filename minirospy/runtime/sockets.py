@@ -1,0 +1,49 @@
+"""Sockets, without a loop: what is set on them, and how they are looked at and ended."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+
+__all__ = ["FAMILIES", "HANDSHAKE_SECONDS", "hang_up", "is_readable", "tune"]
+
+FAMILIES = (socket.AF_INET, socket.AF_INET6)
+"""What a socket of TCP is of."""
+
+HANDSHAKE_SECONDS = 10.0
+"""Others may never answer: each handshake ends after this."""
+
+_KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
+"""Seconds of silence, seconds between questions, questions. macOS calls the first TCP_KEEPALIVE."""
+
+
+def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
+    """TCP_NODELAY as asked; keepalive, so that a peer that lost power is noticed within a minute.
+
+    A socket of another kind is left as it is.
+    """
+    if sock.family not in FAMILIES:
+        return
+    if nodelay:
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option, value in _KEEPALIVE.items():
+        if hasattr(socket, option):
+            with contextlib.suppress(OSError):
+                sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+
+
+def hang_up(sock: socket.socket) -> None:
+    """End a connection; a thread that is blocked in a read of it wakes up and closes it."""
+    with contextlib.suppress(OSError):
+        sock.shutdown(socket.SHUT_RDWR)
+
+
+def is_readable(sock: socket.socket) -> bool:
+    """Whether a read would not wait. poll, since select fails on descriptors above 1023."""
+    if hasattr(select, "poll"):
+        poll = select.poll()
+        poll.register(sock, select.POLLIN)
+        return bool(poll.poll(0))
+    return bool(select.select([sock], [], [], 0)[0])

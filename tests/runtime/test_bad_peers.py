@@ -1,0 +1,60 @@
+"""A node of a process of its own, as users write it, under attack: it answers, its memory and its log stay small.
+
+The attacks are those of benchmarks/bad_peers.py, which measures them.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from xmlrpc.client import ServerProxy
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks" / "bad_peers.py"
+PEERS = 200
+
+
+@pytest.fixture(scope="module")
+def bad_peers() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("bad_peers", SCRIPT)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["bad_peers"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def victim(master: str, bad_peers: ModuleType) -> Iterator[tuple[object, str, str]]:
+    """The node, and where its XML-RPC API and its services are."""
+    node = bad_peers.Victim([sys.executable, "-c", bad_peers.NODE], dict(os.environ), "ready")
+    with ServerProxy(master) as proxy:
+        api, service = proxy.lookupNode("/test", "/victim"), proxy.lookupService("/test", "/flag")
+    yield node, api[2], service[2]  # type: ignore[index]
+    node.close()
+
+
+def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, master: str) -> None:
+    node, api, service = victim
+    ask: Callable[[], None] = lambda: bad_peers.ask_node(api, service)  # noqa: E731
+    tcpros, xmlrpc = bad_peers.port_of(service), bad_peers.port_of(api)
+    short = bad_peers.bad_publisher(master, b"\x05\0\0\0short")
+    attacks = [
+        (bad_peers.garbage, xmlrpc, 1),
+        (bad_peers.half_request, xmlrpc, 1),
+        (bad_peers.silent, tcpros, 12),
+        (bad_peers.half_header, tcpros, 12),
+        (bad_peers.huge_request, tcpros, 1),
+        (short, 0, 3),
+    ]
+    for attack, port, most_lines in attacks:
+        row = bad_peers.measure(attack.__name__, node, attack, port, PEERS, ask)
+        assert row.answered, row
+        assert row.height - row.before < 40, row
+        assert row.lines <= most_lines, (row, node.lines[-row.lines :])  # type: ignore[attr-defined]

@@ -1,0 +1,31 @@
+"""runtime/complaints: the first of a flood of lines is told, and then how many there were."""
+
+from __future__ import annotations
+
+import pytest
+
+from minirospy.runtime import complaints
+from minirospy.runtime.complaints import Complaints
+
+
+def test_a_flood_is_told_by_its_first_line_and_its_number(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(complaints.time, "monotonic", lambda: now[0])
+    log = complaints.logging.getLogger("test-complaints")
+    told = Complaints(log)
+    for number in range(1000):
+        told.warning("%s is bad", number)
+        now[0] += 0.001
+    now[0] += 10.0
+    told.error("%s is worse", "this")
+    now[0] += 10.0
+    told.error("%s too", "that")
+    assert [record.getMessage() for record in caplog.records] == [
+        "0 is bad",
+        "this is worse (and 999 more like it before)",
+        "that too",
+    ]
+    assert [record.levelname for record in caplog.records] == ["WARNING", "ERROR", "ERROR"]
+    assert all(record.filename == "test_complaints.py" for record in caplog.records)

@@ -1,0 +1,370 @@
+"""runtime/links: what carries frames, over TCP and over a Unix socket, and peers that stall, end and lie."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from minirospy.errors import WireError
+from minirospy.runtime import links
+from minirospy.runtime.loop import LoopThread
+from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
+
+KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
+
+
+@pytest.fixture(params=KINDS)
+def pair(request: pytest.FixtureRequest) -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Two ends of a connection within this machine."""
+    if request.param == "unix":
+        one, other = socket.socketpair(socket.AF_UNIX)
+    else:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            one = socket.create_connection(server.getsockname())
+            other, _ = server.accept()
+    with one, other:
+        yield one, other
+
+
+@pytest.fixture
+def loop() -> Iterator[LoopThread]:
+    thread = LoopThread("test-loop")
+    yield thread
+    thread.close()
+
+
+@dataclass
+class Keeps:
+    """How many frames a slow receiver is to get."""
+
+    newest: int
+
+
+def open_link(
+    loop: LoopThread,
+    sock: socket.socket,
+    queue_size: int,
+    on_closed: Callable[[links.OutLink], None],
+    *,
+    split: bool = False,
+) -> links.OutLink:
+    async def make() -> links.OutLink:
+        sock.setblocking(False)
+        link = links.OutLink(sock, asyncio.get_running_loop(), "/peer", queue_size, on_closed, split=split)
+        link.open()
+        return link
+
+    return loop.run(make())
+
+
+def receive_all(sock: socket.socket, count: int) -> bytes:
+    data = bytearray()
+    while len(data) < count:
+        more = sock.recv(1 << 20)
+        assert more, "the link ended"
+        data += more
+    return bytes(data)
+
+
+def test_frames_of_several_threads_stay_whole(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 0, lambda _: None)
+    frames = [serialize_frame(bytes([number]) * 300_000) for number in range(8)]
+    threads = [threading.Thread(target=lambda f=f: [link.send(f) for _ in range(5)]) for f in frames]
+    for thread in threads:
+        thread.start()
+    data = receive_all(pair[1], sum(map(len, frames)) * 5)
+    for thread in threads:
+        thread.join()
+    seen = []
+    while data:
+        (length,) = struct.unpack_from("<I", data)
+        body = data[4 : 4 + length]
+        assert set(body) == {body[0]}
+        seen.append(body[0])
+        data = data[4 + length :]
+    assert sorted(seen) == sorted(list(range(8)) * 5)
+    assert (link.sent, link.dropped, link.waiting) == (40, 0, 0)
+
+
+def test_a_full_queue_drops_the_oldest_and_never_half_a_frame(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 3, lambda _: None)
+    size = 4_000_000
+    for number in range(50):
+        link.send(serialize_frame(bytes([number]) * size))
+    assert link.waiting <= 4
+    count = 50 - link.dropped
+    data = receive_all(pair[1], count * (size + 4))
+    numbers = [data[at + 4] for at in range(0, len(data), size + 4)]
+    assert numbers[-3:] == [47, 48, 49]
+    assert numbers == sorted(numbers)
+    assert all(data[at : at + 4] == struct.pack("<I", size) for at in range(0, len(data), size + 4))
+
+
+def test_a_peer_that_hangs_up_ends_the_link_and_whoever_waits_for_it(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    ended = threading.Event()
+    link = open_link(loop, pair[0], 0, lambda _: ended.set())
+    link.send(serialize_frame(bytes(50_000_000)))
+    waiter = threading.Thread(target=link.wait)
+    waiter.start()
+    pair[1].close()
+    waiter.join(10)
+    assert not waiter.is_alive()
+    assert ended.wait(10)
+    link.send(b"to nobody")
+
+
+def test_what_a_subscriber_says_is_not_listened_to(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    ended = threading.Event()
+    link = open_link(loop, pair[0], 0, lambda _: ended.set())
+    pair[1].sendall(b"x" * 10_000)
+    link.send(serialize_frame(b"still here"))
+    assert receive_all(pair[1], 14)[4:] == b"still here"
+    assert not ended.is_set()
+
+
+def test_reading_ends_at_a_length_over_the_limit(pair: tuple[socket.socket, socket.socket]) -> None:
+    pair[1].sendall(serialize_frame(b"good") + b"\xff\xff\xff\xff")
+    bodies: list[bytes] = []
+    with pytest.raises(WireError, match="over the limit"):
+        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0))
+    assert bodies == [b"good"]
+    assert pair[0].fileno() == -1
+
+
+def test_reading_ends_with_half_a_frame(pair: tuple[socket.socket, socket.socket]) -> None:
+    pair[1].sendall(serialize_frame(b"whole") + b"\x05\0\0\0ab")
+    pair[1].close()
+    bodies: list[bytes] = []
+    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0))
+    assert bodies == [b"whole"]
+
+
+@pytest.mark.parametrize(
+    ("newest", "expected"), [(1, [9]), (3, [7, 8, 9]), (100, list(range(10))), (0, list(range(10)))]
+)
+def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected: list[int]) -> None:
+    pair[1].sendall(b"".join(serialize_frame(bytes([number])) for number in range(10)))
+    pair[1].close()
+    bodies: list[int] = []
+    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), Keeps(newest))
+    assert bodies == expected
+
+
+# --- large messages
+
+
+def image(array: bytes) -> LargeFrame:
+    """A message that ends with a byte array, as its class writes it."""
+    pieces = Pieces()
+    pieces.write(b"head")
+    pieces.write(struct.pack("<BI", 7, len(array)))
+    pieces.write(array)
+    frame = pieces.frame()
+    assert isinstance(frame, LargeFrame)
+    return frame
+
+
+def joined(frame: LargeFrame) -> bytes:
+    return b"".join(frame.pieces)
+
+
+def read_in_thread(sock: socket.socket, frames: list[Frame], newest: int = 0) -> threading.Thread:
+    thread = threading.Thread(
+        target=links.read_frames,
+        args=(
+            sock,
+            lambda frame: frames.append(frame if isinstance(frame, bytes) else bytes(frame)),
+            Keeps(newest),
+        ),
+    )
+    thread.start()
+    return thread
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_small_and_large_messages_in_turns(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread, split: bool
+) -> None:
+    link = open_link(loop, pair[0], 0, lambda _: None, split=split)
+    large = [image(bytes([number]) * (CHUNK + 1000 * number)) for number in range(20)]
+    sent: list[bytes] = []
+    frames: list[Frame] = []
+    reader = read_in_thread(pair[1], frames)
+    for number, frame in enumerate(large):
+        link.send(frame)
+        sent.append(joined(frame))
+        for size in [0, 10, CHUNK - 4, CHUNK][: number % 5]:
+            link.send(serialize_frame(bytes(size)))
+            sent.append(bytes(size))
+    loop.run(link.drain(10))
+    loop.loop.call_soon_threadsafe(link.close)
+    reader.join(10)
+    assert [len(frame) for frame in frames] == [len(frame) for frame in sent]
+    assert list(map(bytes, frames)) == sent
+    assert {type(frame) for frame in frames if len(frame) > CHUNK} == {SplitFrame if split else bytes}
+    assert link.sent_bytes == sum(map(len, sent)) + 4 * len(sent)
+
+
+def test_the_array_is_an_object_of_its_own(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 0, lambda _: None, split=True)
+    frames: list[Frame] = []
+    reader = read_in_thread(pair[1], frames)
+    link.send(image(b"x" * 1_000_000))
+    loop.run(link.drain(10))
+    loop.loop.call_soon_threadsafe(link.close)
+    reader.join(10)
+    (frame,) = frames
+    assert isinstance(frame, SplitFrame)
+    assert frame[9:] is frame.tail
+
+
+def test_a_large_message_with_something_behind_its_array_is_not_split() -> None:
+    pieces = Pieces([struct.pack("<I", CHUNK), bytes(CHUNK), b"dense"])
+    frame = pieces.frame()
+    assert isinstance(frame, LargeFrame)
+    assert frame.buffers(split=True) == [struct.pack("<I", CHUNK + 9), *pieces]
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 20_000])
+def test_pieces_that_are_no_bytes(count: int) -> None:
+    array = memoryview(struct.pack(f"{count}d", *range(count))).cast("d")
+    frame = Pieces([array]).frame()
+    sent = frame if isinstance(frame, bytes) else b"".join(frame.buffers(split=False))
+    assert sent == serialize_frame(array.tobytes())
+    assert Pieces([b"", array, b"end"]).frame() is not None
+
+
+def test_what_may_still_change_is_copied() -> None:
+    array = bytearray(2 * CHUNK)
+    frame = Pieces([struct.pack("<I", 2 * CHUNK), array]).frame()
+    array[0] = 1
+    assert isinstance(frame, LargeFrame)
+    assert frame.pieces[-1][0] == 0
+
+
+def test_a_peer_that_ends_in_the_middle_of_a_large_message(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    ended = threading.Event()
+    link = open_link(loop, pair[0], 0, lambda _: ended.set(), split=True)
+    sender = threading.Thread(target=link.send, args=(image(bytes(50_000_000)),))
+    sender.start()
+    receive_all(pair[1], 1_000_000)
+    pair[1].close()
+    assert ended.wait(10)
+    sender.join(10)
+    assert not sender.is_alive()
+    assert link.waiting == 0
+
+
+@pytest.mark.parametrize("begin", [b"\x50\xc3\0\x80", b"\x50\xc3\x01\x80\x40\xc3\x01\0headABCD"])
+def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
+    pair: tuple[socket.socket, socket.socket], begin: bytes
+) -> None:
+    pair[1].sendall(serialize_frame(b"whole") + begin)
+    pair[1].close()
+    frames: list[Frame] = []
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(0))
+    assert frames == [b"whole"]
+
+
+@pytest.mark.parametrize(
+    ("size", "array", "head", "words"),
+    [
+        (200_000, 100_000, bytes(100_000), "not split where its array begins"),
+        (200_000, 199_999, b"", "ends with an array of 199999"),
+        (200_000, 10, b"", "ends with an array of 10"),
+        (100, 90, b"", "ends with an array of 90"),
+        (1 << 30 | 1, 90, b"", "over the limit"),
+    ],
+)
+def test_split_frames_that_lie(
+    pair: tuple[socket.socket, socket.socket], size: int, array: int, head: bytes, words: str
+) -> None:
+    data = struct.pack("<II", size | 1 << 31, array) + head + bytes(array if head else 0)
+    sender = threading.Thread(target=pair[1].sendall, args=(data,))
+    sender.start()
+    with pytest.raises(WireError, match=words):
+        links.read_frames(pair[0], lambda _: None, Keeps(0))
+    sender.join(10)
+
+
+def test_no_memory_for_a_message_ends_the_link_with_a_line() -> None:
+    def receive(_count: int, _flags: int = 0) -> bytes:
+        raise MemoryError
+
+    def receive_into(space: memoryview) -> int:
+        space[:4] = struct.pack("<I", 1 << 29)
+        return 4
+
+    sock: Any = SimpleNamespace(
+        setblocking=lambda _: None, recv=receive, recv_into=receive_into, close=lambda: None
+    )
+    with pytest.raises(WireError, match="no memory for a message of 536870912 bytes"):
+        links.read_frames(sock, lambda _: None, Keeps(0))
+
+
+def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> None:
+    data = b"".join(b"".join(image(bytes([number]) * CHUNK).buffers(split=True)) for number in range(3))
+    pair[1].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
+    sender = threading.Thread(target=lambda: (pair[1].sendall(data), pair[1].close()))
+    sender.start()
+    frames: list[bytes] = []
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(1))
+    sender.join(10)
+    assert frames[-1] == joined(image(bytes([2]) * CHUNK))
+
+
+# --- a subscriber that is slower than its publisher
+
+
+def test_who_reads_is_waited_for_rather_than_dropped(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 10, lambda _: None)
+    frames: list[Frame] = []
+    reader = read_in_thread(pair[1], frames)
+    for number in range(50_000):
+        link.send(serialize_frame(number.to_bytes(8, "little")))
+    loop.run(link.drain(10))
+    loop.loop.call_soon_threadsafe(link.close)
+    reader.join(10)
+    # Another program may take the reader's processor away for longer than it is waited for.
+    assert len(frames) + link.dropped == 50_000
+    assert link.dropped < 25_000
+    numbers = [int.from_bytes(frame, "little") for frame in frames]
+    assert numbers == sorted(numbers)
+
+
+def test_who_does_not_read_is_not_waited_for(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 2, lambda _: None)
+    frame = serialize_frame(bytes(60_000))
+    while not link.dropped:
+        link.send(frame)
+    begin = time.monotonic()
+    for _ in range(1000):
+        link.send(frame)
+    # Each wait would be a millisecond.
+    assert time.monotonic() - begin < 0.5
+    assert link.waiting <= 3

@@ -1,0 +1,209 @@
+"""runtime/rpc_async and runtime/notifier: connections that are kept, lost, refused or late; lists that are long."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import socket
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
+from minirospy.graph.registry import PublisherUpdate
+from minirospy.runtime.notifier import Notifier
+from minirospy.runtime.rpc_async import AsyncRpcClient
+from minirospy.runtime.rpc_server import RpcServer
+from minirospy.wire.xmlrpc import serialize_call
+
+CALL = serialize_call("getPid", ["/x"])
+
+
+def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(asyncio.wait_for(test(), 20))
+
+
+async def until(condition: Callable[[], object]) -> None:
+    while not condition():
+        await asyncio.sleep(0.002)
+
+
+def test_a_kept_connection_that_the_peer_closed_is_made_anew() -> None:
+    async def test() -> None:
+        client, server = AsyncRpcClient(), RpcServer(lambda method, args: [method, *args])
+        await server.start()
+        uri = f"http://localhost:{server.port}/"
+        assert await client.call(uri, "a", 1) == ["a", 1]
+        await until(lambda: server.clients == 1)
+        assert await client.call(uri, "a", 2) == ["a", 2]
+        assert server.clients == 1
+        for connection in list(server.connections):
+            connection.end()
+        assert await client.call(uri, "a", 3) == ["a", 3]
+        await server.close()
+        with pytest.raises(RpcUnreachable):
+            await client.call(uri, "a", 4)
+        assert not client.under_way
+        await client.close()
+
+    run(test)
+
+
+def test_a_server_at_the_ipv6_address_of_localhost_alone_is_found() -> None:
+    if not socket.has_ipv6:
+        pytest.skip("this machine has no IPv6")
+
+    async def test() -> None:
+        client, server = AsyncRpcClient(), RpcServer(lambda method, args: 5, bind_host="::1")
+        try:
+            await server.start()
+        except OSError:
+            pytest.skip("this machine has no IPv6")
+        assert await client.call(f"http://localhost:{server.port}/", "a") == 5
+        await client.close()
+        await server.close()
+
+    run(test)
+
+
+def test_what_is_under_way_ends_with_its_client_and_its_time() -> None:
+    async def test() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+            client = AsyncRpcClient()
+            with pytest.raises(RpcUnreachable, match=r"timed out after 0\.05 s"):
+                await client.call(uri, "a", timeout=0.05)
+            waiting = asyncio.ensure_future(client.call(uri, "a"))
+            await until(lambda: client.under_way)
+            waiting.cancel()
+            await asyncio.gather(waiting, return_exceptions=True)
+            assert not client.under_way
+            waiting = asyncio.ensure_future(client.call(uri, "a"))
+            await until(lambda: client.under_way)
+            await client.close()
+            with pytest.raises(RpcUnreachable, match="closed"):
+                await waiting
+
+    run(test)
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (b"", "closed without an answer"),
+        (b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", "answered HTTP/1.1 404"),
+        (b"garbage\r\n\r\n", "not HTTP"),
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 10\r\n\r\nabc", "ended inside a message"),
+    ],
+)
+def test_bad_answers(answer: bytes, why: str) -> None:
+    async def test() -> None:
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            await reader.readuntil(b"</methodCall>")
+            writer.write(answer)
+            writer.close()
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        client = AsyncRpcClient()
+        with pytest.raises((RpcUnreachable, RpcProtocolError), match=why):
+            await client.call(f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/", "a")
+        await client.close()
+        server.close()
+
+    run(test)
+
+
+def test_a_bad_uri_is_told_at_once() -> None:
+    async def test() -> None:
+        client, found = AsyncRpcClient(), list[bytes | RpcError]()
+        client.begin("nonsense", CALL, 1.0, found.append)
+        assert isinstance(found[0], RpcUnreachable)
+        await client.close()
+
+    run(test)
+
+
+def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -> None:
+    async def test() -> None:
+        told: list[tuple[float, str, int]] = []
+        loop = asyncio.get_running_loop()
+
+        def serve(method: str, args: Any) -> list[Any]:
+            told.append((loop.time(), args[1], len(args[2])))
+            return [1, "", 0]
+
+        server = RpcServer(serve)
+        await server.start()
+        uri = f"http://127.0.0.1:{server.port}/"
+        lists = {"/many": ["http://x:1/"] * 1000, "/few": ["http://x:1/"]}
+        notifier = Notifier(lambda topic: lists[topic], 5.0)
+        notifier.send(PublisherUpdate(uri, "/many"))
+        await until(lambda: len(told) == 1)
+        for _ in range(5):
+            notifier.send(PublisherUpdate(uri, "/many"))
+        notifier.send(PublisherUpdate(uri, "/few"))
+        await until(lambda: len(told) == 3)
+        assert [(topic, count) for _, topic, count in told] == [("/many", 1000), ("/few", 1), ("/many", 1000)]
+        assert told[2][0] - told[0][0] > 0.05
+        # It rests: a node whose pause is over takes neither memory nor time.
+        await until(lambda: not notifier._nodes)
+        await notifier.close()
+        await server.close()
+
+    run(test)
+
+
+def test_an_update_that_waited_tells_of_the_publishers_that_came_unsaid() -> None:
+    async def test() -> None:
+        told: list[int] = []
+
+        def serve(_: str, args: Any) -> list[Any]:
+            told.append(len(args[2]))
+            return [1, "", 0]
+
+        server = RpcServer(serve)
+        await server.start()
+        uri = f"http://127.0.0.1:{server.port}/"
+        publishers = ["http://x:1/"] * 300
+        notifier = Notifier(lambda _: list(publishers), 5.0)
+        notifier.send(PublisherUpdate(uri, "/many"))
+        await until(lambda: told)
+        # This one pauses, while a publisher comes at a time when nobody subscribes.
+        notifier.send(PublisherUpdate(uri, "/many"))
+        notifier.send(PublisherUpdate(f"http://127.0.0.1:{server.port}/other", "/many"))
+        await until(lambda: len(told) == 2)
+        publishers.append("http://x:2/")
+        await until(lambda: len(told) == 3)
+        assert told == [300, 300, 301]
+        await notifier.close()
+        await server.close()
+
+    run(test)
+
+
+def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def test() -> None:
+        told: list[str] = []
+        server = RpcServer(lambda _, args: told.append(args[1]) or [1, "", 0])  # type: ignore[func-returns-value]
+        await server.start()
+        uri = f"http://127.0.0.1:{server.port}/"
+        notifier = Notifier(lambda _: [], 60.0)
+
+        def none_left(*_: object) -> None:
+            raise OSError(errno.EMFILE, "Too many open files")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(socket, "socket", none_left)
+            notifier.send(PublisherUpdate(uri, "/lost"))
+            await until(lambda: not notifier._nodes)
+        notifier.send(PublisherUpdate(uri, "/told"))
+        await until(lambda: told)
+        assert told == ["/told"]
+        assert notifier._line.under_way + notifier._suspect_line.under_way <= 1
+        await notifier.close()
+        await server.close()
+
+    run(test)

@@ -1,0 +1,113 @@
+"""runtime/rpc_server: clients take turns, and a time limit is for those that stand still."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+
+from minirospy.runtime import rpc_server
+from minirospy.runtime.rpc_server import RpcServer
+from minirospy.wire.http import serialize_request
+from minirospy.wire.xmlrpc import serialize_call
+
+
+def call(method: str, *args: Any) -> bytes:
+    return serialize_request("localhost", "/", serialize_call(method, args))
+
+
+async def until(condition: Callable[[], object]) -> None:
+    async def wait() -> None:
+        while not condition():
+            await asyncio.sleep(0)
+
+    await asyncio.wait_for(wait(), 10)
+
+
+def connect(server: RpcServer) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", server.port), 5)
+
+
+def test_who_asks_much_at_once_keeps_nobody_waiting_and_gets_all_its_answers_in_order() -> None:
+    told: list[str] = []
+
+    def dispatch(method: str, args: Sequence[Any]) -> str:
+        told.append(method)
+        return method
+
+    async def scene() -> bytes:
+        server = RpcServer(dispatch)
+        await server.start()
+        with connect(server) as greedy, connect(server) as modest:
+            greedy.sendall(b"".join(call(f"greedy{number}") for number in range(50)))
+            modest.sendall(call("modest"))
+            await until(lambda: len(told) == 51)
+            await until(lambda: all(each.is_idle for each in server.connections))
+            greedy.setblocking(False)
+            answers = b""
+            while b"greedy49" not in answers:
+                answers += await asyncio.get_running_loop().sock_recv(greedy, 65536)
+        await server.close()
+        return answers
+
+    answers = asyncio.run(scene())
+    assert told.index("modest") < 10
+    places = [answers.index(b"greedy%d<" % number) for number in range(50)]
+    assert places == sorted(places)
+
+
+def test_who_is_hung_up_on_amid_its_requests_gets_no_more_answers() -> None:
+    told: list[str] = []
+
+    def dispatch(method: str, args: Sequence[Any]) -> int:
+        told.append(method)
+        return 1
+
+    async def scene() -> int:
+        server = RpcServer(dispatch)
+        await server.start()
+        with connect(server) as greedy:
+            greedy.sendall(call("more") * 50)
+            await until(lambda: told)
+            for each in list(server.connections):
+                each.end()
+            before = len(told)
+            for _ in range(5):
+                await asyncio.sleep(0)
+        await server.close()
+        return before
+
+    assert asyncio.run(scene()) == len(told) < 50
+
+
+def test_the_time_limit_starts_anew_for_who_gets_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rpc_server, "_PROGRESS", 10_000)
+
+    async def scene() -> None:
+        server = RpcServer(lambda *_: "x" * 20_000_000)
+        await server.start()
+        with connect(server) as client:
+
+            def limit() -> float:
+                return next(iter(server._deadlines.values()), 0.0)
+
+            request = call("take", "x" * 50_000)
+            client.sendall(request[:100])
+            await until(limit)
+            first = limit()
+            held = next(iter(server.connections))
+            client.sendall(request[100:30_000])
+            await until(lambda: limit() > first)
+            client.sendall(request[30_000:])
+            await until(lambda: held._out)
+            # The answer is under way.
+            first = limit()
+            client.setblocking(False)
+            while limit() == first:
+                await asyncio.get_running_loop().sock_recv(client, 3_000_000)
+        await server.close()
+
+    asyncio.run(scene())

@@ -1,0 +1,207 @@
+"""How two nodes of one machine come to a Unix socket, and that TCP is there for everybody else."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import UsageError
+from minirospy.runtime import local
+from minirospy.runtime.slave import SlaveApi
+from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
+from tests.runtime.test_topics import Box, eventually, graph, listen, publish, run
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="abstract Unix sockets are Linux'")
+
+HERE = local.this_host()
+TCP, UNIX, ELSEWHERE = ["TCPROS"], ["UNIXROS", HERE], ["UNIXROS", HERE + "0"]
+
+
+@pytest.mark.parametrize(
+    ("transport", "offered", "chosen"),
+    [
+        ("", [TCP], "TCPROS"),
+        ("", [TCP, UNIX], "UNIXROS"),
+        ("", [UNIX], "UNIXROS"),
+        ("", [TCP, ELSEWHERE], "TCPROS"),
+        ("", [["UDPROS", "x"], TCP], "TCPROS"),
+        ("", [ELSEWHERE], None),
+        ("", [["UNIXROS"]], None),
+        ("tcp", [TCP, UNIX], "TCPROS"),
+        ("tcp", [UNIX], None),
+    ],
+)
+def test_the_publisher_chooses(
+    transport: str, offered: list[list[str]], chosen: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
+
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            await publish(a, "/t")
+            code, text, value = SlaveApi(a).dispatch("requestTopic", ["/b", "/t", offered])
+            if chosen is None:
+                assert (code, text, value) == (0, "no supported protocol implementations", [])
+            elif chosen == "TCPROS":
+                assert (code, value) == (1, ["TCPROS", "127.0.0.1", a.tcpros_port])
+            else:
+                assert (code, value) == (1, ["UNIXROS", a.unix_name, "127.0.0.1", a.tcpros_port])
+
+    run(scene)
+
+
+@pytest.mark.parametrize(
+    ("of_a", "of_b", "transport"),
+    [("", "", "UNIXROS"), ("auto", "auto", "UNIXROS"), ("tcp", "", "TCPROS"), ("", "tcp", "TCPROS")],
+)
+def test_both_sides_have_to_want_it(
+    of_a: str, of_b: str, transport: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            for node, name in ((a, of_a), (b, of_b)):
+                # As if the node had been started so.
+                if name == "tcp":
+                    node.this_host = ""
+            box = Box()
+            publication = await publish(a, "/t")
+            subscription = await listen(b, "/t", box)
+            await eventually(lambda: publication.links)
+            publication.publish(serialize_frame(b"hello"))
+            await eventually(lambda: box.bodies)
+            assert (publication.links[0].transport, subscription.links[0].transport) == (transport, transport)
+            ((_, _, rows), (_, _, others)) = (SlaveApi(node).get_bus_info("/c") for node in (a, b))
+            assert [row[3] for row in rows + others] == [transport, transport]
+
+    run(scene)
+
+
+def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a sandbox that keeps processes apart."""
+
+    def refuse(name: str) -> Any:
+        raise PermissionError(name)
+
+    monkeypatch.setattr(local, "connect", refuse)
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t")
+            box = Box()
+            await listen(b, "/t", box)
+            await eventually(lambda: publication.links)
+            assert publication.links[0].transport == "TCPROS"
+            publication.publish(serialize_frame(b"hello"))
+            await eventually(lambda: box.bodies == [b"hello"])
+
+    run(scene)
+
+
+@pytest.mark.parametrize("transport", ["auto", "tcp"])
+def test_an_image_arrives_and_by_the_unix_socket_without_a_copy_of_its_array(
+    transport: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
+    from sensor_msgs.msg import Image
+
+    sent = Image(height=480, width=640, encoding="rgb8", step=1920, data=os.urandom(921_600))
+    pieces = Pieces()
+    sent.serialize(pieces)
+    got: list[tuple[Any, Image]] = []
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            publication = await publish(a, "/t")
+            await listen(b, "/t", lambda frame, _: got.append((frame, Image().deserialize(frame))))
+            await eventually(lambda: publication.links)
+            publication.publish(pieces.frame())
+            await eventually(lambda: got)
+
+    run(scene)
+    ((frame, image),) = got
+    if transport == "auto":
+        assert isinstance(frame, SplitFrame)
+        assert image.data is frame.tail
+    assert image == sent
+    assert Image().deserialize(bytes(frame)) == sent
+
+
+LISTENER = """
+import os, sys, time, rospy
+from sensor_msgs.msg import Image
+rospy.init_node("listener", anonymous=True)
+def callback(message):
+    print("image", flush=True)
+    time.sleep(60)
+rospy.Subscriber("/t", Image, callback)
+rospy.spin()
+"""
+
+
+@pytest.mark.parametrize("transport", ["auto", "tcp"])
+def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
+    transport: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
+    from sensor_msgs.msg import Image
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (master, (a, b)):
+            box = Box()
+            publication = await publish(a, "/t", queue_size=2)
+            publication.type = publication.type._replace(
+                name=Image._type, md5sum=Image._md5sum, definition=Image._full_text
+            )
+            loop = asyncio.get_running_loop()
+            process = await loop.run_in_executor(None, start_listener, master.port)
+            try:
+                await eventually(lambda: publication.links)
+                pieces = Pieces()
+                Image(data=bytes(20_000_000)).serialize(pieces)
+                frame = pieces.frame()
+                await loop.run_in_executor(None, publication.publish, frame)
+                assert process.stdout
+                await loop.run_in_executor(None, process.stdout.readline)
+                # Its callback sleeps: this one stays in the middle.
+                await loop.run_in_executor(None, publication.publish, frame)
+                link = publication.links[0]
+                assert link.waiting == 1
+                process.send_signal(signal.SIGKILL)
+                await eventually(lambda: not publication.links)
+            finally:
+                process.kill()
+                process.communicate()
+            assert link.waiting == 0
+            # Nobody else is the worse for it.
+            subscription = b.make_subscription("/t", publication.type, box)
+            await b.subscribe(subscription)
+            await eventually(lambda: publication.links)
+            await loop.run_in_executor(None, publication.publish, frame)
+            await eventually(lambda: box.bodies)
+            assert box.bodies == [b"".join(pieces)]
+
+    run(scene)
+
+
+def start_listener(master_port: int) -> subprocess.Popen[str]:
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{master_port}",
+        "ROS_IP": "127.0.0.1",
+    }
+    return subprocess.Popen(
+        [sys.executable, "-c", LISTENER], env=environment, stdout=subprocess.PIPE, text=True
+    )
+
+
+def test_the_environment_names_a_transport_that_there_is() -> None:
+    assert Environment.read({"MINIROSPY_TRANSPORT": "TCP"}).transport == "tcp"
+    with pytest.raises(UsageError, match=r"MINIROSPY_TRANSPORT \[shm\] is neither 'tcp' nor 'auto'"):
+        Environment.read({"MINIROSPY_TRANSPORT": "shm"})
