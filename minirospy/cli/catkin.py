@@ -6,9 +6,7 @@ Source: http://wiki.ros.org/catkin/commands/catkin_make, https://catkin-tools.re
 from __future__ import annotations
 
 import getpass
-import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -136,7 +134,11 @@ def _catkin_make(words: list[str]) -> int:
     if "install" in options.targets:
         _install(workspace, plans)
     if tests or {"run_tests", "test", "tests"} & set(options.targets):
-        return _tested(workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)])
+        from minirospy.cli.catkin_tests import run_tests
+
+        return run_tests(
+            workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)]
+        )
     return 0
 
 
@@ -209,53 +211,6 @@ def _install(workspace: Workspace, plans: Sequence[Plan]) -> None:
         count = install(workspace, plan)
         print(f"-- Installed {plan.name}: {count} files")
     write_set_up(workspace.install, (workspace.install / "share",))
-
-
-def _tested(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests; 1 where one failed."""
-    worst = 0
-    ran = 0
-    for plan in plans:
-        if chosen and plan.name not in chosen:
-            continue
-        for test in plan.tests:
-            path = plan.folder / test.path
-            if not path.exists():
-                raise BuildError(str(plan.cmake_lists), test.line, f"there is no [{test.path}] to test")
-            if test.kind == "rostest":
-                print(f"{plan.name}: {test.path} needs rostest, which minirospy does not have yet: skipped")
-                continue
-            ran += 1
-            print(f"{plan.name}: pytest {test.path}", flush=True)
-            worst = max(worst, _pytest(workspace, plan, path))
-    print(f"{ran} test targets, {'all passed' if not worst else 'with failures'}")
-    return worst
-
-
-def _pytest(workspace: Workspace, plan: Plan, path: Path) -> int:
-    """pytest in the environment of the workspace; 1 where a test failed."""
-    from minirospy.workspace.plan import DIST_PACKAGES
-
-    results = workspace.build / "test_results" / plan.name
-    results.mkdir(parents=True, exist_ok=True)
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(
-            filter(None, [str(workspace.devel / DIST_PACKAGES), os.environ.get("PYTHONPATH", "")])
-        ),
-        "ROS_PACKAGE_PATH": os.pathsep.join(
-            filter(None, [str(workspace.source), os.environ.get("ROS_PACKAGE_PATH", "")])
-        ),
-    }
-    report = results / f"pytest-{path.stem}.xml"
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", str(path), f"--junitxml={report}"],
-        env=environment,
-        cwd=plan.folder,
-        check=False,
-    )
-    # 5: no tests in there.
-    return int(done.returncode not in (0, 5))
 
 
 def _remove(workspace: Workspace) -> None:
@@ -417,11 +372,19 @@ def _locate(argv: Sequence[str]) -> int:
 
 
 def _run_tests(argv: Sequence[str]) -> int:
+    from minirospy.cli.catkin_tests import run_tests
+
     parser = _parser("test", "Build, and run the tests of packages.")
     parser.add_argument("packages", nargs="*", default=[], help="default: all")
+    parser.add_argument("--this", action="store_true", help="the package around the current folder")
+    for flag in ("-j", "--jobs", "-p", "--parallel-packages"):
+        parser.add_argument(flag, nargs="?", help="accepted: one test runs after the other")
+    for flag in ("-c", "--continue-on-failure", "-v", "--verbose", "-i", "--interleave-output", "--no-deps"):
+        parser.add_argument(flag, action="store_true", help="accepted")
     options = parser.parse_args(argv)
     workspace = _workspace_of(options.workspace)
-    return _tested(workspace, _built(workspace, ()), options.packages)
+    chosen = [*options.packages, *([_this_package()] if options.this else [])]
+    return run_tests(workspace, _built(workspace, ()), chosen)
 
 
 # --- catkin_create_pkg

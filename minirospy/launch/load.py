@@ -6,36 +6,47 @@ Source: http://wiki.ros.org/roslaunch/XML.
 from __future__ import annotations
 
 import os
-import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
-from xml.parsers import expat
+from typing import Any, NamedTuple
 
 from minirospy import names
-from minirospy.errors import LaunchError, NotFoundError
-from minirospy.launch.spec import ArgDoc, LaunchSpec, NodeSpec
-from minirospy.launch.substitution import Substitution, SubstitutionError, convert
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.launch.document import Tag, parse_document
+from minirospy.launch.parameters import param_value, rosparam_values
+from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
+from minirospy.launch.substitution import Substitution
 from minirospy.workspace.packages import Packages
 
-__all__ = ["describe_args", "load_files", "load_text"]
+__all__ = [
+    "STDIN",
+    "Problems",
+    "Source",
+    "describe_args",
+    "find_files",
+    "load_files",
+    "load_sources",
+    "load_text",
+]
 
+STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
 
+Problems = list[LaunchError]
 
-@dataclass
-class _Element:
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[_Element] = field(default_factory=list)
-    text: str = ""
+
+class Source(NamedTuple):
+    """A launch file, its text (None: it is read), and what its args are given."""
+
+    file: str
+    text: bytes | None
+    args: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class _Scope:
-    """What a tag inherits from those around it."""
+    """What a tag inherits from those around it. ``private``: parameters of every node that follows."""
 
     namespace: str = "/"
     remaps: tuple[tuple[str, str], ...] = ()
@@ -43,37 +54,79 @@ class _Scope:
     private: tuple[tuple[str, Any], ...] = ()
 
 
+@dataclass
+class _Args:
+    """The args of a file: ``given`` by name, or ``passed`` on by a file that hands on all its own."""
+
+    given: dict[str, str]
+    passed: dict[str, str] = field(default_factory=dict)
+    declared: set[str] = field(default_factory=set)
+    hands_on_all: bool = False
+
+
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
     """Load launch files one after another, with ``args`` as on the command line. Raises LaunchError."""
-    spec = LaunchSpec()
-    for file in files:
-        try:
-            text = Path(file).read_bytes()
-        except OSError as error:
-            raise LaunchError(file, 0, f"cannot be read: {error.strerror}") from error
-        _load(spec, text, file, args, packages, environ)
-    _finish(spec)
-    return spec
+    return load_sources([Source(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
     """Load one launch file from its text, as from standard input. Raises LaunchError."""
+    return load_sources([Source(STDIN, text.encode(), args)], packages, environ)
+
+
+def load_sources(
+    sources: Sequence[Source],
+    packages: Packages,
+    environ: Mapping[str, str] | None = None,
+    problems: Problems | None = None,
+) -> LaunchSpec:
+    """Load launch files one after another. Faults are raised (LaunchError), or, with ``problems``, all put there."""
     spec = LaunchSpec()
-    _load(spec, text.encode(), "<stdin>", args, packages, environ)
-    _finish(spec)
+    anonymous: dict[str, str] = {}
+    used: set[str] = set()
+    environ = os.environ if environ is None else environ
+    for file, text, args in sources:
+        substitution = Substitution(packages, environ, file, dict(args), anonymous, used)
+        reader = _File(spec, substitution, _Args(dict(args)), 0, problems)
+        try:
+            reader.read(_read(file) if text is None else text, _Scope())
+        except LaunchError as error:
+            reader.tell(error)
+    for name in used:
+        # What is asked for is known, though no <arg> declares it.
+        spec.args.setdefault(name, ArgDoc(name, None, None))
+    _check_names(spec, problems)
     return spec
+
+
+def find_files(what: list[str], packages: Packages) -> list[str]:
+    """The launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
+    if len(what) == 2 and not Path(what[0]).is_file():
+        package, file = what
+        try:
+            return [str(packages.find_resource(package, file))]
+        except NotFoundError as error:
+            if error.kind == "package":
+                raise MinirospyError(
+                    f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
+                    f"file name: {error}"
+                ) from error
+            raise
+    for file in what:
+        if not Path(file).is_file():
+            raise MinirospyError(
+                f"[{file}] is not a launch file name: type roslaunch PACKAGE FILE, or a path"
+            )
+    return what
 
 
 def describe_args(file: str) -> list[ArgDoc]:
     """The arguments that a file declares, without loading what it includes. Raises LaunchError."""
-    try:
-        root = _parse(Path(file).read_bytes(), file)
-    except OSError as error:
-        raise LaunchError(file, 0, f"cannot be read: {error.strerror}") from error
+    root = parse_document(_read(file), file)
     return [
         ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
         for attributes in (element.attributes for element in root.children if element.tag == "arg")
@@ -81,366 +134,356 @@ def describe_args(file: str) -> list[ArgDoc]:
     ]
 
 
-def _load(
-    spec: LaunchSpec,
-    text: bytes,
-    file: str,
-    args: Mapping[str, str],
-    packages: Packages,
-    environ: Mapping[str, str] | None,
-) -> None:
-    substitution = Substitution(packages, os.environ if environ is None else environ, file)
-    _File(spec, file, substitution, dict(args), 0).read(_parse(text, file), _Scope())
-
-
-def _finish(spec: LaunchSpec) -> None:
+def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
+    # A <test> may be called as a node: it is one only where its program makes it one.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
-            raise LaunchError(
+            error = LaunchError(
                 node.file,
                 node.line,
                 f"roslaunch file contains multiple nodes named [{node.name}] "
                 f"(the other one: {other.file}:{other.line})",
             )
+            if problems is None:
+                raise error
+            problems.append(error)
 
 
-def _parse(text: bytes, file: str) -> _Element:
-    """The element tree, with line numbers. Raises LaunchError."""
-    parser = expat.ParserCreate()
-    stack: list[_Element] = []
-    roots: list[_Element] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        element = _Element(tag, attributes, parser.CurrentLineNumber)
-        (stack[-1].children if stack else roots).append(element)
-        stack.append(element)
-
-    def end(_: str) -> None:
-        stack.pop()
-
-    def data(part: str) -> None:
-        if stack:
-            stack[-1].text += part
-
-    def refuse(*_: object) -> None:
-        raise LaunchError(file, parser.CurrentLineNumber, "a launch file has no document type")
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = data, refuse
+def _read(file: str) -> bytes:
     try:
-        parser.Parse(text, True)
-    except expat.ExpatError as error:
-        raise LaunchError(
-            file, error.lineno, f"Invalid roslaunch XML syntax: {expat.ErrorString(error.code)}"
-        ) from None
-    if roots[0].tag != "launch":
-        raise LaunchError(file, roots[0].line, f"the outermost tag is <{roots[0].tag}>, it must be <launch>")
-    return roots[0]
+        return Path(file).read_bytes()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise LaunchError(file, 0, f"cannot be read: {why}") from error
 
 
 class _File:
-    """Reads one file into the spec that all share."""
+    """Reads one file into the spec that all share. ``problems``: where faults go that are not to be raised."""
 
     def __init__(
-        self, spec: LaunchSpec, file: str, substitution: Substitution, given: dict[str, str], depth: int
+        self,
+        spec: LaunchSpec,
+        substitution: Substitution,
+        args: _Args,
+        depth: int,
+        problems: Problems | None,
     ) -> None:
         self._spec = spec
-        self._file = file
+        self._file = substitution.file
         self._substitution = substitution
-        self._given = given
+        self._args = args
         self._depth = depth
-        self._declared: set[str] = set()
-        self._tags: dict[str, Callable[[_Element, _Scope], _Scope]] = {
+        self._problems = problems
+        self._tags: dict[str, Callable[[Tag, _Scope], _Scope]] = {
             "arg": self._arg,
             "param": self._param,
             "rosparam": self._rosparam,
             "node": self._node,
+            "test": self._test,
             "remap": self._remap,
             "env": self._env,
             "group": self._group,
             "include": self._include,
             "machine": self._machine,
-            "test": lambda element, scope: scope,
-            "master": lambda element, scope: scope,
+            "master": self._master,
         }
 
-    def read(self, root: _Element, scope: _Scope) -> None:
-        self._spec.files.append(str(Path(self._file).resolve()) if self._file != "<stdin>" else self._file)
-        for element in root.children:
-            scope = self._read(element, scope)
-        unused = set(self._given) - self._declared
-        if unused and self._depth:
-            raise LaunchError(
-                self._file,
-                root.line,
-                f"unused args [{', '.join(sorted(unused))}] for include of [{self._file}]",
-            )
+    def read(self, text: bytes, scope: _Scope) -> None:
+        """Read the file's text. Raises LaunchError."""
+        path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
+        if path not in self._spec.files:
+            self._spec.files.append(path)
+        root = Tag(parse_document(text, self._file), self._file, self._substitution)
+        root.warn_of_attributes(self._spec.warnings.append)
+        if root.has("deprecated"):
+            self._spec.warnings.append(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
+        for tag in root.children():
+            scope = self._read(tag, scope)
+        unused = set(self._args.given) - self._args.declared
+        if unused and self._depth and not self._args.hands_on_all:
+            raise root.error(f"unused args [{', '.join(sorted(unused))}] for include of [{self._file}]")
 
-    def _read(self, element: _Element, scope: _Scope) -> _Scope:
+    def tell(self, error: LaunchError) -> None:
+        """Raise a fault, or collect it where all are wanted."""
+        if self._problems is None:
+            raise error
+        self._problems.append(error)
+
+    def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
         """Read a tag; the scope for those after it."""
-        reader = self._tags.get(element.tag)
-        if reader is None:
-            known = NotFoundError("tag", element.tag, self._tags)
-            raise self._error(element, f"unknown tag <{element.tag}>: {known}")
-        try:
-            return reader(element, scope) if self._applies(element) else scope
-        except (SubstitutionError, NotFoundError) as error:
-            raise self._error(element, str(error)) from error
-
-    # --- tags
-
-    def _arg(self, element: _Element, scope: _Scope) -> _Scope:
-        name = self._required(element, "name")
-        value, default = self._optional(element, "value"), self._optional(element, "default")
-        if value is not None and default is not None:
-            raise self._error(element, f"<arg> tag must have one and only one of value/default: arg [{name}]")
-        if name in self._declared:
-            raise self._error(element, f"arg '{name}' has already been declared")
-        self._declared.add(name)
-        if value is not None:
-            if name in self._given:
-                raise self._error(element, f"cannot override arg '{name}', which has already been set")
-            self._substitution.args[name] = value
-        elif name in self._given:
-            self._substitution.args[name] = self._given[name]
-        elif default is not None:
-            self._substitution.args[name] = default
-        else:
-            raise self._error(element, f"required arg '{name}' is not set: add {name}:=VALUE")
-        if not self._depth and value is None:
-            self._spec.args[name] = ArgDoc(name, default, element.attributes.get("doc"))
-        return scope
-
-    def _param(self, element: _Element, scope: _Scope) -> _Scope:
-        name = self._required(element, "name")
-        value = self._param_value(element)
-        if names.is_private(name):
-            # Above a node: a private parameter of every node that follows in this scope.
-            return replace(scope, private=(*scope.private, (name[1:].lstrip("/"), value)))
-        self._set(names.join(scope.namespace, name), value)
-        return scope
-
-    def _param_value(self, element: _Element) -> Any:
-        ways = [way for way in ("value", "textfile", "binfile", "command") if way in element.attributes]
-        if len(ways) != 1:
-            raise self._error(
-                element, "<param> tag must have one and only one of value, textfile, binfile, command"
-            )
-        text = self._required(element, ways[0], may_be_empty=True)
-        type_ = self._optional(element, "type") or "auto"
-        try:
-            if ways[0] == "value":
-                return convert(text.strip() if type_ not in ("str", "string") else text, type_)
-            if ways[0] == "textfile":
-                return convert(Path(text).read_text(encoding="utf-8"), "str" if type_ == "auto" else type_)
-            if ways[0] == "binfile":
-                return Path(text).read_bytes()
-            return convert(self._output_of(text, element), "str" if type_ == "auto" else type_)
-        except ValueError as error:
-            raise self._error(element, f"param [{element.attributes['name']}]: {error}") from None
-        except OSError as error:
-            raise self._error(element, f"cannot read [{text}]: {error.strerror}") from None
-
-    def _output_of(self, command: str, element: _Element) -> str:
-        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
-        if done.returncode:
-            why = done.stderr.strip().splitlines()[-1:] or ["no output"]
-            raise self._error(element, f"command [{command}] ended with status {done.returncode}: {why[0]}")
-        return done.stdout
-
-    def _rosparam(self, element: _Element, scope: _Scope) -> _Scope:
-        command = self._optional(element, "command") or "load"
-        namespace = names.join(scope.namespace, self._optional(element, "ns") or "")
-        param = self._optional(element, "param")
-        if command == "delete":
-            self._spec.clear.append(names.canonicalize(names.join(namespace, param or "")))
+        reader = self._tags.get(tag.name)
+        if reader is None or (allowed is not None and tag.name not in allowed):
+            near = [] if reader else NotFoundError("tag", tag.name, allowed or self._tags).nearest
+            hint = f": did you mean <{near[0]}>?" if near else ""
+            where = "" if allowed is None else " here"
+            self._spec.warnings.append(tag.error(f"unrecognized tag <{tag.name}>{where}{hint}"))
             return scope
-        if command == "dump":
-            raise self._error(element, '<rosparam command="dump"> is not supported: use `rosparam dump FILE`')
-        if command != "load":
-            raise self._error(element, f"<rosparam> has no command [{command}]: there are load and delete")
-        for key, value in (
-            self._yaml(element).items() if param is None else [(param, self._yaml(element, param))]
-        ):
-            if names.is_private(param or ""):
-                scope = replace(scope, private=(*scope.private, (key[1:], value)))
-            else:
-                self._set(names.join(namespace, str(key)), value)
-        return scope
-
-    def _yaml(self, element: _Element, param: str | None = None) -> Any:
-        file = self._optional(element, "file")
-        text = element.text
-        if file is not None:
-            try:
-                text = Path(file).read_text(encoding="utf-8")
-            except OSError as error:
-                raise self._error(element, f"cannot read [{file}]: {error.strerror}") from None
-        if (self._optional(element, "subst_value") or "false").lower() in ("true", "1"):
-            text = self._substitution.apply(text)
+        tag.warn_of_attributes(self._spec.warnings.append)
         try:
-            value = convert(text, "yaml")
-        except ValueError as error:
-            raise self._error(element, f"<rosparam> {file or ''}: {error}") from None
-        if param is None:
-            if value is None:
-                return {}
-            if not isinstance(value, dict):
-                raise self._error(element, "<rosparam> without a param attribute must hold a YAML dictionary")
-        return value
+            if tag.name == "arg" and not self._depth:
+                # Known, whether its `if` lets it be or not.
+                self._substitution.used.add(tag.element.attributes.get("name", ""))
+            return reader(tag, scope) if tag.applies() else scope
+        except LaunchError as error:
+            self.tell(error)
+            return scope
 
-    def _node(self, element: _Element, scope: _Scope) -> _Scope:
-        name = self._required(element, "name")
-        if not names.is_legal_base_name(name):
-            raise self._error(
-                element, f"<node> name [{name}] is not legal: letters, digits and _, no namespace"
-            )
-        if self._optional(element, "machine") not in (None, "", "localhost"):
-            raise self._error(element, "nodes on other machines are not supported yet: leave machine out")
-        namespace = names.join(scope.namespace, self._optional(element, "ns") or "")
-        full_name = names.canonicalize(f"{namespace}/{name}")
-        if self._flag(element, "clear_params"):
-            self._spec.clear.append(full_name)
-        inner = replace(scope, namespace=full_name + "/")
-        for private, value in scope.private:
-            self._set(f"{full_name}/{private}", value)
-        for child in element.children:
-            if child.tag not in ("param", "rosparam", "remap", "env"):
-                raise self._error(child, f"<{child.tag}> has no place in a <node>")
-            inner = self._read(child, inner)
-        for private, value in inner.private[len(scope.private) :]:
-            self._set(f"{full_name}/{private}", value)
-        output = self._optional(element, "output") or "log"
-        if output not in ("log", "screen"):
-            raise self._error(element, f"output is 'log' or 'screen', not '{output}'")
-        required, respawn = self._flag(element, "required"), self._flag(element, "respawn")
-        if required and respawn:
-            raise self._error(element, f"node [{name}]: respawn and required cannot both be set")
-        try:
-            delay = float(self._optional(element, "respawn_delay") or 0)
-        except ValueError:
-            raise self._error(element, "respawn_delay is a number of seconds") from None
-        self._spec.nodes.append(
-            NodeSpec(
-                name=full_name,
-                package=self._required(element, "pkg"),
-                type=self._required(element, "type"),
-                args=" ".join((self._optional(element, "args") or "").split()),
-                output=output,
-                respawn=respawn,
-                respawn_delay=delay,
-                required=required,
-                cwd=self._optional(element, "cwd") or "ROS_HOME",
-                launch_prefix=self._optional(element, "launch-prefix") or "",
-                remaps=inner.remaps,
-                env=inner.env,
-                file=self._file,
-                line=element.line,
-            )
-        )
+    # --- args, and what structures a file
+
+    def _arg(self, tag: Tag, scope: _Scope) -> _Scope:
+        name = tag.required("name")
+        value, default = tag.optional("value"), tag.optional("default")
+        args, values = self._args, self._substitution.args
+        if value is not None and default is not None:
+            raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")
+        if name in args.declared:
+            raise tag.error(f"arg '{name}' has already been declared")
+        args.declared.add(name)
+        if not self._depth and value is None:
+            self._spec.args[name] = ArgDoc(name, default, tag.element.attributes.get("doc"))
+        if value is not None:
+            if name in args.given and not args.hands_on_all:
+                raise tag.error(f"cannot override arg '{name}', which has already been set")
+            values[name] = value
+        elif name in args.given or name in args.passed:
+            values[name] = args.given.get(name, args.passed.get(name, ""))
+        elif default is not None:
+            values[name] = default
+        elif self._depth:
+            self._substitution.unset[name] = f"required arg '{name}' is not set: give it in the <include>"
+        else:
+            self._substitution.unset[name] = f"required arg '{name}' is not set: add {name}:=VALUE"
         return scope
 
-    def _remap(self, element: _Element, scope: _Scope) -> _Scope:
-        pair = (self._required(element, "from"), self._required(element, "to"))
-        return replace(scope, remaps=(*scope.remaps, pair))
-
-    def _env(self, element: _Element, scope: _Scope) -> _Scope:
-        pair = (self._required(element, "name"), self._required(element, "value", may_be_empty=True))
-        return replace(scope, env=(*scope.env, pair))
-
-    def _group(self, element: _Element, scope: _Scope) -> _Scope:
-        inner = self._below(element, scope)
-        if self._flag(element, "clear_params"):
-            if inner.namespace == "/":
-                raise self._error(element, "'ns' must be set for 'clear_params' to be used")
-            self._spec.clear.append(names.canonicalize(inner.namespace))
-        for child in element.children:
+    def _group(self, tag: Tag, scope: _Scope) -> _Scope:
+        inner = self._below(tag, scope)
+        self._clear(tag, inner)
+        # An arg that a group declares ends with it.
+        declared, args = set(self._args.declared), dict(self._substitution.args)
+        for child in tag.children():
             inner = self._read(child, inner)
+        self._args.declared, self._substitution.args = declared, args
         return scope
 
-    def _include(self, element: _Element, scope: _Scope) -> _Scope:
-        file = self._required(element, "file")
+    def _include(self, tag: Tag, scope: _Scope) -> _Scope:
+        file = tag.required("file")
         if self._depth >= _DEEPEST_INCLUDE:
-            raise self._error(
-                element, f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
+            raise tag.error(
+                f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
             )
-        inner = self._below(element, scope)
-        pass_all = self._flag(element, "pass_all_args")
-        given = dict(self._substitution.args) if pass_all else {}
-        for child in element.children:
-            if child.tag == "env":
-                inner = self._read(child, inner)
-                continue
-            if child.tag != "arg":
-                raise self._error(child, f"<{child.tag}> has no place in an <include>")
-            if not self._applies(child):
-                continue
-            name = self._required(child, "name")
-            value = self._optional(child, "value")
-            value = self._optional(child, "default") if value is None else value
-            if value is None:
-                raise self._error(child, f'<arg name="{name}"> of an <include> needs a value')
-            given[name] = value
+        inner = self._below(tag, scope)
+        self._clear(tag, inner)
+        hands_on_all = tag.flag("pass_all_args")
+        passed = dict(self._substitution.args) if hands_on_all else {}
+        given: dict[str, str] = {}
+        for child in tag.children():
+            if child.name != "arg":
+                inner = self._read(child, inner, ("arg", "env"))
+            elif child.applies():
+                child.warn_of_attributes(self._spec.warnings.append)
+                name, value = child.required("name"), child.optional("value")
+                value = child.optional("default") if value is None else value
+                if value is None:
+                    raise child.error(f'<arg name="{name}"> of an <include> needs a value')
+                if name in given:
+                    raise child.error(f"arg '{name}' has already been declared")
+                given[name] = value
         try:
             text = Path(file).read_bytes()
-        except OSError as error:
-            raise self._error(element, f"cannot include [{file}]: {error.strerror}") from None
-        substitution = replace(self._substitution, file=file, args={})
-        reader = _File(self._spec, file, substitution, given, self._depth + 1)
-        root = _parse(text, file)
-        if pass_all:
-            reader._declared.update(given)
-            reader._declared -= {e.attributes.get("name", "") for e in root.children if e.tag == "arg"}
-        reader.read(root, inner)
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise tag.error(f"cannot include [{file}]: {why}") from None
+        substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
+        args = _Args(given, passed, hands_on_all=hands_on_all)
+        _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
         return scope
 
-    def _machine(self, element: _Element, scope: _Scope) -> _Scope:
-        if self._optional(element, "address") in (None, "localhost", "127.0.0.1"):
-            return scope
-        raise self._error(element, "other machines are not supported yet: start the nodes there by hand")
+    def _remap(self, tag: Tag, scope: _Scope) -> _Scope:
+        pair = (tag.required("from"), tag.required("to"))
+        for key, name in zip(("from", "to"), pair, strict=True):
+            if not names.is_legal_name(names.canonicalize(name)):
+                raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
+        # The last word on a name counts, and stands last.
+        others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
+        return replace(scope, remaps=(*others, pair))
+
+    def _env(self, tag: Tag, scope: _Scope) -> _Scope:
+        pair = (tag.required("name"), tag.required("value", may_be_empty=True))
+        return replace(scope, env=(*scope.env, pair))
+
+    def _machine(self, tag: Tag, scope: _Scope) -> _Scope:
+        for key in ("ros-root", "ros-package-path", "ros-ip", "ros-host-name"):
+            if tag.has(key):
+                raise tag.error(
+                    f"<machine>: '{key}' is not supported since ROS Fuerte: use env-loader instead"
+                )
+        if tag.element.children:
+            child = next(tag.children())
+            raise child.error(f"<machine>: <{child.name}> has no place in it: use env-loader instead")
+        timeout = tag.number("timeout", 10.0)
+        if timeout <= 0:
+            raise tag.error(f"'timeout' must be a positive number: [{timeout:g}]")
+        machine = MachineSpec(
+            name=tag.required("name"),
+            address=tag.required("address"),
+            env_loader=tag.optional("env-loader") or "",
+            user=tag.optional("user") or "",
+            password=tag.optional("password") or "",
+            ssh_port=int(tag.number("ssh-port", 22)),
+            timeout=timeout,
+            file=self._file,
+            line=tag.line,
+        )
+        other = self._spec.machines.setdefault(machine.name, machine)
+        if replace(other, file=machine.file, line=machine.line) != machine:
+            where = f"{other.file}:{other.line}"
+            raise tag.error(f"machine [{machine.name}] is declared otherwise at {where}")
+        if tag.choice("default", ("false", "true", "never")) == "true":
+            self._spec.default_machine = machine.name
+        return scope
+
+    def _master(self, tag: Tag, scope: _Scope) -> _Scope:
+        self._spec.warnings.append(tag.error("ignoring defunct <master /> tag"))
+        return scope
+
+    # --- parameters
+
+    def _param(self, tag: Tag, scope: _Scope) -> _Scope:
+        name = tag.required("name")
+        value = param_value(tag)
+        if names.is_private(name):
+            return replace(scope, private=(*scope.private, (name[1:].lstrip("/"), value)))
+        self._set(tag, names.join(scope.namespace, name), value)
+        return scope
+
+    def _param_of_node(self, tag: Tag, full_name: str) -> None:
+        """All names in a node are its own, whatever they begin with."""
+        self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
+
+    def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
+        command = tag.choice("command", ("load", "dump", "delete"))
+        ns, param = tag.optional("ns") or "", tag.optional("param") or ""
+        namespace = names.join(scope.namespace, ns)
+        if command == "load":
+            is_private = names.is_private(ns) or (not ns and names.is_private(param))
+            if not is_private:
+                for name, value in rosparam_values(tag, namespace, param):
+                    self._set(tag, name, value)
+                return scope
+            values = rosparam_values(tag, "/" + ns.lstrip("~/"), param.lstrip("~/"))
+            return replace(scope, private=(*scope.private, *((name[1:], value) for name, value in values)))
+        name = names.canonicalize(names.join(namespace, param)) or "/"
+        file = tag.optional("file")
+        if command == "delete" and file is not None:
+            raise tag.error("<rosparam>: 'file' attribute is invalid with 'delete' command")
+        if command == "delete" and name == "/":
+            raise tag.error(
+                '<rosparam command="delete"> needs a param or ns: it would delete every parameter'
+            )
+        if command == "dump" and not file:
+            raise tag.error('<rosparam command="dump"> needs a file')
+        self._spec.commands.append(ParameterCommand(name, file))
+        return scope
+
+    def _set(self, tag: Tag, name: str, value: Any) -> None:
+        name = names.canonicalize(name)
+        upper = name
+        while upper := upper.rpartition("/")[0]:
+            if upper in self._spec.params and not isinstance(self._spec.params[upper], dict):
+                text = f"parameter [{name}] conflicts with parent parameter [{upper}]"
+                self._spec.warnings.append(tag.error(text))
+        self._spec.params[name] = value
+
+    # --- nodes
+
+    def _node(self, tag: Tag, scope: _Scope) -> _Scope:
+        name = tag.required("name")
+        if not names.is_legal_base_name(name):
+            if "/" in name:
+                raise tag.error(f"<node> name [{name}] cannot contain a namespace: use ns")
+            self._spec.warnings.append(
+                tag.error(f"illegal <node> name '{name}': letters, digits and _ alone")
+            )
+        self._spec.nodes.append(self._process(tag, scope, name))
+        return scope
+
+    def _test(self, tag: Tag, scope: _Scope) -> _Scope:
+        for key in ("output", "respawn"):
+            if tag.has(key):
+                raise tag.error(f"<test> tags cannot have '{key}' attribute")
+        test_name = tag.required("test-name")
+        name = tag.optional("name") or test_name
+        if "/" in name:
+            raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")
+        node = self._process(tag, scope, name)
+        seconds, retry = tag.number("time-limit", 60), tag.number("retry", 0)
+        if seconds <= 0:
+            raise tag.error("'time-limit' must be a positive number of seconds")
+        self._spec.tests.append(TestSpec(test_name, node, seconds, int(retry)))
+        return scope
+
+    def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
+        """What a ``<node>`` and a ``<test>`` have in common."""
+        required, respawn = tag.flag("required"), tag.flag("respawn")
+        if required and respawn:
+            raise tag.error(f"node [{name}]: respawn and required cannot both be set")
+        scope = self._below(tag, scope)
+        full_name = names.canonicalize(f"{scope.namespace}/{name}")
+        if tag.flag("clear_params"):
+            self._spec.clear.append(full_name)
+        for private, value in scope.private:
+            self._set(tag, f"{full_name}/{private}", value)
+        inner = replace(scope, namespace=full_name + "/", private=())
+        for child in tag.children():
+            if child.name == "param":
+                self._read_own_param(child, full_name)
+            else:
+                inner = self._read(child, inner, ("param", "rosparam", "remap", "env"))
+        for private, value in inner.private:
+            self._set(tag, f"{full_name}/{private}", value)
+        return NodeSpec(
+            name=full_name,
+            package=tag.required("pkg"),
+            type=tag.required("type"),
+            args=tag.optional("args") or "",
+            output=tag.choice("output", ("log", "screen")),
+            respawn=respawn,
+            respawn_delay=tag.number("respawn_delay", 0.0),
+            required=required,
+            cwd=tag.choice("cwd", ("ROS_HOME", "node")),
+            launch_prefix=tag.optional("launch-prefix") or "",
+            machine=tag.optional("machine") or "",
+            remaps=inner.remaps,
+            env=inner.env,
+            file=self._file,
+            line=tag.line,
+        )
+
+    def _read_own_param(self, tag: Tag, full_name: str) -> None:
+        tag.warn_of_attributes(self._spec.warnings.append)
+        try:
+            if tag.applies():
+                self._param_of_node(tag, full_name)
+        except LaunchError as error:
+            self.tell(error)
 
     # --- helpers
 
-    def _below(self, element: _Element, scope: _Scope) -> _Scope:
-        namespace = self._optional(element, "ns")
-        return replace(scope, namespace=names.join(scope.namespace, namespace)) if namespace else scope
+    def _below(self, tag: Tag, scope: _Scope) -> _Scope:
+        namespace = tag.optional("ns")
+        if namespace is None:
+            return scope
+        if not namespace and tag.name != "include":
+            raise tag.error(f"<{tag.name}> tag has an empty 'ns' attribute")
+        if names.is_private(namespace):
+            raise tag.error(f"cannot turn [{namespace}] into a global name")
+        return replace(scope, namespace=names.join(scope.namespace, namespace))
 
-    def _set(self, name: str, value: Any) -> None:
-        """Set a parameter; a dictionary sets its leaves, and leaves its siblings alone."""
-        if isinstance(value, dict) and value:
-            for key, inner in value.items():
-                self._set(f"{name}/{key}", inner)
-        else:
-            self._spec.params[names.canonicalize(name)] = value
-
-    def _applies(self, element: _Element) -> bool:
-        both = {key for key in ("if", "unless") if key in element.attributes}
-        if len(both) == 2:
-            raise self._error(element, "cannot set both 'if' and 'unless' on the same tag")
-        for key in both:
-            return self._flag(element, key) == (key == "if")
-        return True
-
-    def _flag(self, element: _Element, key: str) -> bool:
-        text = (self._optional(element, key) or "false").strip().lower()
-        if text not in ("true", "1", "false", "0"):
-            raise self._error(element, f"{key} is 'true' or 'false', not '{text}'")
-        return text in ("true", "1")
-
-    def _optional(self, element: _Element, key: str) -> str | None:
-        text = element.attributes.get(key)
-        try:
-            return None if text is None else self._substitution.apply(text)
-        except (SubstitutionError, NotFoundError) as error:
-            raise self._error(element, str(error)) from error
-
-    def _required(self, element: _Element, key: str, *, may_be_empty: bool = False) -> str:
-        text = self._optional(element, key)
-        if text is None or (not text and not may_be_empty):
-            raise self._error(element, f"<{element.tag}> tag is missing required attribute: '{key}'")
-        return text
-
-    def _error(self, element: _Element, text: str) -> LaunchError:
-        return LaunchError(self._file, element.line, text)
+    def _clear(self, tag: Tag, inner: _Scope) -> None:
+        if not tag.flag("clear_params"):
+            return
+        if not tag.has("ns") or inner.namespace.strip("/") == "":
+            raise tag.error("'ns' must be set for 'clear_params' to be used")
+        self._spec.clear.append(names.canonicalize(inner.namespace))

@@ -8,127 +8,250 @@ from __future__ import annotations
 import contextlib
 import os
 import queue
-import shlex
 import signal
-import subprocess
 import sys
 import threading
 import time
 import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
-from typing import IO, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.environment import Environment
-from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError, RpcError
-from minirospy.launch.spec import LaunchSpec, NodeSpec
+from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
+from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
+from minirospy.launch.command import node_command, node_environment, node_folder
+from minirospy.launch.output import Output
+from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
+from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
+from minirospy.launch.summary import summary
+from minirospy.launch.watch import FileWatch
 from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.workspace.packages import NotExecutableError, Packages
+from minirospy.workspace.packages import Packages
 
-__all__ = ["Launcher", "node_command", "node_environment"]
+if TYPE_CHECKING:
+    from minirospy.launch.remote import RemoteMachines
+
+__all__ = ["Launcher", "RunOptions"]
 
 _WINDOWS = sys.platform == "win32"
-_INTERRUPT_SECONDS = 10.0
-_TERMINATE_SECONDS = 2.0
 _MASTER_SECONDS = 15.0
+_RESPAWN_SECONDS = 0.1
+"""A node that ends at once is not started more often than that."""
+
+_WATCH_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a spec is run.
+
+    ``screen``, ``log``: where all output goes, whatever the file says; ``log_errors``: what nodes write to standard
+    error goes to their log file, too. ``required``: every node is. ``local``: nodes of other machines are not run.
+    ``strict``: a node that cannot be started ends it all. ``watch``: a node whose file changes is started again.
+    ``name`` is what stands in the terminal's title.
+    """
+
+    screen: bool = False
+    log: bool = False
+    log_errors: bool = False
+    required: bool = False
+    local: bool = False
+    strict: bool = False
+    watch: bool = False
+    summary: bool = True
+    name: str = ""
+    timeouts: Timeouts = field(default_factory=Timeouts)
+    master_arguments: tuple[str, ...] = ()
 
 
 class _Ended(NamedTuple):
     """A process has ended."""
 
-    process: _Process
+    process: Process
+
+
+class _RemoteEnded(NamedTuple):
+    """A process on another machine has ended."""
+
+    node: NodeSpec | None
+    name: str
+    code: int
 
 
 class _Stop(NamedTuple):
-    """A signal, or a required node's end, asks all to stop."""
+    """A signal, or somebody, asks all to stop."""
 
     why: str
 
 
-@dataclass
-class _Process:
-    name: str
-    popen: subprocess.Popen[bytes]
-    command: list[str]
-    node: NodeSpec | None = None
-    log_file: Path | None = None
+_Event = _Ended | _RemoteEnded | _Stop
 
 
 class Launcher:
-    """Runs what a spec says until all nodes have ended or somebody asks it to stop.
-
-    ``screen`` shows every node's output, whatever the file says.
-    """
+    """Runs what a spec says until all nodes have ended or somebody asks it to stop."""
 
     def __init__(
-        self, spec: LaunchSpec, environment: Environment, packages: Packages, *, screen: bool = False
+        self,
+        spec: LaunchSpec,
+        environment: Environment,
+        packages: Packages,
+        options: RunOptions | None = None,
+        output: Output | None = None,
     ) -> None:
         self._spec = spec
         self._environment = environment
         self._packages = packages
-        self._screen = screen
-        self._events: queue.SimpleQueue[_Ended | _Stop] = queue.SimpleQueue()
-        self._processes: list[_Process] = []
+        self._options = options or RunOptions()
+        self._output = output or Output()
+        self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
+        self._restarts: list[tuple[float, Process]] = []
         self._master = MasterProxy(environment.master_uri, "/roslaunch")
-        self._run_id = ""
+        self._guardian: Guardian | None = None
+        self._remote: RemoteMachines | None = None
         self._counter = 0
+        self._files = FileWatch(packages)
+        self._master_process: Process | None = None
+        self._has_begun = False
+        self.run_id = ""
+        """The folder of the log files, and /run_id at the master."""
+        self.processes: list[Process] = []
+        """The nodes that were started and are watched, those that wait to be started again included."""
+        self.stopped_by = ""
+        """The signal, or who called stop(), that ended the run; empty where the nodes ended it."""
 
     def run(self, *, wait: bool = False) -> int:
         """Run until the end; the exit status: 0, or 1 where a required node died of a fault.
 
         ``wait``: wait for a master instead of starting one. Raises LaunchError, MasterUnreachableError.
         """
-        commands = [(node, node_command(node, self._packages)) for node in self._spec.nodes]
-        self._print_summary()
-        with self._signals():
+        with self.signals():
             try:
-                self._find_master(wait=wait)
-                self._set_parameters()
-                for node, command in commands:
-                    self._start_node(node, command)
-                return self._watch()
+                self.start(wait=wait)
+                return self.watch()
+            except KeyboardInterrupt:
+                return 0
             finally:
-                self._end_all()
-                self._master.close()
+                self.close()
+
+    def stop(self, why: str) -> None:
+        """End the run; from any thread."""
+        self._events.put(_Stop(why))
 
     # --- beginning
 
-    def _find_master(self, *, wait: bool) -> None:
-        told = False
-        while not self._master_answers():
-            if not wait:
-                self._start_master()
-                return
-            if not told:
-                _say("roscore/master is not yet running, will wait for it to start")
-                told = True
-            self._pause(0.2)
-        _say(f"ROS_MASTER_URI={self._environment.master_uri}")
+    def start(self, *, wait: bool = False) -> None:
+        """Show the summary, find or start a master, set the parameters, start the nodes.
+
+        Raises LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt where stop() was called meanwhile.
+        """
+        here, elsewhere = self._nodes()
+        if self._options.strict:
+            for node in here:
+                node_command(node, self._packages)
+        self._has_begun = True
+        had_master = self._master_answers()
+        if wait and not had_master:
+            self._wait_for_master()
+            had_master = True
+        if had_master:
+            self._find_run_id()
+        self._output.title(self._options.name)
+        if self._options.local:
+            self._output.say("local only launch specified, will not launch remote nodes", bold=True)
+        if self._options.summary:
+            params = {**self._spec.params, **_core_parameters()}
+            self._output.say(summary([*here, *elsewhere], params, self._spec.clear))
+        for warning in self._spec.warnings:
+            self._output.warn(f"WARNING: {warning}")
+        if not had_master:
+            self._start_master()
+        self._output.say(f"ROS_MASTER_URI={self._environment.master_uri}", bold=True)
+        self._output.title(f"{self._options.name} {self._environment.master_uri}")
+        if self._master_process:
+            self._output.say(f"setting /run_id to {self.run_id}", bold=True)
+            self._output.say("started core service [/rosout]")
+            # As in ROS, where /rosout is the first process of a master that roslaunch started.
+            self._counter = 1
+        self._set_parameters()
+        if elsewhere:
+            from minirospy.launch.remote import RemoteMachines
+
+            timeouts = self._options.timeouts
+            self._remote = RemoteMachines(self._environment, self.run_id, self._output, timeouts, self)
+            self._remote.start(
+                [(node, machine) for node in elsewhere if (machine := self._spec.machine_of(node))]
+            )
+        for node in here:
+            self.start_node(node)
+
+    def start_node(self, node: NodeSpec) -> Process | None:
+        """Start a node; None where that cannot be (it is told why)."""
+        self._counter += 1
         try:
-            self._run_id = str(self._master.get_param("/run_id"))
+            command = node_command(node, self._packages)
+            folder = node_folder(node, self._packages, self._environment)
+            process = self._start_process(node, command, folder, self._counter)
+            self.processes.append(process)
+            self._attend(process)
+        except MinirospyError as error:
+            if self._options.strict:
+                raise
+            self._output.warn(f"ERROR: cannot launch node of type [{node.package}/{node.type}]: {error}")
+            return None
+        return process
+
+    def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
+        """The nodes of this machine, and those of others. Raises LaunchError on an unknown machine."""
+        here: list[NodeSpec] = []
+        elsewhere: list[NodeSpec] = []
+        for node in self._spec.nodes:
+            machine = self._spec.machine_of(node)
+            if self._options.required:
+                node = replace(node, required=True, respawn=False)  # noqa: PLW2901 - the same node, as it is run
+            if machine is None or _is_here(machine):
+                here.append(node)
+            elif not self._options.local:
+                elsewhere.append(node)
+        return here, elsewhere
+
+    def _wait_for_master(self) -> None:
+        self._output.say("roscore/master is not yet running, will wait for it to start")
+        while not self._master_answers():
+            self._pause(0.1)
+        self._output.say("master has started, initiating launch")
+
+    def _find_run_id(self) -> None:
+        try:
+            self.run_id = str(self._master.get_param("/run_id"))
         except RpcError:
-            self._run_id = str(uuid.uuid1())
+            self.run_id = self.run_id or str(uuid.uuid1())
+            self._master.set_param("/run_id", self.run_id)
+            self._output.say(f"setting /run_id to {self.run_id}", bold=True)
+        path = self._output.log_to(self._log_folder)
+        self._output.say(f"... logging to {path}")
 
     def _start_master(self) -> None:
         if not self._environment.master_is_local:
             raise MasterUnreachableError(self._environment.master_uri)
-        _say("auto-starting new master")
+        self._output.say("auto-starting new master")
         port = self._environment.master_address[1]
-        command = [sys.executable, "-m", "minirospy.cli.master", "-q", "-p", str(port)]
-        process = self._spawn("master", command, dict(os.environ), None, None)
-        _say(f"process[master]: started with pid [{process.popen.pid}]")
+        arguments = ["-q", "-p", str(port), *self._options.master_arguments]
+        process = start_process(
+            "master", [sys.executable, "-m", "minirospy.cli.master", *arguments], environ=os.environ
+        )
+        self._master_process = process
+        self._attend(process)
+        self._output.say(f"process[master]: started with pid [{process.pid}]", bold=True)
         end = time.monotonic() + _MASTER_SECONDS
         while not self._master_answers():
-            if process.popen.poll() is not None:
-                raise MinirospyError(f"the master ended with status {process.popen.returncode}")
+            if not process.is_running:
+                raise MinirospyError(f"the master ended with status {process.exit_code}")
             if time.monotonic() > end:
                 raise MinirospyError(f"the master does not answer at {self._environment.master_uri}")
             self._pause(0.02)
-        _say(f"ROS_MASTER_URI={self._environment.master_uri}\n")
-        self._run_id = str(self._master.get_param("/run_id"))
-        _say(f"setting /run_id to {self._run_id}\nstarted core service [/rosout]")
+        self._find_run_id()
 
     def _master_answers(self) -> bool:
         try:
@@ -141,118 +264,210 @@ class Launcher:
         for namespace in self._spec.clear:
             with contextlib.suppress(RpcError):
                 self._master.delete_param(namespace)
-        for name, value in self._spec.params.items():
+        for command in self._spec.commands:
+            if command.file is None:
+                self._output.say(f"running rosparam delete {command.name}")
+                try:
+                    self._master.delete_param(command.name)
+                except RpcError:
+                    self._output.warn(f"ERROR: parameter [{command.name}] is not set")
+            else:
+                self._output.say(f"running rosparam dump {command.file} {command.name}")
+                self._dump(command.name, command.file)
+        for name, value in {**_core_parameters(), **self._spec.params}.items():
             try:
                 self._master.set_param(name, value)
-            except RpcError as error:
-                raise LaunchError(self._spec.files[0], 0, f"parameter [{name}]: {error}") from error
+            except (RpcError, ValueTextError) as error:
+                raise MinirospyError(f"parameter [{name}]: {error}") from error
 
-    def _start_node(self, node: NodeSpec, command: list[str]) -> None:
-        self._counter += 1
-        name = f"{node.name.lstrip('/')}-{self._counter}"
-        folder = self._environment.log_dir / self._run_id
+    def _dump(self, name: str, file: str) -> None:
+        from minirospy.introspect.parameters import dump_parameters
+
+        try:
+            Path(file).write_text(dump_parameters(self._master.get_param(name)), encoding="utf-8")
+        except (OSError, RpcError) as error:
+            self._output.warn(f"ERROR: parameters cannot be dumped to [{file}]: {error}")
+
+    @property
+    def _log_folder(self) -> Path:
+        return self._environment.log_dir / self.run_id
+
+    def _start_process(self, node: NodeSpec, command: list[str], folder: Path, number: int) -> Process:
+        called = node.name if node.base_name else f"{node.name}{Path(node.type).stem}"
+        name = f"{called.lstrip('/')}-{number}"
         stem = name.replace("/", "-")
-        environment = node_environment(node, self._environment)
-        environment["ROS_MASTER_URI"] = self._environment.master_uri
-        log_argument = f"__log:={folder / (stem + '.log')}"
-        screen = self._screen or node.output == "screen"
-        log_file = None if screen else folder / f"{stem}-stdout.log"
-        cwd = self._packages.find(node.package) if node.cwd == "node" else self._environment.home
-        cwd.mkdir(parents=True, exist_ok=True)
-        if log_file or not sys.stdout.isatty():
+        environ = node_environment(node, self._environment)
+        screen = (self._options.screen or node.output == "screen") and not self._options.log
+        if not screen or not sys.stdout.isatty():
             # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
             # writes whole lines, which those of another node do not cut in two.
-            environment.setdefault("PYTHONUNBUFFERED", "1")
-        with _output(log_file) as output:
-            process = self._spawn(name, [*command, log_argument], environment, output, cwd)
-        process.node, process.log_file = node, folder / f"{stem}*.log"
-        _say(f"process[{name}]: started with pid [{process.popen.pid}]")
-
-    def _spawn(
-        self,
-        name: str,
-        command: list[str],
-        environment: dict[str, str],
-        output: IO[bytes] | None,
-        cwd: Path | None,
-    ) -> _Process:
-        # A group of its own: Ctrl-C in the terminal reaches roslaunch alone, which ends the nodes in order.
-        group: dict[str, Any] = {"start_new_session": True}
-        if sys.platform == "win32":
-            group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-        try:
-            popen = subprocess.Popen(
-                command,
-                env=environment,
-                cwd=cwd,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output and subprocess.STDOUT,
-                **group,
-            )
-        except OSError as error:
-            raise LaunchError(self._spec.files[0], 0, f"[{name}] cannot be started: {error}") from error
-        process = _Process(name, popen, command)
-        self._processes.append(process)
-        threading.Thread(target=self._wait_for, args=(process,), name=f"wait-{name}", daemon=True).start()
+            environ.setdefault("PYTHONUNBUFFERED", "1")
+        folder.mkdir(parents=True, exist_ok=True)
+        process = start_process(
+            name,
+            [*command, f"__log:={self._log_folder / stem}.log"],
+            environ=environ,
+            folder=folder,
+            stdout_file=None if screen else self._log_folder / f"{stem}-stdout.log",
+            log_errors=self._options.log_errors,
+        )
+        process.node, process.log_files = node, f"{self._log_folder / stem}*.log"
+        self._output.say(f"process[{name}]: started with pid [{process.pid}]", bold=True)
+        if self._options.watch:
+            self._files.add(node)
         return process
 
-    def _wait_for(self, process: _Process) -> None:
-        process.popen.wait()
-        self._events.put(_Ended(process))
+    def _attend(self, process: Process) -> None:
+        """Have a process's end told, and the process ended where we are killed."""
+        self.guard(process)
+
+        def wait() -> None:
+            process.popen.wait()
+            self._events.put(_Ended(process))
+
+        threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
+
+    def guard(self, process: Process) -> None:
+        """Have a process ended where we are killed."""
+        if self._guardian is None:
+            self._guardian = Guardian(self._options.timeouts)
+        self._guardian.add(process)
 
     # --- watching
 
-    def _watch(self) -> int:
-        while any(process.node for process in self._processes):
+    def watch(self, *, forever: bool = False) -> int:
+        """Watch the nodes until they, or a required one, have ended, or stop() was called; the exit status.
+
+        ``forever``: also where no node is left.
+        """
+        if not forever and not self._is_anything_left():
+            self._output.say("No processes to monitor", bold=True)
+        while forever or self._is_anything_left():
             event = self._next_event()
             if isinstance(event, _Stop):
+                self.stopped_by = event.why
                 return 0
-            status = self._ended(event.process)
+            status = None
+            if isinstance(event, _Ended):
+                status = self._ended(event.process)
+            elif event:
+                status = self._remote_ended(event)
             if status is not None:
                 return status
-        # As roslaunch: without a node left, there is nothing to wait for.
-        if self._spec.nodes:
-            _say("all processes on machine have died, roslaunch will exit")
+        if self._counter:
+            self._output.say("all processes on machine have died, roslaunch will exit")
         return 0
 
-    def _next_event(self) -> _Ended | _Stop:
-        while True:
-            try:
-                # On Windows Ctrl-C does not end a wait: there look twice a second.
-                return self._events.get(timeout=0.5 if _WINDOWS else None)
-            except queue.Empty:
-                continue
+    def _is_anything_left(self) -> bool:
+        remote = self._remote is not None and self._remote.is_running
+        return bool(self.processes) or self._master_process is not None or remote
 
-    def _ended(self, process: _Process) -> int | None:
-        """React to a process's end; a status where all have to stop."""
-        if process not in self._processes:
-            return None
-        self._processes.remove(process)
-        node, code = process.node, process.popen.returncode
-        if code == 0:
-            _say(f"[{process.name}] process has finished cleanly\nlog file: {process.log_file}")
-        else:
-            _say(
-                f"[{process.name}] process has died [pid {process.popen.pid}, exit code {code}, "
-                f"cmd {' '.join(process.command)}].\nlog file: {process.log_file}",
-                sys.stderr,
-            )
-        if node is None:
-            _say("the master has ended: shutting down", sys.stderr)
-            return 1
-        if node.required:
-            bar = "=" * 80
-            how = "has finished" if code == 0 else f"has died with exit code {code}"
-            _say(f"{bar}\nREQUIRED process [{process.name}] {how}\nInitiating shutdown!\n{bar}")
-            return 0 if code == 0 else 1
-        if node.respawn:
-            if node.respawn_delay:
-                self._pause(node.respawn_delay)
-            _say(f"[{process.name}] restarting process")
-            self._counter -= 1
-            self._start_node(node, node_command(node, self._packages))
+    def _next_event(self) -> _Event | None:
+        """What happened; None after a while in which nothing did, when restarts and files have been looked after."""
+        due = min((when for when, _ in self._restarts), default=None)
+        pauses = [0.5] if _WINDOWS or self._remote else []
+        pauses += [_WATCH_SECONDS] if self._options.watch else []
+        pauses += [max(0.0, due - time.monotonic())] if due is not None else []
+        try:
+            return self._events.get(timeout=min(pauses, default=None))
+        except queue.Empty:
+            pass
+        now = time.monotonic()
+        ready = [process for when, process in self._restarts if when <= now]
+        self._restarts = [each for each in self._restarts if each[0] > now]
+        for process in ready:
+            self._restart(process)
+        if self._options.watch:
+            self._restart_changed()
         return None
+
+    def _ended(self, process: Process) -> int | None:
+        """React to a process's end; a status where all have to stop."""
+        if self._guardian:
+            self._guardian.remove(process)
+        if process is self._master_process:
+            self._master_process = None
+            self._output.warn("the master has ended: shutting down")
+            return 1
+        if process not in self.processes:
+            return None
+        node, code = process.node, process.exit_code
+        assert node
+        self._on_end(process)
+        if process.is_restarting:
+            self._restart(process)
+            return None
+        if process.is_ending:
+            self.processes.remove(process)
+            return None
+        if code == 0:
+            how, tell = "process has finished cleanly", self._say_bold
+        else:
+            command = " ".join(process.command)
+            how = f"process has died [pid {process.pid}, exit code {code}, cmd {command}]."
+            tell = self._output.warn
+        told = f"{how}\nlog file: {process.log_files}"
+        if node.required:
+            self.processes.remove(process)
+            bar = "=" * 80
+            text = f"REQUIRED process [{process.name}] has died!\n{told}\nInitiating shutdown!"
+            self._output.warn(f"{bar}\n{text}\n{bar}")
+            return 0 if code == 0 else 1
+        tell(f"[{process.name}] {told}")
+        if node.respawn:
+            due = time.monotonic() + max(node.respawn_delay, _RESPAWN_SECONDS)
+            self._restarts.append((due, process))
+        else:
+            self.processes.remove(process)
+        return None
+
+    def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
+        """A process on another machine has ended; from any thread."""
+        self._events.put(_RemoteEnded(node, name, code))
+
+    def _remote_ended(self, event: _RemoteEnded) -> int | None:
+        if event.node is None or not event.node.required:
+            return None
+        bar = "=" * 80
+        self._output.warn(f"{bar}\nREQUIRED process [{event.name}] has died!\nInitiating shutdown!\n{bar}")
+        return 0 if event.code == 0 else 1
+
+    def _on_end(self, process: Process) -> None:
+        """A node has ended: for those who want to know."""
+
+    def _say_bold(self, text: str) -> None:
+        self._output.say(text, bold=True)
+
+    def _restart(self, process: Process) -> None:
+        """Start an ended node again, in its place among the others."""
+        node = process.node
+        assert node
+        place = self.processes.index(process)
+        self._output.say(f"[{process.name}] restarting process")
+        number = int(process.name.rpartition("-")[2])
+        try:
+            command = node_command(node, self._packages)
+            folder = node_folder(node, self._packages, self._environment)
+            again = self._start_process(node, command, folder, number)
+        except MinirospyError as error:
+            self._output.warn(f"ERROR: cannot launch node of type [{node.package}/{node.type}]: {error}")
+            del self.processes[place]
+            return
+        again.starts = process.starts + 1
+        self.processes[place] = again
+        self._attend(again)
+
+    def _restart_changed(self) -> None:
+        for process in self.processes:
+            if process.node and not process.is_restarting and (file := self._files.changed(process.node)):
+                self._output.say(f"[{process.name}] {file} has changed")
+                process.is_restarting = True
+                if process.is_running:
+                    threading.Thread(target=self.end_process, args=(process,), daemon=True).start()
+
+    def end_process(self, process: Process) -> None:
+        """End one process, and wait for that."""
+        end_processes([process], self._options.timeouts, self._output.warn)
 
     def _pause(self, seconds: float) -> None:
         """Wait; a request to stop ends it, and comes back."""
@@ -262,29 +477,51 @@ class Launcher:
             return
         self._events.put(event)
         if isinstance(event, _Stop):
+            self.stopped_by = event.why
             raise KeyboardInterrupt
 
     # --- ending
 
-    def _end_all(self) -> None:
-        nodes = [process for process in self._processes if process.node]
-        others = [process for process in self._processes if not process.node]
-        for group in (nodes[::-1], others):
+    def close(self) -> None:
+        """End all processes: the nodes, the last one first, then the master. Idempotent."""
+        had_any = bool(self.processes or self._master_process or self._remote)
+        killed: list[Process] = []
+        if self._remote:
+            self._remote.close()
+            self._remote = None
+        nodes = [process for process in reversed(self.processes) if process.is_running]
+        master = [self._master_process] if self._master_process else []
+        for group in (nodes, master):
             for process in group:
-                if process.popen.poll() is None:
-                    _say(f"[{process.name}] killing on exit")
-            _end(group)
-        if self._processes:
-            _say("shutting down processing monitor...\n... shutting down processing monitor complete")
-        self._processes.clear()
-        _say("done")
+                self._output.say(f"[{process.name}] killing on exit")
+            killed += end_processes(group, self._options.timeouts, self._output.warn)
+        self.processes.clear()
+        self._restarts.clear()
+        self._master_process = None
+        if self._guardian:
+            for process in (*nodes, *master):
+                self._guardian.remove(process)
+            self._guardian.close()
+            self._guardian = None
+        if killed:
+            lines = [
+                f" * process[{process.name}, pid {process.pid}]: required SIGKILL." for process in killed
+            ]
+            self._output.warn("\n".join(["Shutdown errors:", *lines]))
+        if self._has_begun:
+            self._output.say("shutting down processing monitor...")
+            self._output.say("... shutting down processing monitor complete")
+            self._has_begun = False
+        if had_any or self._counter:
+            self._output.say("done", bold=True)
+        self._master.close()
 
     @contextlib.contextmanager
-    def _signals(self) -> Iterator[None]:
-        """SIGINT, SIGTERM and SIGHUP ask all to stop."""
+    def signals(self) -> Iterator[None]:
+        """SIGINT, SIGTERM and SIGHUP ask all to stop, meanwhile (in the main thread)."""
 
         def on_signal(number: int, _: FrameType | None) -> None:
-            self._events.put(_Stop(signal.Signals(number).name))
+            self.stop(signal.Signals(number).name)
 
         wanted = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")]
         before = {number: signal.signal(number, on_signal) for number in wanted if number is not None}
@@ -294,99 +531,16 @@ class Launcher:
             for number, handler in before.items():
                 signal.signal(number, handler)
 
-    def _print_summary(self) -> None:
-        _say("\nSUMMARY\n========\n\nPARAMETERS")
-        for name, value in sorted(self._spec.params.items()):
-            text = str(value).replace("\n", " ").strip()
-            _say(f" * {name}: {text if len(text) <= 20 else text[:17] + '...'}")
-        _say("\nNODES")
-        by_namespace: dict[str, list[NodeSpec]] = {}
-        for node in self._spec.nodes:
-            by_namespace.setdefault(node.namespace, []).append(node)
-        for namespace, nodes in sorted(by_namespace.items()):
-            _say(f"  {namespace}")
-            for node in sorted(nodes, key=lambda n: n.base_name):
-                _say(f"    {node.base_name} ({node.package}/{node.type})")
-        _say("")
+
+def _is_here(machine: MachineSpec) -> bool:
+    """Whether a machine is the one that this runs on, and its user this one."""
+    if machine.user:
+        import getpass
+
+        if machine.user != getpass.getuser():
+            return False
+    return is_own_host(machine.address)
 
 
-def node_command(node: NodeSpec, packages: Packages) -> list[str]:
-    """The command that runs a node, with its name and remappings. Raises LaunchError."""
-    try:
-        program = packages.find_executable(node.package, node.type)
-    except (NotFoundError, NotExecutableError) as error:
-        raise LaunchError(node.file, node.line, f"node [{node.base_name}]: {error}") from error
-    prefix = shlex.split(node.launch_prefix) if node.launch_prefix else []
-    remaps = [f"{a}:={b}" for a, b in node.remaps]
-    return [*prefix, *program, *shlex.split(node.args), *remaps, f"__name:={node.base_name}"]
-
-
-def node_environment(node: NodeSpec, environment: Environment) -> dict[str, str]:
-    """The environment of a node's process."""
-    variables = {**os.environ, **dict(node.env)}
-    namespace = node.namespace.rstrip("/")
-    if namespace:
-        variables["ROS_NAMESPACE"] = namespace
-    else:
-        variables.pop("ROS_NAMESPACE", None)
-    return variables
-
-
-@contextlib.contextmanager
-def _output(path: Path | None) -> Iterator[IO[bytes] | None]:
-    if path is None:
-        yield None
-        return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.open("ab")
-    except OSError as error:
-        raise MinirospyError(f"cannot write the log file {path}: {error.strerror}") from error
-    with file:
-        yield file
-
-
-def _end(processes: list[_Process]) -> None:
-    """SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended."""
-    steps = [(_interrupt, _INTERRUPT_SECONDS), (_terminate, _TERMINATE_SECONDS), (_kill, _TERMINATE_SECONDS)]
-    for number, (step, seconds) in enumerate(steps):
-        running = [process for process in processes if process.popen.poll() is None]
-        if number and running:
-            words = ("", "escalating to SIGTERM", "escalating to SIGKILL")
-            for process in running:
-                _say(f"[{process.name}] {words[number]}")
-        for process in running:
-            with contextlib.suppress(OSError):
-                step(process.popen)
-        end = time.monotonic() + seconds
-        for process in running:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.popen.wait(max(0.0, end - time.monotonic()))
-
-
-def _interrupt(popen: subprocess.Popen[bytes]) -> None:
-    if _WINDOWS:
-        popen.send_signal(signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined,unused-ignore]
-    else:
-        os.killpg(popen.pid, signal.SIGINT)
-
-
-def _terminate(popen: subprocess.Popen[bytes]) -> None:
-    if _WINDOWS:
-        popen.terminate()
-    else:
-        os.killpg(popen.pid, signal.SIGTERM)
-
-
-def _kill(popen: subprocess.Popen[bytes]) -> None:
-    """The process and all that it started."""
-    import psutil
-
-    with contextlib.suppress(psutil.Error):
-        for child in psutil.Process(popen.pid).children(recursive=True):
-            child.kill()
-    popen.kill()
-
-
-def _say(text: str, stream: Any = None) -> None:
-    print(text, file=stream or sys.stdout, flush=True)
+def _core_parameters() -> dict[str, str]:
+    return {"/rosdistro": DISTRO, "/rosversion": ROS_VERSION}

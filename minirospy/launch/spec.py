@@ -1,11 +1,14 @@
-"""What a launch file says, when all substitutions are done."""
+"""What launch files say, when all substitutions are done."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["ArgDoc", "LaunchSpec", "NodeSpec"]
+from minirospy.errors import LaunchError
+
+__all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand", "TestSpec"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,7 @@ class NodeSpec:
     required: bool = False
     cwd: str = "ROS_HOME"
     launch_prefix: str = ""
+    machine: str = ""
     remaps: tuple[tuple[str, str], ...] = ()
     env: tuple[tuple[str, str], ...] = ()
     file: str = ""
@@ -39,6 +43,39 @@ class NodeSpec:
 
 
 @dataclass(frozen=True)
+class TestSpec:
+    """A ``<test>``, which rostest runs: its name in the results, its node, its limit in seconds, further tries."""
+
+    test_name: str
+    node: NodeSpec
+    time_limit: float
+    retry: int
+
+
+@dataclass(frozen=True)
+class MachineSpec:
+    """A ``<machine>`` that nodes run on: where ssh finds it, and what sets up ROS there (``env_loader``)."""
+
+    name: str
+    address: str
+    env_loader: str = ""
+    user: str = ""
+    password: str = ""
+    ssh_port: int = 22
+    timeout: float = 10.0
+    file: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class ParameterCommand:
+    """A ``<rosparam>`` that deletes ``name`` (global) at the master, or dumps what is below it into ``file``."""
+
+    name: str
+    file: str | None = None
+
+
+@dataclass(frozen=True)
 class ArgDoc:
     """An ``<arg>`` of the first file: its default (None where it is required), and its doc."""
 
@@ -49,10 +86,36 @@ class ArgDoc:
 
 @dataclass
 class LaunchSpec:
-    """Everything that the files say together. ``params`` has leaves only; ``clear`` names namespaces to delete."""
+    """Everything that the files say together.
+
+    ``params``: name -> value; ``clear``: namespaces to delete; ``commands``: what is done at the parameter server
+    before the parameters are set; ``files``: those that were read, each once; ``args``: what the first file
+    declares; ``machines``: by name; ``warnings``: what was passed over.
+    """
 
     nodes: list[NodeSpec] = field(default_factory=list)
+    tests: list[TestSpec] = field(default_factory=list)
     params: dict[str, Any] = field(default_factory=dict)
     clear: list[str] = field(default_factory=list)
+    commands: list[ParameterCommand] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
     args: dict[str, ArgDoc] = field(default_factory=dict)
+    machines: dict[str, MachineSpec] = field(default_factory=dict)
+    default_machine: str = ""
+    warnings: list[LaunchError] = field(default_factory=list)
+
+    def runnables(self) -> Iterator[NodeSpec]:
+        """The nodes, and those that are tests."""
+        yield from self.nodes
+        yield from (test.node for test in self.tests)
+
+    def machine_of(self, node: NodeSpec) -> MachineSpec | None:
+        """The machine that a node is to run on; None is this one. Raises LaunchError."""
+        name = node.machine or self.default_machine
+        if name in ("", "localhost"):
+            return None
+        machine = self.machines.get(name)
+        if machine is None:
+            known = f" (there are: {', '.join(self.machines)})" if self.machines else ""
+            raise LaunchError(node.file, node.line, f"unknown machine [{name}]{known}")
+        return machine

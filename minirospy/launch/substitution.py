@@ -1,11 +1,11 @@
-"""Substitution arguments: ``$(find pkg)``, ``$(arg name)``, ``$(env VAR)`` and their kin.
+"""Substitution arguments: ``$(find pkg)``, ``$(arg name)``, ``$(env VAR)`` and their kin; and values from texts.
 
 Source: http://wiki.ros.org/roslaunch/XML#substitution_args.
 """
 
 from __future__ import annotations
 
-import ast
+import builtins
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -18,14 +18,16 @@ from minirospy.workspace.packages import Packages
 
 __all__ = ["Substitution", "SubstitutionError", "convert"]
 
-_PATTERN = re.compile(r"\$\(([^)]*)\)")
-_EVAL = re.compile(r"^\$\(eval (.*)\)$", re.DOTALL)
-_ALLOWED = (
-    ast.Expression, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Compare, ast.IfExp, ast.Call, ast.Name, ast.Load,
-    ast.Constant, ast.List, ast.Tuple, ast.Dict, ast.Subscript, ast.Slice, ast.boolop, ast.operator, ast.unaryop,
-    ast.cmpop,
-)  # fmt: skip
-_LONGEST_EXPRESSION = 1000
+_PATTERN = re.compile(r"\$\(([^$()]+)\)")
+_NESTED = re.compile(r"\$\([^()]*(\$\()?[^()]*\(")
+_EVAL = re.compile(r"\$\(eval (.*)\)\Z", re.DOTALL)
+_ONE = {
+    "find": "$(find pkg) takes one package",
+    "env": "$(env VAR) takes one environment variable",
+    "arg": "$(arg name) takes one arg",
+    "anon": "$(anon name) takes one name",
+}
+_VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
 class SubstitutionError(ValueError):
@@ -34,13 +36,19 @@ class SubstitutionError(ValueError):
 
 @dataclass
 class Substitution:
-    """What the substitutions of one file stand for."""
+    """What the substitutions of one file stand for.
+
+    ``used``: every arg that was asked for, in any file. ``unset``: args that are declared without a value, and why
+    that is an error where they are used.
+    """
 
     packages: Packages
     environ: Mapping[str, str]
     file: str
     args: dict[str, str] = field(default_factory=dict)
     anonymous: dict[str, str] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+    unset: dict[str, str] = field(default_factory=dict)
 
     def apply(self, text: str) -> str:
         """``text`` with every substitution made. Raises SubstitutionError, NotFoundError."""
@@ -48,35 +56,34 @@ class Substitution:
             return text
         whole = _EVAL.match(text)
         if whole:
-            return str(self._eval(whole[1]))
-        if "$(eval" in text:
-            raise SubstitutionError("$(eval ...) must stand alone: it takes the whole attribute")
+            return self._eval(whole[1])
+        if _NESTED.search(text):
+            raise SubstitutionError(f"[{text}]: a substitution cannot hold another, nor brackets")
         return _PATTERN.sub(lambda match: self._one(match[1]), text)
 
     def _one(self, text: str) -> str:
-        verb, *words = text.split()
-        rules: dict[str, Callable[[list[str]], str]] = {
-            "find": lambda words: str(self._find(*words)),
-            "arg": lambda words: self._arg(*words),
-            "env": lambda words: self._env(*words),
-            "optenv": lambda words: self.environ.get(words[0], " ".join(words[1:])),
-            "anon": lambda words: self._anon(*words),
-            "dirname": lambda words: self._dirname(),
+        verb, *words = text.split() or [""]
+        if verb in _ONE and len(words) != 1:
+            raise SubstitutionError(f"[$({text})]: {_ONE[verb]}")
+        rules: dict[str, Callable[[], str]] = {
+            "find": lambda: str(self.packages.find(words[0])),
+            "arg": lambda: self._arg(words[0]),
+            "env": lambda: self._env(words[0]),
+            "optenv": lambda: self._optenv(*words),
+            "anon": lambda: self._anon(words[0]),
+            "dirname": self._dirname,
         }
+        if verb == "eval":
+            raise SubstitutionError(f"[$({text})]: $(eval ...) must stand alone, and holds an expression")
         if verb not in rules:
-            raise SubstitutionError(
-                f"unknown substitution [$({text})]; there are {', '.join(rules)} and eval"
-            )
-        try:
-            return rules[verb](words)
-        except (TypeError, IndexError):
-            raise SubstitutionError(f"[$({text})] has a wrong number of words") from None
-
-    def _find(self, package: str) -> Path:
-        return self.packages.find(package)
+            raise SubstitutionError(f"unknown substitution [$({text})]; there are {', '.join(_VERBS)}")
+        return rules[verb]()
 
     def _arg(self, name: str) -> str:
+        self.used.add(name)
         if name not in self.args:
+            if name in self.unset:
+                raise SubstitutionError(self.unset[name])
             known = f" (there are: {', '.join(sorted(self.args))})" if self.args else ""
             raise SubstitutionError(f"arg '{name}' is not defined{known}")
         return self.args[name]
@@ -86,44 +93,52 @@ class Substitution:
             raise SubstitutionError(f"environment variable '{name}' is not set")
         return self.environ[name]
 
+    def _optenv(self, name: str = "", *default: str) -> str:
+        if not name:
+            raise SubstitutionError("[$(optenv)]: $(optenv VAR default) takes an environment variable")
+        return self.environ.get(name, " ".join(default))
+
     def _anon(self, name: str) -> str:
         return self.anonymous.setdefault(name, names.anonymous_name(name))
 
     def _dirname(self) -> str:
         return str(Path(self.file).resolve().parent)
 
-    def _eval(self, expression: str) -> Any:
-        """A Python expression of numbers, texts, lists, args and a few functions; nothing else."""
-        if len(expression) > _LONGEST_EXPRESSION:
-            raise SubstitutionError("the $(eval ...) is too long")
+    def _eval(self, expression: str) -> str:
+        """The text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
+        if "__" in expression:
+            raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
         functions: dict[str, Any] = {
             "arg": lambda name: convert(self._arg(name), "auto"),
             "env": self._env,
-            "optenv": lambda name, default="": self.environ.get(name, default),
-            "find": lambda package: str(self._find(package)),
+            "optenv": self._optenv,
+            "find": lambda package: str(self.packages.find(package)),
             "anon": self._anon,
             "dirname": self._dirname,
             "true": True,
             "false": False,
-            **{kind.__name__: kind for kind in (str, int, float, bool, len, min, max, abs, round, list)},
-            **{name: value for name, value in vars(math).items() if not name.startswith("_")},
         }
-        scope = functions | {name: convert(value, "auto") for name, value in self.args.items()}
+        scope = _Names(self, {**vars(builtins), **vars(math), **functions})
         try:
-            tree = ast.parse(expression.strip(), mode="eval")
-        except (SyntaxError, ValueError) as error:
-            raise SubstitutionError(f"[{expression}] is not an expression: {error}") from None
-        for node in ast.walk(tree):
-            if not isinstance(node, _ALLOWED) or (
-                isinstance(node, ast.Call) and not isinstance(node.func, ast.Name)
-            ):
-                raise SubstitutionError(f"[{expression}] holds what $(eval ...) does not allow")
-            if isinstance(node, ast.Pow):
-                raise SubstitutionError(f"[{expression}]: use pow(), not **")
-        try:
-            return eval(compile(tree, "<eval>", "eval"), {"__builtins__": {}}, scope)
+            return str(eval(expression.strip(), {"__builtins__": {}}, scope))
+        except SubstitutionError:
+            raise
         except Exception as error:  # noqa: BLE001 - whatever the expression does wrong
-            raise SubstitutionError(f"[{expression}] cannot be evaluated: {error}") from None
+            why = " ".join(str(error).split())
+            raise SubstitutionError(f"[{expression}] cannot be evaluated: {why}") from None
+
+
+class _Names(dict[str, Any]):
+    """The names of an expression: Python's, those of ``math``, then the args as values."""
+
+    def __init__(self, substitution: Substitution, known: dict[str, Any]) -> None:
+        super().__init__(known)
+        self._substitution = substitution
+
+    def __missing__(self, name: str) -> Any:
+        if name not in self._substitution.args and name not in self._substitution.unset:
+            raise KeyError(name)
+        return convert(self._substitution._arg(name), "auto")
 
 
 def convert(text: str, type_: str) -> Any:
@@ -139,7 +154,7 @@ def convert(text: str, type_: str) -> Any:
         return float(text)
     if kind in ("bool", "boolean"):
         if text.strip().lower() not in ("true", "1", "false", "0"):
-            raise ValueError(f"{text} is not a bool")
+            raise ValueError(f"{text} is not a 'bool' type")
         return text.strip().lower() in ("true", "1")
     if kind == "yaml":
         import yaml
@@ -153,7 +168,11 @@ def convert(text: str, type_: str) -> Any:
 
 def _guess(text: str) -> Any:
     try:
-        return float(text) if "." in text else int(text)
+        if "." in text:
+            return float(text)
+        # As ROS has it: an int has no underscores, though Python's may.
+        if "_" not in text:
+            return int(text)
     except ValueError:
         pass
     lowered = text.lower()

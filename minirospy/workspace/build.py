@@ -24,9 +24,18 @@ from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
 
-__all__ = ["Workspace", "build", "build_order", "find_workspace", "own_set_up", "read_plans", "write_set_up"]
+__all__ = [
+    "PROVIDED",
+    "Workspace",
+    "build",
+    "build_order",
+    "find_workspace",
+    "own_set_up",
+    "read_plans",
+    "write_set_up",
+]
 
-_PROVIDED = frozenset(
+PROVIDED = frozenset(
     """
     actionlib angles catkin class_loader cmake_modules cpp_common cv_bridge diagnostic_updater dynamic_reconfigure
     eigen_conversions gencpp geneus genlisp genmsg gennodejs genpy image_geometry image_transport
@@ -272,7 +281,7 @@ class _Builder:
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
         """Packages that find_package names and nobody has: an error where it looks like a typing error."""
         warnings = []
-        known = self._folders.keys() | _PROVIDED
+        known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
             if name not in known:
                 self._check_typing(plan, name, known, line)

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.environment import Environment
+from minirospy.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.errors import MinirospyError, NotFoundError
 
 __all__ = [
@@ -31,6 +31,7 @@ _MANIFEST = "package.xml"
 _IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
+_ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
 
 
@@ -49,7 +50,8 @@ class Packages:
     """The packages that an environment sees. A package's name is that in its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
-        environment = environment or Environment.read()
+        # Packages are found whatever ROS_MASTER_URI says, and no look-up of this machine's name is needed.
+        environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
 
@@ -96,20 +98,28 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """The command that runs a package's program. Python runs in this interpreter, whatever ``env`` finds.
+        """The command that runs a package's program; of several programs of a name, the first.
 
-        Raises NotFoundError with the nearest names, NotExecutableError.
+        Python runs in this interpreter, whatever ``env`` finds. Raises NotFoundError with the nearest names,
+        NotExecutableError.
+        """
+        return self.find_executables(package, name)[0]
+
+    def find_executables(self, package: str, name: str) -> list[list[str]]:
+        """Each command that a name, or a path in the package, may mean: more than one where folders share a name.
+
+        Raises as :meth:`find_executable`.
         """
         folder = self.find(package)
         candidates = (
             [folder / name] if "/" in name else [path for path in _files(folder) if path.name == name]
         )
         candidates = [path for path in candidates if path.is_file()]
-        for path in candidates:
-            if _is_python(path):
-                return [sys.executable, str(path)]
-            if os.access(path, os.X_OK):
-                return [str(path)]
+        runnable = [path for path in candidates if _is_python(path) or os.access(path, os.X_OK)]
+        if runnable:
+            # What a build has put beside a script of the package is that script again.
+            own = [path for path in runnable if path.is_relative_to(folder)] or runnable
+            return [[sys.executable, str(path)] if _is_python(path) else [str(path)] for path in own]
         if candidates:
             raise NotExecutableError(candidates[0])
         raise NotFoundError(
@@ -166,7 +176,7 @@ def built_in_roots() -> tuple[Path, ...]:
     """What minirospy brings along: beside the package in a checkout, in its ``share`` when installed."""
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
-    return (base / "msgs", base / "rpi_feros", base / "launch")
+    return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros_packages")
 
 
 def crawl(root: Path) -> Iterator[Path]:

@@ -28,7 +28,23 @@ _COMPILED = {
     "catkin_add_gtest": "test",
     "add_rostest_gtest": "test",
 }
-_TESTS = {"catkin_add_nosetests": "pytest", "catkin_add_pytests": "pytest", "add_rostest": "rostest"}
+_TESTS = {
+    "catkin_add_nosetests": "pytest",
+    "catkin_add_pytests": "pytest",
+    "add_rostest": "rostest",
+    "roslaunch_add_file_check": "roslaunch-check",
+}
+_TEST_WORDS = frozenset(
+    [
+        "ARGS",
+        "DEPENDENCIES",
+        "IGNORE_UNSET_ARGS",
+        "OPTIONS",
+        "TIMEOUT",
+        "USE_TEST_DEPENDENCIES",
+        "WORKING_DIRECTORY",
+    ]
+)
 _WORDS = frozenset(
     ["REQUIRED", "QUIET", "COMPONENTS", "OPTIONAL_COMPONENTS", "EXACT", "MODULE", "CONFIG", "NO_MODULE"]
 )
@@ -67,11 +83,13 @@ class Install(NamedTuple):
 
 
 class Test(NamedTuple):
-    """A test: a file or folder below the package, and what runs it (pytest or rostest)."""
+    """A test: a file or folder below the package, what runs it, with what arguments and where."""
 
     path: str
     kind: str
     line: int
+    arguments: tuple[str, ...] = ()
+    folder: str = ""
 
 
 class Plan(NamedTuple):
@@ -251,7 +269,13 @@ class _Collector:
 
     def _test(self, command: Command) -> None:
         if command.arguments:
-            self._tests.append(Test(command.arguments[0], _TESTS[command.name], command.line))
+            given = keyword_arguments(command.arguments[1:], _TEST_WORDS)
+            flags = ["-i"] if "IGNORE_UNSET_ARGS" in given else []
+            arguments = (*flags, *given.get("ARGS", ()))
+            folder = next(iter(given.get("WORKING_DIRECTORY", ())), "")
+            self._tests.append(
+                Test(command.arguments[0], _TESTS[command.name], command.line, arguments, folder)
+            )
 
     def _install_python(self, command: Command) -> None:
         given = keyword_arguments(command.arguments, frozenset(["PROGRAMS", "DESTINATION", "OPTIONAL"]))

@@ -43,7 +43,8 @@ def setup_files(setup: SetUp) -> dict[str, str]:
         "env.sh": _ENV,
         "setup.fish": _fish(setup, setup.parents),
         "setup.bat": _bat(setup, setup.parents),
-        "env.bat": '@echo off\ncall "%~dp0setup.bat"\n%*\n',
+        "local_setup.bat": _bat(setup, ()),
+        "env.bat": '@echo off\r\ncall "%~dp0setup.bat"\r\n%*\r\n',
     }
     for stem in ("setup", "local_setup"):
         files[f"{stem}.bash"] = _BASH.format(
@@ -279,19 +280,57 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _bat(setup: SetUp, parents: Sequence[Path]) -> str:
-    lines = ["@echo off", "rem Made by minirospy: `call` it to work with the packages of this workspace.", ""]
-    text = "\n".join(lines) + _bat_base(setup)
-    for prefix in (*reversed(parents), None):
-        text += _bat_workspace(str(prefix) if prefix else "%~dp0", setup.sources if prefix is None else ())
-    text += "".join(f'set "ROS_PACKAGE_PATH=%ROS_PACKAGE_PATH%;{folder}"\n' for folder in setup.share)
-    return text + f'call "{setup.functions / "ros.bat"}"\n'
+    chain = "".join(f'call :minirospy_workspace put "{parent}"\n' for parent in reversed(parents))
+    share = "".join(f'call :minirospy_last ROS_PACKAGE_PATH "{folder}"\n' for folder in setup.share)
+    text = _BAT.format(base=_bat_base(setup), chain=chain, share=share, functions=setup.functions / "ros.bat")
+    # cmd.exe misses labels in a file whose lines end in a line feed alone.
+    return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 
-def _bat_workspace(prefix: str, sources: Sequence[Path]) -> str:
-    prefix = prefix.removesuffix("\\")
-    entries = [("PYTHONPATH", f"{prefix}\\{DIST_PACKAGES}".replace("/", "\\")), ("CMAKE_PREFIX_PATH", prefix)]
-    entries += [("PATH", f"{prefix}\\bin"), *(("ROS_PACKAGE_PATH", str(source)) for source in sources)]
-    return "".join(f'set "{name}={entry};%{name}%"\n' for name, entry in entries)
+_BAT = """@echo off
+rem Made by minirospy: `call` it to work with the packages of this workspace.
+{base}if "%~1"=="--extend" goto minirospy_own
+if not defined CMAKE_PREFIX_PATH goto minirospy_below
+rem The workspaces that were sourced before make way.
+for %%P in ("%CMAKE_PREFIX_PATH:;=" "%") do if exist "%%~P\\.catkin" call :minirospy_workspace take "%%~P"
+:minirospy_below
+{chain}:minirospy_own
+for %%P in ("%~dp0.") do call :minirospy_workspace put "%%~fP"
+{share}call "{functions}"
+exit /b 0
+
+rem put or take PREFIX: all variables of one workspace; its file .catkin names the folders of packages.
+:minirospy_workspace
+for /f "usebackq delims=" %%L in ("%~2\\.catkin") do set "MINIROSPY_SOURCES=%%L"
+for %%S in ("%MINIROSPY_SOURCES:;=" "%") do call :minirospy_%~1 ROS_PACKAGE_PATH "%%~S"
+set "MINIROSPY_SOURCES="
+call :minirospy_%~1 CMAKE_PREFIX_PATH "%~2"
+call :minirospy_%~1 PYTHONPATH "%~2\\@DIST_PACKAGES@"
+call :minirospy_%~1 PATH "%~2\\bin"
+exit /b 0
+
+rem VARIABLE ENTRY: put it in front, and take it away where it was before.
+:minirospy_put
+call :minirospy_take %1 %2
+if defined %~1 (call set "%~1=%~2;%%%~1%%") else set "%~1=%~2"
+exit /b 0
+
+rem VARIABLE ENTRY: put it at the end, and take it away where it was before.
+:minirospy_last
+call :minirospy_take %1 %2
+if defined %~1 (call set "%~1=%%%~1%%;%~2") else set "%~1=%~2"
+exit /b 0
+
+rem VARIABLE ENTRY: take it out. What call runs is read twice: %% stands for the % of the second time.
+:minirospy_take
+if not defined %~1 exit /b 0
+call set "MINIROSPY_REST=;%%%~1%%;"
+call set "MINIROSPY_REST=%%MINIROSPY_REST:;%~2;=;%%"
+set "MINIROSPY_REST=%MINIROSPY_REST:~1,-1%"
+if defined MINIROSPY_REST (call set "%~1=%%MINIROSPY_REST%%") else set "%~1="
+set "MINIROSPY_REST="
+exit /b 0
+"""
 
 
 def _bat_base(setup: SetUp) -> str:

@@ -196,17 +196,18 @@ def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
     assert "PARAMETERS\n * /p: 5\n" in said
     assert "  /deep/\n    two (pkg/wait.py)\n" in said
     assert "waiting -x a:=b __name:=one __log:=" in said
-    if "process[deep/two-2]" not in said:
-        read_until(launch, "process[deep/two-2]: started with pid [")
+    if "process[deep/two-3]" not in said:
+        read_until(launch, "process[deep/two-3]: started with pid [")
     proxy = MasterProxy(f"http://localhost:{port}", "/test")
     assert proxy.get_param("/p") == 5
     proxy.close()
     children = psutil.Process(launch.pid).children(recursive=True)
-    assert len(children) == 3
+    # The master, both nodes, and what would end them if roslaunch were killed.
+    assert len(children) == 4
     launch.send_signal(signal.SIGINT)
     output, _ = launch.communicate(timeout=5)
     assert launch.returncode == 0
-    assert "[deep/two-2] killing on exit\n[one-1] killing on exit\n" in output
+    assert "[deep/two-3] killing on exit\n[one-2] killing on exit\n" in output
     assert output.splitlines()[-4:] == [
         "[master] killing on exit",
         "shutting down processing monitor...",
@@ -214,7 +215,7 @@ def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
         "done",
     ]
     assert not [child for child in children if child.is_running()]
-    assert list(Path(os.environ["ROS_LOG_DIR"]).glob("*/deep-two-2-stdout.log"))
+    assert list(Path(os.environ["ROS_LOG_DIR"]).glob("*/deep-two-3-stdout.log"))
 
 
 @pytest.mark.parametrize(("code", "status"), [(0, 0), (3, 1)])
@@ -228,7 +229,7 @@ def test_a_required_node_ends_all(master: str, package: Path, code: int, status:
         [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=20, check=False
     )
     assert done.returncode == status
-    assert "REQUIRED process [r-1] has" in done.stdout
+    assert "REQUIRED process [r-1] has died!" in done.stderr
     assert "[w-2] killing on exit" in done.stdout
     assert "auto-starting" not in done.stdout
 
@@ -279,7 +280,7 @@ def test_roslaunch_without_running(package: Path, capsys: pytest.CaptureFixture[
     assert roslaunch.main(["--args", "me", str(file), "who:=me"]) == 0
     command = f"{sys.executable} {package / 'wait.py'} __name:=me"
     assert capsys.readouterr().out == (
-        f"/me\n{{/p: 1}}\n\nRequired Arguments:\n  who: a name\n{file}\n{command}\n"
+        f"/me\n/p: 1\n\nRequired Arguments:\n  who: a name\n{file}\n{command}\n"
     )
 
 

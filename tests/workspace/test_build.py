@@ -415,7 +415,7 @@ def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     assert "1 passed" in capfd.readouterr().out
     (scene.source / "p" / "test" / "test_led.py").write_text("def test_led():\n    assert False\n")
     assert catkin_make(["-C", str(scene.root), "run_tests_p"]) == 1
-    assert "1 test targets, with failures" in capfd.readouterr().out
+    assert "Summary: 1 tests, 0 errors, 1 failures, 0 skipped" in capfd.readouterr().out
 
 
 def test_install(scene: Scene) -> None:

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import pytest
 
 import minirospy
+from minirospy.cli.complete import _MODULES
+from minirospy.cli.sources import BY_HAND
 
 SHELL = Path(minirospy.__file__).parent / "workspace" / "shell"
 BIN = Path(sys.executable).parent
@@ -276,19 +278,20 @@ def test_bash_inserts_a_message(bash: Shell) -> None:
     assert bash_tab(bash, 'rostopic pub /t std_msgs/Bool "da') == ["data: false"]
 
 
+_COMMANDS = {*_MODULES, *BY_HAND, "minirospy"}
+
+
 def test_bash_knows_every_command(bash: Shell) -> None:
-    registered = "\n".join(bash.run("complete -p").out)
-    for command in (
-        "roscd",
-        "rospd",
-        "roscore",
-        "rosservice",
-        "rosparam",
-        "rossrv",
-        "rospack",
-        "catkin_make",
-    ):
-        assert f"_ros_complete_bash {command}" in registered
+    lines = bash.run("complete -p").out
+    assert {line.split()[-1] for line in lines if "_ros_complete_bash" in line} == _COMMANDS
+
+
+def test_fish_knows_every_command(tmp_path: Path) -> None:
+    if not shutil.which("fish"):
+        pytest.skip("fish is not installed")
+    make_workspace(tmp_path)
+    lines = Shell("fish", tmp_path).run("complete").out
+    assert {line.split()[-3] for line in lines if "_ros_complete" in line} == _COMMANDS
 
 
 def test_tab_without_minirospy_is_silent(bash: Shell) -> None:
@@ -345,6 +348,45 @@ def test_fish_tab(tmp_path: Path) -> None:
     done = fish.run("\n".join(f"complete -C '{line}'" for line in lines))
     assert done == (0, ["my_robot/", "talker.py", "rate:=10", "data: false", "{x: 0.0, y: 0.0, z: 0.0}"], "")
     assert fish.run("set PATH /nowhere; complete -C 'rostopic e'").err == ""
+
+
+@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
+def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
+    """A shell at a terminal: a TAB is typed, what stands on the line is read."""
+    import pty
+    import select
+
+    if not shutil.which(name):
+        pytest.skip(f"{name} is not installed")
+    make_workspace(tmp_path)
+    bare = {"bash": ["--norc", "--noprofile"], "zsh": ["-f"], "fish": ["--no-config"]}[name]
+    # Fish asks that the terminal is its session's own.
+    own = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
+    keyboard, terminal = pty.openpty()
+    shell = subprocess.Popen(
+        [sys.executable, "-c", own, name, *bare, "-i"], stdin=terminal, stdout=terminal, stderr=terminal, start_new_session=True,
+        env={**Shell(name, tmp_path).environ, "TERM": "dumb"},
+    )  # fmt: skip
+    os.close(terminal)
+
+    def read_until(text: bytes) -> None:
+        seen = b""
+        while text not in seen:
+            assert select.select([keyboard], [], [], 20.0)[0], seen
+            seen += os.read(keyboard, 65536)
+
+    try:
+        source = SHELL / ("ros.fish" if name == "fish" else "ros.bash")
+        ready = "math 6 x 7" if name == "fish" else "echo $((6 * 7))"
+        # The answer, not its echo: from then on the line editor reads.
+        os.write(keyboard, f"source {source}\n{ready}\n".encode())
+        read_until(b"42")
+        os.write(keyboard, b"rosrun my_robot ta\t")
+        read_until(b"talker.py ")
+    finally:
+        shell.kill()
+        shell.wait()
+        os.close(keyboard)
 
 
 # --- the files themselves

@@ -275,8 +275,10 @@ _ros_complete_zsh() {
 }
 
 _ros_commands() {
-    printf '%s\n' roscd rosls rosed roscp rospd rosrun roslaunch roscore rostopic rosnode rosservice rosparam \
-        rosmsg rossrv rospack catkin_make catkin minirospy
+    printf '%s\n' roscd rosls rosed roscp rospd rosrun roslaunch roscore rosmaster rostopic rosnode rosservice rosparam \
+        rosmsg rossrv rosmsg-proto rospack rosconsole rosgraph rosclean rosversion roswtf rostest rosunit \
+        catkin_make catkin catkin_create_pkg catkin_init_workspace catkin_test_results \
+        catkin_find catkin_find_pkg catkin_topological_order minirospy
 }
 
 if [ -n "${ZSH_VERSION:-}" ]; then

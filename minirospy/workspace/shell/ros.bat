@@ -18,24 +18,24 @@
 :workspace
 @if not "%ROS_WORKSPACE%"=="" cd /d "%ROS_WORKSPACE%" & exit /b
 @for /f "tokens=1 delims=;" %%p in ("%CMAKE_PREFIX_PATH%") do @cd /d "%%p" & exit /b
-@echo roscd: ERROR: no workspace: call its devel\setup.bat, or set ROS_WORKSPACE>&2
+@>&2 echo roscd: ERROR: no workspace: call its devel\setup.bat, or set ROS_WORKSPACE
 @exit /b 1
 
 :rosls
-@if "%~2"=="" echo usage: rosls package [options of dir]>&2 & exit /b 2
+@if "%~2"=="" >&2 echo usage: rosls package [options of dir]& exit /b 2
 @call :find "%~2" || exit /b 1
 @dir %3 %4 %5 "%ROS_FOUND%"
 @exit /b
 
 :rosed
-@if "%~3"=="" echo usage: rosed package filename>&2 & exit /b 2
+@if "%~3"=="" >&2 echo usage: rosed package filename& exit /b 2
 @call :find "%~2" || exit /b 1
 @call :file "%~3" || exit /b 1
 @if "%EDITOR%"=="" (notepad "%ROS_FOUND%") else %EDITOR% "%ROS_FOUND%"
 @exit /b
 
 :roscp
-@if "%~4"=="" echo usage: roscp package filename target>&2 & exit /b 2
+@if "%~4"=="" >&2 echo usage: roscp package filename target& exit /b 2
 @call :find "%~2" || exit /b 1
 @call :file "%~3" || exit /b 1
 @copy "%ROS_FOUND%" "%~4"
@@ -58,5 +58,5 @@
 :file
 @if exist "%ROS_FOUND%%~1" set "ROS_FOUND=%ROS_FOUND%%~1" & exit /b 0
 @for /f "delims=" %%f in ('dir /s /b "%ROS_FOUND%%~1" 2^>nul') do @set "ROS_FOUND=%%f" & exit /b 0
-@echo there is no file %~1 in %ROS_FOUND%>&2
+@>&2 echo there is no file "%~1" in "%ROS_FOUND%"
 @exit /b 1

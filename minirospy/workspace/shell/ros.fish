@@ -65,17 +65,23 @@ function _ros_usage --argument-names name --description 'print how a command is 
     end
 end
 
+function _ros_takes --argument-names name least most --description 'check how many words a command was given; 1: say no more, 3: too few or many'
+    set --local words $argv[4..]
+    if test (count $words) -le 1; and contains -- "$words" -h --help
+        _ros_usage $name
+        return 1
+    end
+    test (count $words) -ge $least -a (count $words) -le $most; and return
+    _ros_usage $name >&2
+    return 3
+end
+
 # --- commands
 
 function roscd --description 'go to the folder of a package'
     set --local folder
-    if contains -- "$argv" -h --help
-        _ros_usage roscd
-        return
-    else if test (count $argv) -gt 1
-        _ros_usage roscd >&2
-        return 2
-    else if test -z "$argv"
+    _ros_takes roscd 0 1 $argv; or return (math $status - 1)
+    if test -z "$argv"
         set folder (_ros_workspace); or return
     else if test "$argv" = log
         set folder (_ros_log_folder)
@@ -133,13 +139,7 @@ function _ros_file --argument-names name package file --description 'put the pat
 end
 
 function rosed --description 'edit a file of a package'
-    if contains -- "$argv" -h --help
-        _ros_usage rosed
-        return
-    else if test (count $argv) -ne 2
-        _ros_usage rosed >&2
-        return 2
-    end
+    _ros_takes rosed 2 2 $argv; or return (math $status - 1)
     _ros_file rosed $argv; or return
     for editor in "$EDITOR" "$VISUAL" nano vim vi emacs
         # EDITOR may hold options, as in "code --wait".
@@ -154,13 +154,7 @@ function rosed --description 'edit a file of a package'
 end
 
 function roscp --description 'copy a file of a package'
-    if contains -- "$argv" -h --help
-        _ros_usage roscp
-        return
-    else if test (count $argv) -ne 3
-        _ros_usage roscp >&2
-        return 2
-    end
+    _ros_takes roscp 3 3 $argv; or return (math $status - 1)
     _ros_file roscp $argv[1] $argv[2]; or return
     cp -- $_ros_found $argv[3]
 end
@@ -174,13 +168,8 @@ function rosd --description 'show the stack of folders, numbered'
 end
 
 function rospd --description 'push the folder of a package onto the stack, or turn the stack'
-    if contains -- "$argv" -h --help
-        _ros_usage rospd
-        return
-    else if test (count $argv) -gt 1
-        _ros_usage rospd >&2
-        return 2
-    else if test -z "$argv"
+    _ros_takes rospd 0 1 $argv; or return (math $status - 1)
+    if test -z "$argv"
         pushd $PWD >/dev/null; or return
     else if string match --quiet --regex '^\+?[0-9]+$' -- $argv
         set --local number (string replace + '' -- $argv)
@@ -206,8 +195,10 @@ function _ros_complete --description 'print what can stand at the cursor'
     command minirospy complete --one-line (count $before) $before "$current" 2>/dev/null | string unescape
 end
 
-for name in roscd rosls rosed roscp rospd rosrun roslaunch roscore rostopic rosnode rosservice rosparam \
-        rosmsg rossrv rospack catkin_make catkin minirospy
+for name in roscd rosls rosed roscp rospd rosrun roslaunch roscore rosmaster rostopic rosnode rosservice rosparam \
+        rosmsg rossrv rosmsg-proto rospack rosconsole rosgraph rosclean rosversion roswtf rostest rosunit \
+        catkin_make catkin catkin_create_pkg catkin_init_workspace catkin_test_results \
+        catkin_find catkin_find_pkg catkin_topological_order minirospy
     complete --command $name --erase
     complete --command $name --no-files --arguments '(_ros_complete)'
 end

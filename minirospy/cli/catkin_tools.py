@@ -1,0 +1,150 @@
+"""catkin_find, catkin_find_pkg and catkin_topological_order: where catkin's folders, files and packages are.
+
+Source: http://docs.ros.org/api/catkin/html. What is printed is what catkin prints; packages that need nothing of one
+another come by name.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from minirospy.cli.command import Parser, run
+from minirospy.errors import MinirospyError, NotFoundError, UsageError
+from minirospy.workspace.manifest import Kind, read_manifest
+from minirospy.workspace.packages import Packages, built_in_roots
+
+__all__ = ["catkin_find", "catkin_find_pkg", "catkin_topological_order"]
+
+_PLACES: dict[str, Callable[[str], str]] = {
+    "bin": lambda project: "bin",
+    "etc": lambda project: f"etc/{project}",
+    "include": lambda project: f"include/{project}",
+    "lib": lambda project: "lib",
+    "libexec": lambda project: f"lib/{project}",
+    "share": lambda project: f"share/{project}",
+}
+"""Search folder -> where it is below a workspace's devel or install folder."""
+
+_WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
+_WITH_PROJECT = ("etc", "include", "libexec", "share")
+
+
+def catkin_find(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status as in minirospy.cli.command."""
+    return run("catkin_find", lambda: _find(argv))
+
+
+def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status is 2, as catkin's, where there is no such package."""
+    return run("catkin_find_pkg", lambda: _find_pkg(argv))
+
+
+def catkin_topological_order(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status as in minirospy.cli.command."""
+    return run("catkin_topological_order", lambda: _topological_order(argv))
+
+
+def _find(argv: Sequence[str] | None) -> None:
+    parser = Parser(
+        "catkin_find",
+        description="Print the folders and files of a package in the workspaces that are sourced.",
+    )
+    parser.add_argument(
+        "package", nargs="?", default="", help="the package; without one, the folders themselves"
+    )
+    parser.add_argument("path", nargs="?", default="", help="a file or folder in it")
+    parser.add_argument("--first-only", action="store_true", help="only what is found first")
+    parser.add_argument(
+        "--without-underlays", action="store_true", help="end with the first workspace that has it"
+    )
+    for name in _PLACES:
+        parser.add_argument(f"--{name}", action="store_true", help=f'search in "{name}"')
+    options = parser.parse_args(argv)
+    known = _WITH_PROJECT if options.package else _WITHOUT_PROJECT
+    chosen = [name for name in _PLACES if getattr(options, name)]
+    odd = [name for name in chosen if name not in known]
+    if odd:
+        which = "for a package" if options.package else "without a package"
+        raise UsageError(f"there is no search {which} in {', '.join(odd)}")
+    for workspace in _workspaces():
+        found = list(_found(workspace, chosen or known, options.package, options.path))
+        if options.first_only:
+            del found[1:]
+        for path in found:
+            print(path)
+        if found and (options.first_only or options.without_underlays):
+            break
+
+
+def _workspaces() -> Iterator[Path | None]:
+    """The prefixes of the workspaces that are sourced, the nearest first; None for minirospy's own packages."""
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
+        if prefix and Path(prefix, ".catkin").is_file():
+            yield Path(prefix)
+    yield None
+
+
+def _found(workspace: Path | None, places: Sequence[str], project: str, path: str) -> Iterator[Path]:
+    if workspace is not None:
+        for place in places:
+            yield from filter(Path.exists, [workspace / _PLACES[place](project) / path])
+        text = (workspace / ".catkin").read_text(encoding="utf-8")
+        sources = [Path(each) for each in text.split(";") if each]
+    else:
+        sources = list(built_in_roots())
+    if project and "share" in places:
+        try:
+            yield from filter(Path.exists, [Packages.below(*sources).find(project) / path])
+        except NotFoundError:
+            return
+
+
+def _find_pkg(argv: Sequence[str] | None) -> int:
+    parser = Parser("catkin_find_pkg", description="Print where a package is, below a folder.")
+    parser.add_argument("pkg", help="the package's name")
+    parser.add_argument("directory", nargs="?", default=".", help="the folder to search (default: .)")
+    options = parser.parse_args(argv)
+    base = Path(options.directory)
+    folder = Packages.below(base).folders().get(options.pkg)
+    if folder is None:
+        print(f"Could not find package '{options.pkg}'.", file=sys.stderr)
+        return 2
+    print(os.path.relpath(folder, base))
+    return 0
+
+
+def _topological_order(argv: Sequence[str] | None) -> None:
+    parser = Parser(
+        "catkin_topological_order",
+        description="Print the packages below a folder in the order to build them in.",
+    )
+    parser.add_argument("workspace", nargs="?", default=".", help="the folder (default: .)")
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument("--only-folders", action="store_true", help="print their folders")
+    only.add_argument("--only-names", action="store_true", help="print their names")
+    options = parser.parse_args(argv)
+    base = Path(options.workspace)
+    if not base.is_dir():
+        raise MinirospyError(f'Workspace "{base}" does not exist')
+    folders = Packages.below(base).folders()
+    for name in _ordered(folders):
+        folder = os.path.relpath(folders[name], base)
+        print(folder if options.only_folders else name if options.only_names else f"{name} {folder}")
+
+
+def _ordered(folders: Mapping[str, Path]) -> Iterator[str]:
+    """The packages, each behind those that it is built from; of those that could come next, the first by name."""
+    kinds = (Kind.BUILD, Kind.BUILDTOOL, Kind.BUILD_EXPORT)
+    waiting = {
+        name: {*read_manifest(folder).depends(*kinds)} & folders.keys() for name, folder in folders.items()
+    }
+    while waiting:
+        free = sorted(name for name, needed in waiting.items() if not needed & waiting.keys())
+        if not free:
+            raise MinirospyError(f"packages depend on each other in a circle: {', '.join(sorted(waiting))}")
+        for name in free:
+            del waiting[name]
+        yield from free

@@ -1,0 +1,190 @@
+"""`rostest` and `rosunit`: run the tests of a launch file, or a unit test's file, and say how they went.
+
+Source: http://wiki.ros.org/rostest/Commandline, http://wiki.ros.org/rosunit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.cli.command import Parser, run
+from minirospy.environment import Environment
+from minirospy.errors import MinirospyError, NotFoundError, UsageError
+from minirospy.testing.junit import Result, report
+from minirospy.testing.unit import begin_results, rostest_name_from_path
+from minirospy.workspace.packages import Packages, package_name
+
+__all__ = ["rostest", "rosunit"]
+
+
+def rostest(argv: Sequence[str] | None = None) -> int:
+    """rostest; 0 all passed, 1 a test could not be run or did not say how it went, 2 a test failed."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    return run("rostest", lambda: _rostest(words))
+
+
+def rosunit(argv: Sequence[str] | None = None) -> int:
+    """rosunit; 0 all passed, 1 the file could not be run or did not say how it went, 2 a test failed."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    return run("rosunit", lambda: _rosunit(words))
+
+
+def _rostest(words: list[str]) -> int:
+    parser = Parser(
+        prog="rostest",
+        usage="rostest [options] PACKAGE FILE [arg:=value ...]\n       rostest [options] FILE [arg:=value ...]",
+        description="Runs each <test> of a launch file, with the file's nodes and a master of its own on a free port.",
+        epilog="Exit status: 0 all passed, 1 a test could not be run or wrote no results, 2 a test failed.",
+    )
+    parser.add_argument("what", nargs="*", help="a package and a file in it, or a file")
+    parser.add_argument(
+        "-t", "--text", action="store_true", help="print everything, write no files of results"
+    )
+    parser.add_argument(
+        "--results-filename", metavar="NAME", help="name of the file of results, instead of the test's"
+    )
+    parser.add_argument(
+        "--results-base-dir", metavar="DIR", help="folder of results, instead of ~/.ros/test_results"
+    )
+    parser.add_argument("-r", "--reuse-master", action="store_true", help="use the master that runs")
+    parser.add_argument(
+        "-c", "--clear", action="store_true", help="with --reuse-master: delete all its parameters first"
+    )
+    parser.add_argument(
+        "--package", metavar="PKG", help="name the results after this package, instead of the file's"
+    )
+    parser.add_argument("--pkgdir", metavar="DIR", help="the folder that the file's name is relative to")
+    options = parser.parse_args([word for word in words if ":=" not in word])
+    args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
+    if not options.what:
+        parser.error("You must supply a test file argument to rostest.")
+    if options.clear and not options.reuse_master:
+        parser.error("The --clear option is only valid with --reuse-master")
+    packages = Packages()
+    file = _file(options.what, packages)
+    package, folder = options.package, options.pkgdir
+    if not (package and folder):
+        found = _package_of(file, "rostest", "--package NAME --pkgdir FOLDER")
+        package, folder = package or found[0], folder or str(found[1])
+
+    from minirospy.launch.load import load_files
+    from minirospy.testing.runner import RosTest
+
+    base = _base(options.results_base_dir)
+    test = RosTest(
+        package=package,
+        spec=load_files([str(file)], args, packages),
+        environment=Environment.read(),
+        packages=packages,
+        results_dir=base,
+        text=options.text,
+        reuse_master=options.reuse_master,
+        clear=options.clear,
+    )
+    name = options.results_filename or rostest_name_from_path(os.path.abspath(folder), str(file))
+    output = base / package / f"rostest-{name.removesuffix('.xml')}.xml"
+    if options.text:
+        test.run()
+        return _told(test.own, test.results, "ROSTEST", None)
+    log_file = test.environment.log_dir / f"{test.run_id}.log"
+    print(f"... logging to {log_file}")
+    begin_results(output)
+    test.run()
+    if test.spec.tests:
+        print()
+    status = _told(test.own, test.results, "ROSTEST", output)
+    log_file.parent.mkdir(parents=True, exist_ok=True)
+    log_file.write_text(test.own.system_out, encoding="utf-8")
+    print(f"rostest log file is in {log_file}")
+    return status
+
+
+def _rosunit(words: list[str]) -> int:
+    parser = Parser(
+        prog="rosunit",
+        usage="rosunit [options] FILE [arguments of the test ...]",
+        description="Runs a unit test's file, and reads the results that it writes.",
+        epilog="Exit status: 0 all passed, 1 the file could not be run or wrote no results, 2 a test failed.",
+    )
+    parser.add_argument("file", nargs="?", help="a Python file, or a program, that calls rosunit.unitrun")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="what the file is given")
+    parser.add_argument(
+        "-t", "--text", action="store_true", help="print everything, write no files of results"
+    )
+    parser.add_argument("--time-limit", type=float, default=60.0, metavar="SECONDS", help="default: 60")
+    parser.add_argument("--name", help="the test's name in the results (default: the file's)")
+    parser.add_argument("--package", help="the package in the results (default: the one around the file)")
+    options = parser.parse_args(words)
+    if not options.file:
+        parser.error("You must supply a test file.")
+    file = Path(options.file)
+    if not file.is_file():
+        raise MinirospyError(f"there is no file {file} to test")
+    package = options.package or _package_of(file, "rosunit", "--package NAME")[0]
+    name = options.name or file.stem
+
+    from minirospy.testing.bare import run_bare
+
+    base = _base(None)
+    output = base / package / f"rostest-{name}.xml"
+    results_file = base / package / f"rosunit-{name}.xml"
+    if not options.text:
+        begin_results(output)
+    results, case = run_bare(
+        file, options.arguments, results_file, package, name, seconds=options.time_limit, text=options.text
+    )
+    own = Result("unittest.suite.TestSuite")
+    own.add_case(case)
+    print(case.line)
+    return _told(own, results, "ROSUNIT", None if options.text else output)
+
+
+def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
+    """Write and print how it went; the exit status."""
+    if output is not None:
+        own.write(output)
+        failed = [case.name for case in own.test_case_results if case.failures]
+        print(report(results, runner, own.num_errors, failed))
+    if own.num_errors or own.num_failures:
+        return 1
+    return 2 if results.num_errors or results.num_failures else 0
+
+
+def _base(folder: str | None) -> Path:
+    from minirospy.workspace.rospkg import get_test_results_dir
+
+    return Path(folder or get_test_results_dir()).absolute()
+
+
+def _file(what: list[str], packages: Packages) -> Path:
+    """The launch file that the command line names. Raises MinirospyError."""
+    if len(what) == 1:
+        if Path(what[0]).is_file():
+            return Path(what[0]).resolve()
+        raise MinirospyError(f"[{what[0]}] is not a launch file name: type rostest PACKAGE FILE, or a path")
+    if len(what) > 2:
+        raise UsageError("type rostest PACKAGE FILE, or rostest FILE (`rostest -h` shows what there is)")
+    package, file = what
+    try:
+        return packages.find_resource(package, file)
+    except NotFoundError as error:
+        raise MinirospyError(
+            f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch file name: {error}"
+        ) from error
+
+
+def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
+    """The package that a file lies in, and its folder. Raises MinirospyError."""
+    for folder in file.resolve().parents:
+        name = package_name(folder)
+        if name:
+            return name, folder
+    raise MinirospyError(f"{file} is in no package (no package.xml above it): type {command} {options} FILE")
+
+
+if __name__ == "__main__":
+    sys.exit(rostest())

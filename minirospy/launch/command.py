@@ -1,0 +1,64 @@
+"""A node -> the command that runs it, its environment and its folder. Source: http://wiki.ros.org/roslaunch/XML/node."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+
+from minirospy.environment import Environment
+from minirospy.errors import LaunchError, NotFoundError
+from minirospy.launch.spec import NodeSpec
+from minirospy.workspace.packages import NotExecutableError, Packages
+
+__all__ = ["node_command", "node_environment", "node_folder", "node_program", "shell_line"]
+
+
+def node_program(node: NodeSpec, packages: Packages) -> list[str]:
+    """What runs a node's program, its path last. Raises LaunchError."""
+    try:
+        return packages.find_executable(node.package, node.type)
+    except (NotFoundError, NotExecutableError) as error:
+        raise LaunchError(node.file, node.line, f"node [{node.base_name}]: {error}") from error
+
+
+def node_command(node: NodeSpec, packages: Packages) -> list[str]:
+    """The command that runs a node, with its name and remappings. Raises LaunchError."""
+    program = node_program(node, packages)
+    try:
+        prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
+    except ValueError as error:
+        text = f"node [{node.base_name}]: args or launch-prefix: {error}"
+        raise LaunchError(node.file, node.line, text) from None
+    remaps = [f"{a}:={b}" for a, b in node.remaps]
+    # A program that launches nodes may leave them the name that they have.
+    name = [f"__name:={node.base_name}"] if node.base_name else []
+    return [*prefix, *program, *args, *remaps, *name]
+
+
+def node_environment(
+    node: NodeSpec, environment: Environment, environ: Mapping[str, str] | None = None
+) -> dict[str, str]:
+    """The environment of a node's process."""
+    variables = {**(os.environ if environ is None else environ), **dict(node.env)}
+    variables["ROS_MASTER_URI"] = environment.master_uri
+    namespace = node.namespace.rstrip("/")
+    if namespace:
+        variables["ROS_NAMESPACE"] = namespace
+    else:
+        variables.pop("ROS_NAMESPACE", None)
+    return variables
+
+
+def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
+    """The folder that a node's process starts in. Raises LaunchError."""
+    return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
+
+
+def shell_line(node: NodeSpec, packages: Packages) -> str:
+    """A node's command as `roslaunch --args` prints it, with the variables that it sets. Raises LaunchError."""
+    namespace = node.namespace.rstrip("/")
+    variables = [("ROS_NAMESPACE", namespace)] if namespace else []
+    words = [f'{name}="{value}"' for name, value in (*variables, *node.env)]
+    return " ".join([*words, *node_command(node, packages)])

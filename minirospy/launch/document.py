@@ -1,0 +1,182 @@
+"""The text of a launch file -> its tags, each with its line. Pure.
+
+Source: http://wiki.ros.org/roslaunch/XML.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from minirospy.errors import LaunchError, NotFoundError
+from minirospy.launch.substitution import Substitution, SubstitutionError
+
+__all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
+
+_NODE = [
+    "pkg", "type", "name", "args", "machine", "respawn", "respawn_delay", "required", "ns", "clear_params", "output",
+    "cwd", "launch-prefix",
+]  # fmt: skip
+ATTRIBUTES: dict[str, frozenset[str]] = {
+    tag: frozenset({*names, "if", "unless"})
+    for tag, names in {
+        "launch": ["deprecated"],
+        "arg": ["name", "value", "default", "doc"],
+        "param": ["name", "value", "type", "textfile", "binfile", "command"],
+        "rosparam": ["command", "file", "param", "ns", "subst_value"],
+        "node": _NODE,
+        "test": [*_NODE, "test-name", "time-limit", "retry"],
+        "remap": ["from", "to"],
+        "env": ["name", "value"],
+        "group": ["ns", "clear_params"],
+        "include": ["file", "ns", "clear_params", "pass_all_args"],
+        "machine": ["name", "address", "env-loader", "ssh-port", "user", "password", "default", "timeout"],
+        "master": ["auto", "type", "uri"],
+    }.items()
+}
+"""Each tag, and the attributes that it may have."""
+
+_TRUTH = {"true": True, "false": False}
+
+
+@dataclass
+class Element:
+    """A tag as it stands in the file, on ``line``; ``text`` is what it holds beside its children."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+
+def parse_document(text: bytes, file: str) -> Element:
+    """The ``<launch>`` of a launch file. Raises LaunchError."""
+    parser = expat.ParserCreate()
+    stack: list[Element] = []
+    roots: list[Element] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(tag, attributes, parser.CurrentLineNumber)
+        (stack[-1].children if stack else roots).append(element)
+        stack.append(element)
+
+    def end(_: str) -> None:
+        stack.pop()
+
+    def data(part: str) -> None:
+        if stack:
+            stack[-1].text += part
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = data
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        why = expat.ErrorString(error.code)
+        raise LaunchError(file, error.lineno, f"Invalid roslaunch XML syntax: {why}") from None
+    except (LookupError, ValueError) as error:
+        raise LaunchError(file, 0, f"Invalid roslaunch XML syntax: {error}") from None
+    if roots[0].tag != "launch":
+        raise LaunchError(file, roots[0].line, f"the outermost tag is <{roots[0].tag}>, it must be <launch>")
+    return roots[0]
+
+
+class Tag:
+    """An element with what its substitutions stand for: its attributes as values, its faults with their line."""
+
+    def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
+        self.element = element
+        self.file = file
+        self._substitution = substitution
+
+    @property
+    def name(self) -> str:
+        """What stands behind the ``<``."""
+        return self.element.tag
+
+    @property
+    def line(self) -> int:
+        """The line that it begins on."""
+        return self.element.line
+
+    def children(self) -> Iterator[Tag]:
+        """The tags inside."""
+        return (Tag(child, self.file, self._substitution) for child in self.element.children)
+
+    def has(self, key: str) -> bool:
+        """Whether an attribute is there, empty or not."""
+        return key in self.element.attributes
+
+    def resolve(self, text: str) -> str:
+        """A text with its substitutions made. Raises LaunchError."""
+        try:
+            return self._substitution.apply(text)
+        except (SubstitutionError, NotFoundError) as error:
+            raise self.error(str(error)) from error
+
+    def optional(self, key: str) -> str | None:
+        """An attribute, substitutions made; None where it is not there. Raises LaunchError."""
+        text = self.element.attributes.get(key)
+        return None if text is None else self.resolve(text)
+
+    def required(self, key: str, *, may_be_empty: bool = False) -> str:
+        """An attribute that has to be there. Raises LaunchError."""
+        text = self.optional(key)
+        if text is None:
+            raise self.error(f"<{self.name}> tag is missing required attribute: '{key}'")
+        if not text and not may_be_empty:
+            raise self.error(f"<{self.name}> tag has an empty '{key}' attribute")
+        return text
+
+    def flag(self, key: str) -> bool:
+        """An attribute that is true or false (where it is not there). Raises LaunchError."""
+        text = self.optional(key)
+        if text is None:
+            return False
+        return self._truth(key, text, _TRUTH)
+
+    def number(self, key: str, default: float) -> float:
+        """An attribute that is a number. Raises LaunchError."""
+        text = self.optional(key)
+        try:
+            return default if text is None else float(text)
+        except ValueError:
+            raise self.error(f"'{key}' must be a number: [{text}]") from None
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """An attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
+        text = self.optional(key)
+        if text is not None and text not in choices:
+            raise self.error(f"{key} is {' or '.join(map(repr, choices))}, not '{text}'")
+        return text or choices[0]
+
+    def applies(self) -> bool:
+        """What its ``if`` or ``unless`` says. Raises LaunchError."""
+        if self.has("if") and self.has("unless"):
+            raise self.error("cannot set both 'if' and 'unless' on the same tag")
+        for key in ("if", "unless"):
+            text = self.optional(key)
+            if text is not None:
+                return self._truth(key, text, {**_TRUTH, "1": True, "0": False}) == (key == "if")
+        return True
+
+    def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
+        """Tell of each attribute that a tag of this name does not have: most often it is a typing error."""
+        known = ATTRIBUTES[self.name]
+        for key in self.element.attributes:
+            if key not in known:
+                near = NotFoundError("attribute", key, known).nearest
+                hint = f": did you mean {' or '.join(near)}?" if near else ""
+                warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
+
+    def error(self, text: str) -> LaunchError:
+        """A fault of this tag, to be raised."""
+        return LaunchError(self.file, self.line, text)
+
+    def _truth(self, key: str, text: str, words: dict[str, bool]) -> bool:
+        value = words.get(text.strip().lower())
+        if value is None:
+            raise self.error(f"{key} is 'true' or 'false', not '{text}'")
+        return value

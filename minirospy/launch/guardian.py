@@ -1,0 +1,68 @@
+"""A process that outlives roslaunch by a moment: it ends the nodes that a killed roslaunch has left. A script.
+
+From its input it reads a line for each process group: ``+PID`` began, ``*PID`` began and is to end last (the master),
+``-PID`` has ended. Where the input ends, roslaunch has, however it came: what is left then gets SIGINT, SIGTERM, SIGKILL.
+Nothing but the standard library is imported, and little of that: it starts while the first nodes do.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterable
+
+
+def watch(lines: Iterable[str], interrupt_seconds: float, terminate_seconds: float) -> None:
+    """Keep book until ``lines`` end; then end what is left."""
+    groups: dict[int, bool] = {}
+    for line in lines:
+        pid = int(line[1:])
+        if line[0] == "-":
+            groups.pop(pid, None)
+        else:
+            groups[pid] = line[0] == "*"
+    for is_last in (False, True):
+        group = left = [pid for pid, last in groups.items() if last == is_last]
+        for name, seconds in (("SIGINT", interrupt_seconds), ("SIGTERM", terminate_seconds)):
+            left = [pid for pid in left if send(pid, name)]
+            end = time.monotonic() + seconds
+            while left and time.monotonic() < end:
+                time.sleep(0.02)
+                left = [pid for pid in left if is_running(pid)]
+        for pid in group:
+            # With what a node left behind in its group.
+            send(pid, "SIGKILL")
+
+
+def send(pid: int, name: str) -> bool:
+    """Send a signal to a process group; whether there was one to take it."""
+    if sys.platform == "win32":
+        import subprocess
+
+        # No signal reaches a process of another console: it is ended, with all that it started.
+        subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
+        return False
+    try:
+        os.killpg(pid, getattr(signal, name))
+    except OSError:
+        return False
+    return True
+
+
+def is_running(pid: int) -> bool:
+    """Whether the first process of a group has not ended; one that nobody has buried yet has."""
+    try:
+        os.kill(pid, 0)
+        with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except ProcessLookupError:
+        return False
+    except OSError:
+        # No /proc (macOS), whose first process buries at once.
+        return True
+
+
+if __name__ == "__main__":
+    watch(sys.stdin, float(sys.argv[1]), float(sys.argv[2]))

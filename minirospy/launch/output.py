@@ -1,0 +1,95 @@
+"""What roslaunch itself says: on the terminal with ROS's colours, and into its log file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+__all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
+
+_BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
+_LARGE = 1024**3
+INFO, ERROR = 2, 8
+"""Levels as in rosgraph_msgs/Log."""
+
+
+class Output:
+    """Says things on standard output and error; colours and titles where that is a terminal.
+
+    ``listener`` hears (level, text) of each line, too: a roslaunch on another machine passes them to the one that
+    started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when something is said.
+    """
+
+    def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
+        self._may_title = title
+        self._listener = listener
+        self._log: Path | None = None
+        self._unlogged: list[str] = []
+
+    def say(self, text: str = "", *, bold: bool = False) -> None:
+        """A line on standard output."""
+        self._write(text, _BOLD if bold else "", INFO)
+
+    def warn(self, text: str) -> None:
+        """A line on standard error, in red."""
+        self._write(text, _RED, ERROR)
+
+    def title(self, text: str) -> None:
+        """Set the terminal's title."""
+        if self._may_title and sys.stdout.isatty():
+            print(f"\033]2;{text}\007", end="", flush=True)
+
+    def log_to(self, folder: Path) -> Path:
+        """Write all that was and will be said into roslaunch-HOST-PID.log of ``folder``; its path."""
+        path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
+        # A disk that is full or read-only must not stop the nodes.
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            path.write_text("".join(self._unlogged), encoding="utf-8")
+            self._log = path
+        self._unlogged.clear()
+        return path
+
+    def _write(self, text: str, colour: str, level: int) -> None:
+        stream = sys.stderr if level == ERROR else sys.stdout
+        # One write: nodes write to the same terminal.
+        shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
+        # Who read it (`| head`) may have gone; the nodes are to be ended in order even so.
+        with contextlib.suppress(BrokenPipeError):
+            stream.write(shown + "\n")
+            stream.flush()
+        if text:
+            self._to_log(text, level)
+            if self._listener:
+                self._listener(level, text)
+
+    def _to_log(self, text: str, level: int) -> None:
+        stamp = time.strftime("%Y-%m-%d %H:%M:%S")
+        line = f"[roslaunch][{'ERROR' if level == ERROR else 'INFO'}] {stamp}: {text}\n"
+        if self._log is None:
+            self._unlogged.append(line)
+            return
+        with contextlib.suppress(OSError), self._log.open("a", encoding="utf-8") as file:
+            file.write(line)
+
+
+def warn_of_large_logs(folder: Path, output: Output) -> None:
+    """Say so where the log folder holds more than a gigabyte; it is looked at meanwhile, nothing waits for it."""
+
+    def look() -> None:
+        size = 0
+        for path, _, names in os.walk(folder):
+            for name in names:
+                with contextlib.suppress(OSError):
+                    size += os.stat(os.path.join(path, name)).st_size
+        if size > _LARGE:
+            what = f"disk usage in log directory [{folder}] is over {size // _LARGE}GB."
+            output.warn(f"WARNING: {what}\nIt's recommended that you use the 'rosclean' command.")
+
+    threading.Thread(target=look, daemon=True).start()

@@ -1,0 +1,97 @@
+"""``<param>`` and ``<rosparam>`` -> values. Reads files, and runs what ``<param command=...>`` says.
+
+Source: http://wiki.ros.org/roslaunch/XML/param, http://wiki.ros.org/roslaunch/XML/rosparam.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from minirospy import names
+from minirospy.errors import ValueTextError
+from minirospy.introspect.parameters import flatten
+from minirospy.introspect.values import check_parameter, parse_value
+from minirospy.launch.document import Tag
+from minirospy.launch.substitution import convert
+
+__all__ = ["param_value", "rosparam_values"]
+
+_WAYS = ("value", "textfile", "binfile", "command")
+
+
+def param_value(tag: Tag) -> Any:
+    """The value of a ``<param>``. Raises LaunchError."""
+    ways = [way for way in _WAYS if tag.has(way)]
+    if len(ways) != 1:
+        raise tag.error(f"<param> tag must have one and only one of {', '.join(_WAYS)}")
+    text = tag.required(ways[0], may_be_empty=True)
+    if ways[0] == "binfile":
+        return _read(tag, text)
+    if ways[0] == "value":
+        text = text.strip()
+    elif ways[0] == "textfile":
+        text = _decoded(tag, text, _read(tag, text))
+    else:
+        text = _output_of(tag, text)
+    name = tag.element.attributes["name"]
+    try:
+        value = convert(text, tag.optional("type") or "auto")
+        check_parameter(value, name)
+    except ValueError as error:
+        raise tag.error(f"param [{name}]: {error}") from None
+    except ValueTextError as error:
+        raise tag.error(f"param [{name}]: {error.why}") from None
+    return value
+
+
+def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, Any]]:
+    """Each single parameter that a ``<rosparam>`` loads, and its value. Raises LaunchError."""
+    file = tag.optional("file")
+    text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
+    if tag.flag("subst_value"):
+        text = tag.resolve(text)
+    where = file or "the text"
+    try:
+        value = parse_value(text) if text.strip() else None
+        if value is None:
+            return
+        if not param and not isinstance(value, dict):
+            raise tag.error(f"<rosparam> {where}: without a param attribute it must hold a YAML dictionary")
+        name = names.join(namespace, param) if param else namespace
+        check_parameter(value, name)
+    except ValueTextError as error:
+        why = error.why if len(text) > 60 or file else str(error)
+        raise tag.error(f"<rosparam> {where}: {why}") from None
+    for single, single_value in flatten(name, value):
+        yield names.canonicalize(single), single_value
+
+
+def _read(tag: Tag, file: str) -> bytes:
+    try:
+        return Path(file).read_bytes()
+    except (OSError, ValueError) as error:
+        raise tag.error(f"cannot read [{file}]: {getattr(error, 'strerror', None) or error}") from None
+
+
+def _decoded(tag: Tag, file: str, data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise tag.error(f"[{file}] is not UTF-8 text: {error.reason} at byte {error.start}") from None
+
+
+def _output_of(tag: Tag, command: str) -> str:
+    """What a command prints; it is no shell that runs it."""
+    try:
+        done = subprocess.run(shlex.split(command), stdout=subprocess.PIPE, check=False)
+    except ValueError as error:
+        raise tag.error(f"command [{command}]: {error}") from None
+    except (OSError, IndexError):
+        raise tag.error(f"no such command [{command}]") from None
+    if done.returncode:
+        raise tag.error(f"command [{command}] returned with code [{done.returncode}]")
+    return _decoded(tag, command, done.stdout)

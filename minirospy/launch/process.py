@@ -1,0 +1,211 @@
+"""Processes that roslaunch starts: begun in groups of their own, ended step by step, and never left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from minirospy.errors import MinirospyError
+from minirospy.launch import guardian
+from minirospy.launch.spec import NodeSpec
+
+__all__ = ["Guardian", "Process", "Timeouts", "end_processes", "start_process"]
+
+_WINDOWS = sys.platform == "win32"
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Seconds that a process has to end after SIGINT, and then after SIGTERM."""
+
+    interrupt: float = 15.0
+    terminate: float = 2.0
+
+
+@dataclass(eq=False)
+class Process:
+    """A process that was started, for ``node`` where it is one. ``starts``: how often it was begun."""
+
+    name: str
+    command: Sequence[str]
+    popen: subprocess.Popen[bytes]
+    node: NodeSpec | None = None
+    log_files: str = ""
+    stdout_file: Path | None = None
+    starts: int = 1
+    begun: float = field(default_factory=time.monotonic)
+    is_ending: bool = False
+    """Somebody asked it to end: its end is no news."""
+
+    is_restarting: bool = False
+    """It is to be started again when it has ended, because its file changed."""
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self.popen.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit status, as subprocess tells it; None while it runs."""
+        return self.popen.poll()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self.popen.poll() is None
+
+
+class Guardian:
+    """Hears of each process that begins and ends; where this process is killed, it ends those that are left."""
+
+    def __init__(self, timeouts: Timeouts) -> None:
+        words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate)]
+        self._guard = threading.Lock()
+        self._popen = subprocess.Popen(
+            [sys.executable, "-I", "-S", *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            **_own_group(),
+        )
+
+    def add(self, process: Process) -> None:
+        """A process has begun."""
+        self._tell(f"{'+' if process.node else '*'}{process.pid}\n")
+
+    def remove(self, process: Process) -> None:
+        """A process has ended."""
+        self._tell(f"-{process.pid}\n")
+
+    def close(self) -> None:
+        """No process is left. Idempotent."""
+        with self._guard, contextlib.suppress(OSError):
+            if self._popen.stdin:
+                self._popen.stdin.close()
+        self._popen.wait()
+
+    def _tell(self, line: str) -> None:
+        # Without a guardian (somebody killed it) all goes on as it would.
+        with self._guard, contextlib.suppress(OSError, ValueError):
+            assert self._popen.stdin
+            self._popen.stdin.write(line.encode())
+            self._popen.stdin.flush()
+
+
+def start_process(
+    name: str,
+    command: Sequence[str],
+    *,
+    environ: Mapping[str, str],
+    folder: Path | None = None,
+    stdout_file: Path | None = None,
+    log_errors: bool = False,
+    stdin: int | None = subprocess.DEVNULL,
+    stdout: int | None = None,
+) -> Process:
+    """Start a process. What it prints goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
+
+    Raises MinirospyError.
+    """
+    try:
+        with _opened(stdout_file) as output:
+            popen = subprocess.Popen(
+                command,
+                env=dict(environ),
+                cwd=folder,
+                stdin=stdin,
+                stdout=output or stdout,
+                stderr=subprocess.STDOUT if log_errors and (output or stdout) else None,
+                **_own_group(),
+            )
+    except OSError as error:
+        raise MinirospyError(f"[{name}] cannot be started: {error}") from error
+    return Process(name, command, popen, stdout_file=stdout_file)
+
+
+def end_processes(
+    processes: Sequence[Process], timeouts: Timeouts, tell: Callable[[str], None]
+) -> list[Process]:
+    """SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; those that SIGKILL ended."""
+    steps = (
+        (_interrupt, timeouts.interrupt, ""),
+        (_terminate, timeouts.terminate, "escalating to SIGTERM"),
+        (_kill, timeouts.terminate, "escalating to SIGKILL"),
+    )
+    killed: list[Process] = []
+    for step, seconds, words in steps:
+        running = [process for process in processes if process.is_running]
+        if step is _kill:
+            killed = running
+        for process in running:
+            process.is_ending = True
+            if words:
+                tell(f"[{process.name}] {words}")
+            with contextlib.suppress(OSError):
+                step(process.popen)
+        end = time.monotonic() + seconds
+        for process in running:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.popen.wait(max(0.0, end - time.monotonic()))
+    if not _WINDOWS:
+        for process in processes:
+            # What a node started and left behind, in its group.
+            with contextlib.suppress(OSError):
+                os.killpg(process.pid, signal.SIGKILL)
+    return killed
+
+
+def _own_group() -> dict[str, Any]:
+    """Ctrl-C in the terminal reaches roslaunch alone, which ends the nodes in order."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}
+
+
+@contextlib.contextmanager
+def _opened(path: Path | None) -> Any:
+    if path is None:
+        yield None
+        return
+    file: IO[bytes]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("ab")
+    except OSError as error:
+        raise MinirospyError(f"cannot write the log file {path}: {error.strerror}") from error
+    with file:
+        yield file
+
+
+def _interrupt(popen: subprocess.Popen[bytes]) -> None:
+    if _WINDOWS:
+        popen.send_signal(signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined,unused-ignore]
+    else:
+        os.killpg(popen.pid, signal.SIGINT)
+
+
+def _terminate(popen: subprocess.Popen[bytes]) -> None:
+    if _WINDOWS:
+        popen.terminate()
+    else:
+        os.killpg(popen.pid, signal.SIGTERM)
+
+
+def _kill(popen: subprocess.Popen[bytes]) -> None:
+    """The process and all that it started."""
+    import psutil
+
+    with contextlib.suppress(psutil.Error):
+        for child in psutil.Process(popen.pid).children(recursive=True):
+            child.kill()
+    popen.kill()

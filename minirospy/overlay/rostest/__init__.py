@@ -1,0 +1,24 @@
+"""rostest, filled in by minirospy: tests that are nodes. Source: http://wiki.ros.org/rostest."""
+
+from minirospy.testing.node import get_master, is_publisher, is_subscriber, rosrun, run, unitrun
+from minirospy.testing.unit import XML_OUTPUT_FLAG
+
+__all__ = [
+    "XML_OUTPUT_FLAG",
+    "get_master",
+    "is_publisher",
+    "is_subscriber",
+    "rosrun",
+    "rostestmain",
+    "run",
+    "unitrun",
+]
+
+
+def rostestmain() -> None:
+    """What the command `rostest` runs; ends the process."""
+    import sys
+
+    from minirospy.cli.rostest import rostest
+
+    sys.exit(rostest())

@@ -1,0 +1,5 @@
+"""rosunit.baretest, filled in by minirospy."""
+
+from minirospy.testing.unit import print_runner_summary, print_unittest_summary
+
+__all__ = ["print_runner_summary", "print_unittest_summary"]

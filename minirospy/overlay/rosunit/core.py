@@ -1,0 +1,17 @@
+"""rosunit.core, filled in by minirospy."""
+
+from minirospy.testing.unit import (
+    XML_OUTPUT_FLAG,
+    XMLTestRunner,
+    create_xml_runner,
+    rostest_name_from_path,
+    xml_results_file,
+)
+
+__all__ = [
+    "XML_OUTPUT_FLAG",
+    "XMLTestRunner",
+    "create_xml_runner",
+    "rostest_name_from_path",
+    "xml_results_file",
+]

@@ -1,0 +1,20 @@
+"""rosunit.junitxml, filled in by minirospy: files of test results."""
+
+from minirospy.testing.junit import (
+    Result,
+    TestCaseResult,
+    TestError,
+    TestFailure,
+    TestInfo,
+    filter_nonprintable_text,
+    print_summary,
+    read,
+    read_all,
+)
+from minirospy.testing.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.testing.junit import success_junit_xml as test_success_junit_xml
+
+__all__ = [
+    "Result", "TestCaseResult", "TestError", "TestFailure", "TestInfo", "filter_nonprintable_text", "print_summary",
+    "read", "read_all", "test_failure_junit_xml", "test_success_junit_xml",
+]  # fmt: skip

@@ -1,0 +1,5 @@
+"""rosunit.pyunit, filled in by minirospy."""
+
+from minirospy.testing.unit import XML_OUTPUT_FLAG, create_xml_runner, print_unittest_summary, unitrun
+
+__all__ = ["XML_OUTPUT_FLAG", "create_xml_runner", "print_unittest_summary", "unitrun"]

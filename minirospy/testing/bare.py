@@ -1,0 +1,91 @@
+"""A unit test's file, run as a program of its own: its results, and what went wrong besides them.
+
+Source: http://wiki.ros.org/rosunit.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
+from minirospy.testing.unit import XML_OUTPUT_FLAG
+
+__all__ = ["run_bare"]
+
+_INTERRUPT_SECONDS = 5.0
+_TERMINATE_SECONDS = 2.0
+
+
+def run_bare(
+    file: Path,
+    arguments: Sequence[str],
+    results_file: Path,
+    package: str,
+    name: str,
+    *,
+    seconds: float,
+    text: bool,
+) -> tuple[Result, TestCaseResult]:
+    """Run a file, Python or executable, for at most so many seconds: (its results, how the run itself went).
+
+    ``text``: it prints, and writes no results; then its exit status says how it went.
+    """
+    case = TestCaseResult("runTest")
+    case.classname = "rosunit.baretest.BareTestCase"
+    results_file.unlink(missing_ok=True)
+    command = [sys.executable, str(file)] if file.suffix == ".py" else [str(file.absolute())]
+    command += [*arguments, f"{XML_OUTPUT_FLAG}{results_file}", *(["--text"] if text else [])]
+    begun = time.perf_counter()
+    try:
+        status = _run(command, seconds)
+    except OSError as error:
+        case.add_failure(_failure(f"test [{name}] cannot be run: {error}"))
+        return Result(""), case
+    case.time = time.perf_counter() - begun
+    if status is None:
+        case.add_error(TestError("TestTimeoutException", f"test max time allotted: {seconds:g} s"))
+    elif text:
+        if status:
+            case.add_failure(_failure(f"test [{name}] ended with status {status}"))
+    elif not results_file.is_file():
+        text_ = f"test [{name}] did not generate test results (it ended with status {status})"
+        case.add_failure(_failure(text_))
+    else:
+        return read(results_file, f"{package}/{name}"), case
+    return Result(""), case
+
+
+def _run(command: list[str], seconds: float) -> int | None:
+    """The exit status; None where the time was over."""
+    with subprocess.Popen(command) as popen:
+        try:
+            return popen.wait(seconds)
+        except subprocess.TimeoutExpired:
+            _end(popen)
+            return None
+        except KeyboardInterrupt:
+            # The terminal's Ctrl-C reached it, too.
+            _end(popen)
+            raise
+
+
+def _end(popen: subprocess.Popen[bytes]) -> None:
+    if sys.platform != "win32":
+        popen.send_signal(signal.SIGINT)
+        try:
+            popen.wait(_INTERRUPT_SECONDS)
+        except subprocess.TimeoutExpired:
+            popen.terminate()
+    try:
+        popen.wait(_TERMINATE_SECONDS)
+    except subprocess.TimeoutExpired:
+        popen.kill()
+
+
+def _failure(text: str) -> TestFailure:
+    return TestFailure("AssertionError", text)

@@ -1,0 +1,40 @@
+"""The panel of the workshop in a test's hands: press its buttons, walk before its scanner, wait for its LEDs."""
+
+import unittest
+
+from minirospy.gpio.board import Board
+
+LEDS = range(2, 8)  # BCM
+PATIENCE = 15.0  # s
+
+
+class PanelTest(unittest.TestCase):
+    """A test with a virtual board."""
+
+    def setUp(self) -> None:
+        self.board = Board()
+        self.addCleanup(self.board.close)
+
+    def lit(self) -> list[int]:
+        return [led for led in LEDS if self.board.get(led)]
+
+    def wait_for_lit(self, *leds: int) -> None:
+        """Until these LEDs are lit, and no other."""
+        edges = self.board.watch(LEDS, timeout=PATIENCE)
+        if self.lit() != list(leds) and not any(self.lit() == list(leds) for _ in edges):
+            self.fail(f"{self.lit()} are lit instead of {list(leds)}")
+
+    def push(self, button: int, led: int, level: int = 1) -> None:
+        """Push a button, and again where nobody watched it yet, until an LED is switched."""
+        for _ in range(int(PATIENCE)):
+            edges = self.board.watch([led], timeout=0.7)
+            self.board.press(button)
+            is_switched = any(edge.level == level for edge in edges)
+            self.board.release(button)
+            if is_switched:
+                return
+        self.fail(f"button {button} did not switch LED {led}")
+
+    def walk_to(self, ahead: float) -> None:
+        """Put the person so many metres before the scanner."""
+        self.board.move_person((ahead, 0.0))

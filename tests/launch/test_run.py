@@ -1,0 +1,183 @@
+"""roslaunch as a process: what it starts, how it ends what it started, and what it says of that."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import stat
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from minirospy.runtime.master_proxy import MasterProxy
+from tests.launch.conftest import Start
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals between processes")
+
+NODE = '<node pkg="pkg" type="wait.py" name='
+
+
+def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{probe.getsockname()[1]}")
+    launch = start(f'{NODE}"a" output="screen"/>{NODE}"b" launch-prefix="env"/>', "--sigint-timeout=5")
+    launch.read_until("waiting", "process[b-3]")
+    children = launch.children()
+    assert len(children) == 4
+    launch.process.kill()
+    _, left = psutil.wait_procs(children, timeout=10)
+    assert not left
+    # In the end the pipe is closed; the node was asked kindly.
+    assert "ended by SIGINT" in launch.read_until("ended by")
+
+
+def test_a_node_that_does_not_listen_is_killed(start: Start, master: str) -> None:
+    launch = start(f'{NODE}"a" args="SIGINT SIGTERM" output="screen"/>{NODE}"b" args="SIGINT" output="screen"/>',
+                   "--sigint-timeout=0.2", "--sigterm-timeout=0.2")  # fmt: skip
+    launch.read_until("waiting SIGINT SIGTERM", "waiting SIGINT __name")
+    launch.process.send_signal(signal.SIGINT)
+    said, _ = launch.process.communicate(timeout=10)
+    assert "[b-2] escalating to SIGTERM\n" in said
+    assert "[b-2] escalating to SIGKILL\n" not in said
+    assert "[a-1] escalating to SIGKILL\nShutdown errors:\n * process[a-1, pid " in said
+
+
+def test_where_a_node_prints_and_runs(start: Start, master: str, package: Path) -> None:
+    home, run_id = Path(os.environ["ROS_HOME"]), MasterProxy(master, "/t")
+    launch = start(
+        '<env name="E" value="1 2"/><node pkg="pkg" type="stop.py" name="a" args="0" cwd="node"/>'
+        '<node pkg="pkg" type="stop.py" name="b" args="0" output="screen"/>'
+    )
+    said, _ = launch.process.communicate(timeout=10)
+    # Standard error is seen, whatever `output` says.
+    assert said.count("err\n") == 2
+    assert f"out {home} 1 2\n" in said
+    folder = home / "log" / str(run_id.get_param("/run_id"))
+    run_id.close()
+    assert (folder / "a-1-stdout.log").read_text() == f"out {package} 1 2\n"
+    log = next(folder.glob("roslaunch-*.log")).read_text()
+    assert "process[a-1]: started with pid" in log
+    assert f"... logging to {folder}/roslaunch-{socket.gethostname()}-{launch.process.pid}.log" in said
+
+
+def test_a_program_that_is_missing_stops_no_other(start: Start, master: str) -> None:
+    launch = start(
+        '<node pkg="pkg" type="stop.p" name="a"/><node pkg="pkg" type="stop.py" name="b" args="0"/>'
+    )
+    said, _ = launch.process.communicate(timeout=10)
+    assert "ERROR: cannot launch node of type [pkg/stop.p]: " in said
+    assert "did you mean stop.py?" in said
+    assert "[b-2] process has finished cleanly\nlog file: " in said
+    assert launch.process.returncode == 0
+
+
+def test_respawn_waits_as_long_as_it_says(start: Start, master: str) -> None:
+    launch = start(
+        f'<node pkg="pkg" type="stop.py" name="a" args="0" respawn="true" respawn_delay="0.3"/>{NODE}"b"/>'
+    )
+    said = launch.read_until("restarting process", "process[a-1]: started with pid")
+    assert said.index("[a-1] process has finished cleanly") < said.index("[a-1] restarting process")
+    launch.process.send_signal(signal.SIGTERM)
+    said, _ = launch.process.communicate(timeout=10)
+    assert said.endswith("done\n")
+
+
+def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: str, package: Path) -> None:
+    launch = start(f'{NODE}"a" output="screen"/>', "--watch")
+    launch.read_until("waiting")
+    file = package / "wait.py"
+    file.write_text(file.read_text().replace("waiting", "changed"))
+    said = launch.read_until("changed __name:=a")
+    assert f"[a-1] {file} has changed\nended by SIGINT\n[a-1] restarting process\n" in said
+
+
+def test_rosparam_commands_come_before_the_parameters(start: Start, master: str, tmp_path: Path) -> None:
+    proxy = MasterProxy(master, "/t")
+    proxy.set_param("/old/a", 1)
+    proxy.set_param("/kept", 2)
+    proxy.set_param("/g/a", 3)
+    launch = start(
+        f'<rosparam command="dump" file="{tmp_path}/dump.yaml" param="old"/>'
+        '<rosparam command="delete" param="old"/><rosparam command="delete" param="none"/>'
+        '<group ns="g" clear_params="true"><param name="b" value="4"/></group>'
+    )
+    said, _ = launch.process.communicate(timeout=10)
+    assert "CLEAR PARAMETERS\n * /g/\n\nPARAMETERS\n * /g/b: 4\n * /rosdistro: noetic\n" in said
+    assert f"running rosparam dump {tmp_path}/dump.yaml /old\nrunning rosparam delete /old\n" in said
+    assert "ERROR: parameter [/none] is not set\n" in said
+    assert "No processes to monitor\nshutting down processing monitor...\n" in said
+    assert (tmp_path / "dump.yaml").read_text() == "a: 1\n"
+    assert (proxy.get_param("/g"), proxy.get_param("/kept")) == ({"b": 4}, 2)
+    assert not proxy.has_param("/old")
+    proxy.close()
+
+
+@pytest.fixture
+def ssh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An ssh that runs here what it is to run there, and writes down how it was called."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    said = tmp_path / "ssh-said"
+    program = folder / "ssh"
+    program.write_text(f'#!/bin/sh\necho "$@" >> {said}\nfor last; do :; done\nexec sh -c "$last"\n')
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
+    monkeypatch.setenv("PATH", path)
+    return said
+
+
+MACHINE = '<machine name="m" address="127.0.0.1" user="somebody" env-loader="env" timeout="20"/>'
+
+
+def test_a_node_on_another_machine(start: Start, master: str, ssh: Path) -> None:
+    launch = start(
+        f'{MACHINE}<node machine="m" pkg="pkg" type="wait.py" name="a" ns="deep" args="x"/>'
+        '<node machine="m" pkg="pkg" type="stop.py" name="b" args="3"/><node pkg="pkg" type="no" name="c" machine="m"/>'
+    )
+    said = launch.read_until(
+        "[127.0.0.1-0]: process[deep/a-1]: started with pid",
+        "[127.0.0.1-0]: [b-2] process has died [pid ",
+        "remote[127.0.0.1-0]: [c] cannot be launched",
+    )
+    assert "remote[127.0.0.1-0]: creating ssh connection to 127.0.0.1:22, user[somebody]\n" in said
+    called = ssh.read_text()
+    assert "-p 22 somebody@127.0.0.1 ROS_MASTER_URI=" in called
+    assert " env roslaunch -c 127.0.0.1-0 -u http://localhost:" in called
+    children = launch.children()
+    launch.process.send_signal(signal.SIGINT)
+    said, _ = launch.process.communicate(timeout=20)
+    assert "[127.0.0.1-0] killing on exit\n" in said
+    assert not [child for child in children if child.is_running()]
+
+
+def test_a_required_node_on_another_machine_ends_all(start: Start, master: str, ssh: Path) -> None:
+    launch = start(
+        f'{MACHINE}{NODE}"a"/><node machine="m" pkg="pkg" type="stop.py" name="b" args="3" required="true"/>'
+    )
+    said, _ = launch.process.communicate(timeout=20)
+    assert "REQUIRED process [b-1] has died!\nInitiating shutdown!\n" in said
+    assert launch.process.returncode == 1
+
+
+def test_a_machine_that_cannot_be_reached(start: Start, master: str, ssh: Path) -> None:
+    ssh.parent.joinpath("bin", "ssh").write_text("#!/bin/sh\necho no route >&2\nexit 255\n")
+    launch = start(f'{MACHINE}<node machine="m" pkg="pkg" type="wait.py" name="a"/>')
+    said, _ = launch.process.communicate(timeout=20)
+    assert launch.process.returncode == 1
+    assert "no route\n" in said
+    text = "unable to start remote roslaunch child [127.0.0.1-0]: ssh ended with status 255\n"
+    assert f"0.launch:1: {text}" in said
+
+
+def test_local_leaves_other_machines_alone(start: Start, master: str) -> None:
+    launch = start(
+        f'{MACHINE}<node machine="m" pkg="pkg" type="wait.py" name="a"/>', "--local", "--no-summary"
+    )
+    said, _ = launch.process.communicate(timeout=20)
+    assert "local only launch specified, will not launch remote nodes\n" in said
+    assert "SUMMARY" not in said
+    assert "No processes to monitor\n" in said

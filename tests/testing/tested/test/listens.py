@@ -1,0 +1,23 @@
+#!/usr/bin/env python3
+"""A test that is a node: it hears the talker, and sees what rostest.py says of it."""
+
+import unittest
+
+import rospy
+import rostest
+from std_msgs.msg import String
+
+
+class Listens(unittest.TestCase):
+    def test_hears(self):
+        rospy.init_node("listens")
+        self.assertEqual(rospy.wait_for_message("/chatter", String, 10).data, "hello")
+        self.assertTrue(rostest.is_publisher("/chatter", "/talker"))
+        self.assertTrue(rostest.is_subscriber("/orders", "/talker"))
+        self.assertFalse(rostest.is_subscriber("/chatter", "/talker"))
+        self.assertEqual(rospy.get_param("~who"), "you")
+        self.assertEqual(rospy.get_name(), "/ns/listener")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("tested", "listens", Listens)

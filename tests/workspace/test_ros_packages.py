@@ -1,0 +1,58 @@
+"""ROS's own packages, as far as we stand in for them: rospack and rospkg find them and what they need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import rospkg
+
+from minirospy.cli.rospack import main as rospack
+from minirospy.workspace.manifest import read_manifest
+
+ROOT = Path(__file__).parents[2] / "minirospy"
+FOLDERS = sorted(path.parent for path in (ROOT / "ros_packages").glob("*/package.xml"))
+# Packages of Python alone, which are no packages of ROS.
+NO_PACKAGES = {"RPi", "rospkg"}
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_each_is_in_order(folder: Path) -> None:
+    manifest = read_manifest(folder)
+    assert manifest.name == folder.name
+    assert manifest.problems == ()
+
+
+def test_what_can_be_imported_can_be_found() -> None:
+    known = set(rospkg.RosPack().list())
+    overlay = {path.name for path in (ROOT / "overlay").iterdir() if (path / "__init__.py").is_file()}
+    assert overlay - NO_PACKAGES <= known
+
+
+def test_rospack(capsys: pytest.CaptureFixture[str]) -> None:
+    assert rospack(["find", "rospy"]) == 0
+    assert capsys.readouterr().out == f"{ROOT / 'ros_packages' / 'rospy'}\n"
+    assert rospack(["depends1", "rospy"]) == 0
+    assert capsys.readouterr().out.split() == [
+        "genpy",
+        "roscpp",
+        "rosgraph",
+        "rosgraph_msgs",
+        "roslib",
+        "std_msgs",
+    ]
+    assert rospack(["depends1", "actionlib"]) == 0
+    assert capsys.readouterr().out.split() == [
+        *("message_runtime", "actionlib_msgs", "roscpp", "rospy", "rostest", "std_msgs")
+    ]
+    assert rospack(["depends-on1", "rostest"]) == 0
+    assert capsys.readouterr().out.split() == ["actionlib"]
+    assert rospack(["list-names"]) == 0
+    assert {folder.name for folder in FOLDERS} <= set(capsys.readouterr().out.split())
+
+
+def test_rospkg() -> None:
+    packages = rospkg.RosPack()
+    assert packages.get_path("rosgraph") == str(ROOT / "ros_packages" / "rosgraph")
+    assert "rospy" in packages.get_depends("rostest")
+    assert packages.get_manifest("rosmaster").name == "rosmaster"

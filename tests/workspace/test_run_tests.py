@@ -1,0 +1,125 @@
+"""`catkin_make run_tests`, `catkin test`: what CMakeLists.txt names is run, and its results are where catkin has them."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from minirospy.cli.catkin import catkin, catkin_make
+from minirospy.cli.catkin_test_results import main as catkin_test_results
+from minirospy.workspace.plan import Test as PlannedTest
+from minirospy.workspace.plan import read_plan
+
+if TYPE_CHECKING:
+    from conftest import Scene
+
+
+UNIT = """import os, unittest
+from led_msgs.msg import Led
+
+class Case(unittest.TestCase):
+    def test_led(self):
+        self.assertEqual(Led().number, int(os.environ.get("EXPECTED", "0")))
+
+if __name__ == "__main__":
+    import rosunit
+    rosunit.unitrun("p", "case", Case)
+"""
+CMAKE = """if(CATKIN_ENABLE_TESTING)
+  find_package(rostest REQUIRED)
+  add_rostest(test/unit.test ARGS expected:=0 DEPENDENCIES ${catkin_EXPORTED_TARGETS})
+  add_rostest(test/unit.test ARGS expected:=1)
+  add_rostest_gtest(hardware_test test/hardware.test src/hardware.cpp)
+  catkin_add_nosetests(test/nose TIMEOUT 10)
+endif()"""
+FILES = {
+    "test/unit.py": UNIT,
+    "test/unit.test": '<launch><arg name="expected"/><env name="EXPECTED" value="$(arg expected)"/>'
+    '<test test-name="unit_$(arg expected)" pkg="p" type="unit.py"/></launch>',
+    "test/nose/test_it.py": "def test_it():\n    pass\n",
+}
+
+
+def write(scene: Scene) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package("p", CMAKE, "led_msgs", FILES)
+    scene.package("q", "catkin_add_nosetests(test)", "", {"test/test_q.py": "def test_q():\n    pass\n"})
+
+
+def test_what_a_plan_names(scene: Scene) -> None:
+    write(scene)
+    plan = read_plan(scene.source / "p")
+    assert plan.tests == (
+        PlannedTest("test/unit.test", "rostest", 5, ("expected:=0",)),
+        PlannedTest("test/unit.test", "rostest", 6, ("expected:=1",)),
+        PlannedTest("test/nose", "pytest", 8),
+    )
+    assert plan.skipped == ("hardware_test",)
+
+
+def test_all_are_run(
+    scene: Scene, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(scene)
+    assert catkin_make(["-C", str(scene.root), "run_tests_p"]) == 1
+    out = capfd.readouterr().out
+    for line in (
+        "p: skipped, they need a C++ compiler: hardware_test",
+        "p: rostest test/unit.test expected:=0\n",
+        "[p.rosunit-unit_0/test_led][passed]",
+        "[p.rosunit-unit_1/test_led][FAILURE]",
+        "p: pytest test/nose\n",
+        "Summary: 5 tests, 0 errors, 1 failures, 0 skipped",
+    ):
+        assert line in out
+    assert "q: " not in out.split("p: pytest")[1]
+    results = scene.root / "build" / "test_results"
+    assert sorted(str(path.relative_to(results)) for path in results.rglob("*.xml")) == [
+        "p/pytest-nose.xml",
+        "p/rostest-test_unit__expected__0.xml",
+        "p/rostest-test_unit__expected__1.xml",
+        "p/rosunit-unit_0.xml",
+        "p/rosunit-unit_1.xml",
+    ]
+    assert catkin_test_results([str(results)]) == 1
+    assert catkin_make(["-C", str(scene.root), "run_tests_p_rostest_test_unit.test"]) == 1
+    out = capfd.readouterr().out
+    assert "p: rostest test/unit.test" in out
+    assert "p: pytest" not in out
+    monkeypatch.chdir(scene.source / "q")
+    assert catkin(["test", "--this", "-j2"]) == 0
+    assert "Summary: 1 tests, 0 errors, 0 failures, 0 skipped" in capfd.readouterr().out
+    assert catkin(["test", "r"]) == 1
+    assert "package or test [r] not found" in capfd.readouterr().err
+
+
+def test_launch_files_are_checked(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
+    good = '<launch><node name="n" pkg="p" type="n.py"/></launch>'
+    files = {
+        "launch/good.launch": good,
+        "launch/more/given.launch": '<launch><arg name="a"/></launch>',
+        "n.py": "",
+    }
+    folder = scene.package("p", "roslaunch_add_file_check(launch IGNORE_UNSET_ARGS)", "", files)
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0
+    (folder / "launch" / "bad.launch").write_text(good.replace("n.py", "m.py").replace("><", ">\n<"))
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
+    said = capfd.readouterr()
+    assert "bad.launch:2: error: node [n]: executable [m.py] not found" in said.err
+    assert "Summary: 1 tests, 0 errors, 1 failures, 0 skipped" in said.out
+    assert (scene.root / "build" / "test_results" / "p" / "roslaunch-check_launch.xml").is_file()
+
+
+def test_what_cannot_be_run(
+    scene: Scene, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    scene.package("p", "add_rostest(test/no.test)")
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
+    assert "CMakeLists.txt:3: there is no [test/no.test] to test" in capsys.readouterr().err
+    scene.package("q", "catkin_add_nosetests(test)", "", {"test/test_q.py": ""})
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert catkin_make(["-C", str(scene.root), "run_tests_q"]) == 1
+    assert "tests need pytest: pip install pytest" in capsys.readouterr().err
