@@ -2,7 +2,7 @@
 # Real ROS 1 from Debian, the referee of the interop tests: rospy, roscpp, the commands, and what builds a C++ peer.
 # Everything goes to /usr; nothing of it is used by minirospy itself. Does nothing where it is installed already.
 set -eu
-packages="ros-core rosbash python3-rospy python3-rosmaster python3-std-srvs python3-sensor-msgs python3-nav-msgs
+packages="ros-core openssh-server openssh-client rosbash python3-rospy python3-rosmaster python3-std-srvs python3-sensor-msgs python3-nav-msgs
 python3-diagnostic-msgs python3-tf2-msgs python3-actionlib python3-numpy
 ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-actionlib-msgs ros-geometry-msgs ros-sensor-msgs ros-diagnostic-msgs
 ros-nav-msgs ros-roscpp-msg ros-shape-msgs ros-stereo-msgs ros-trajectory-msgs ros-visualization-msgs
@@ -10,7 +10,7 @@ ros-map-msgs ros-move-base-msgs ros-pcl-msgs ros-tf2-msgs ros-topic-tools-srvs
 python3-shape-msgs python3-stereo-msgs python3-trajectory-msgs python3-visualization-msgs python3-map-msgs
 python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure
 catkin cmake ros-message-generation
-g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev"
+g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev iproute2"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || missing="$missing $package"

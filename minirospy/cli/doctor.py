@@ -1,0 +1,153 @@
+"""`minirospy doctor` and `roswtf`: what is wrong, a line for each check, with what to do.
+
+Source: http://wiki.ros.org/roswtf.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from minirospy.cli.command import Parser, run
+from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
+
+__all__ = ["main", "roswtf"]
+
+_WORDS = {Status.OK: "ok     ", Status.WARNING: "warning", Status.PROBLEM: "PROBLEM"}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command `minirospy doctor`."""
+    return _command("minirospy doctor", argv)
+
+
+def roswtf(argv: Sequence[str] | None = None) -> int:
+    """The command `roswtf`."""
+    return _command("roswtf", argv)
+
+
+def _command(name: str, argv: Sequence[str] | None) -> int:
+    parser = Parser(
+        prog=name,
+        description="Checks this machine, its network and the graph, and says what to do. "
+        "Exit status: 0 without problems, 1 with, 2 typed wrong.",
+    )
+    parser.add_argument(
+        "others",
+        nargs="*",
+        metavar="HOST|FILE.launch",
+        help="another machine to try too, by its name or address; a launch file to check too (with arg:=value)",
+    )
+    parser.add_argument(
+        "--listen", action="store_true", help="then wait for the doctors of other machines, and connect back"
+    )
+    parser.add_argument("--offline", action="store_true", help="only what needs no network")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON, one a line")
+    # Options of ROS's roswtf that ask for nothing here.
+    for word in ("--all", "--no-plugins"):
+        parser.add_argument(word, action="store_true", help="accepted, without effect")
+
+    def body() -> int:
+        words = list(sys.argv[1:] if argv is None else argv)
+        options = parser.parse_args([word for word in words if ":=" not in word])
+        args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
+        if options.listen and options.offline:
+            parser.error("--listen needs the network")
+        # What the node under the checks would log is what they find out.
+        logging.getLogger("minirospy").addHandler(logging.NullHandler())
+        show = _show_json if options.json else _show
+        counts = dict.fromkeys(Status, 0)
+        machines = [word for word in options.others if not _is_file(word)]
+        if machines and options.offline:
+            parser.error(f"{machines[0]}: to try another machine needs the network")
+        with Examination(machines=machines, offline=options.offline) as examination:
+            for finding in _all(examination, list(filter(_is_file, options.others)), args):
+                counts[finding.status] += 1
+                show(finding)
+            if not options.json:
+                print(_summary(counts), flush=True)
+            if options.listen and examination.listen(show):
+                print("listening: type `minirospy doctor` on the other machine; Ctrl-C ends this", flush=True)
+                _wait_for_signal()
+        return 1 if counts[Status.PROBLEM] else 0
+
+    return run(name, body)
+
+
+def _is_file(word: str) -> bool:
+    """Whether a file is meant, rather than a machine."""
+    return "/" in word or word.endswith((".launch", ".test", ".xml")) or Path(word).is_file()
+
+
+def _wait_for_signal() -> None:
+    """Until Ctrl-C, or SIGTERM: a listener takes itself out of the master."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    # In slices: on Windows a wait without end hears no signal.
+    while not stop.wait(0.5):
+        pass
+
+
+def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -> Iterator[Finding]:
+    yield from examination.findings()
+    for file in files:
+        yield from _launch_findings(file, args)
+
+
+def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
+    """Whether a launch file loads, and whether the programs that it starts are there."""
+    from minirospy.errors import MinirospyError
+    from minirospy.launch.command import node_command
+    from minirospy.launch.load import load_files
+    from minirospy.workspace.packages import Packages
+
+    packages = Packages()
+    if not Path(file).is_file():
+        yield problem("launch file", f"{file} is no file", "give its path")
+        return
+    try:
+        spec = load_files([file], args, packages)
+    except MinirospyError as error:
+        yield problem("launch file", str(error), "correct it")
+        return
+    found = True
+    for node in spec.nodes:
+        try:
+            node_command(node, packages)
+        except MinirospyError as error:
+            found = False
+            yield problem("launch file", str(error), "correct the <node>")
+    if found:
+        yield ok("launch file", f"{file}: {len(spec.nodes)} node(s), all programs are there")
+
+
+def _show(finding: Finding) -> None:
+    advice = f" -> {finding.advice}" if finding.advice else ""
+    print(f"{_WORDS[finding.status]} {finding.check}: {finding.text}{advice}", flush=True)
+
+
+def _show_json(finding: Finding) -> None:
+    import json
+
+    print(json.dumps({**finding._asdict(), "status": finding.status.value}), flush=True)
+
+
+def _summary(counts: dict[Status, int]) -> str:
+    found = [
+        f"{number} {status.value}{'s' if number > 1 else ''}"
+        for status, number in (
+            (Status.PROBLEM, counts[Status.PROBLEM]),
+            (Status.WARNING, counts[Status.WARNING]),
+        )
+        if number
+    ]
+    return " and ".join(found) if found else "all is well"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""What a check says: one finding, one line."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+__all__ = ["Finding", "Status", "ok", "problem", "warning"]
+
+
+class Status(str, Enum):
+    """How a check ended. A warning may be just fine; a problem is one."""
+
+    OK = "ok"
+    WARNING = "warning"
+    PROBLEM = "problem"
+
+
+class Finding(NamedTuple):
+    """``check`` is what was looked at, ``text`` what was seen, ``advice`` what to do about it ("": nothing)."""
+
+    check: str
+    status: Status
+    text: str
+    advice: str = ""
+
+
+def ok(check: str, text: str) -> Finding:
+    """Nothing to do."""
+    return Finding(check, Status.OK, text)
+
+
+def warning(check: str, text: str, advice: str) -> Finding:
+    """Something that is sometimes at fault."""
+    return Finding(check, Status.WARNING, text, advice)
+
+
+def problem(check: str, text: str, advice: str) -> Finding:
+    """Something that does not work."""
+    return Finding(check, Status.PROBLEM, text, advice)

@@ -1,0 +1,137 @@
+"""Both ways between two machines: one listens, the other asks it to connect back.
+
+The listener is a service of type std_srvs/Trigger: who calls it has reached that machine, and its answer says whether
+that machine reached the caller's node, by a topic, with a message of 16 KiB. The answer's text is JSON: ``host`` and
+``time`` of the listener, ``fault`` and ``text`` of what went wrong ("": nothing).
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Callable, Iterator
+from io import BytesIO
+
+from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, RpcRefused
+from minirospy.idl.load import service_class
+from minirospy.introspect.doctor.findings import Finding, ok, problem
+from minirospy.introspect.doctor.graph import Answers, node_trouble
+from minirospy.introspect.doctor.master import clock_finding
+from minirospy.introspect.doctor.own_node import PREFIX, DoctorNode, unreached_finding
+from minirospy.introspect.doctor.reach import (
+    CONNECT_SECONDS,
+    Fault,
+    MasterPlace,
+    Trouble,
+    host_port,
+    in_parallel,
+    look_up,
+    read_topic,
+    trouble_of,
+)
+from minirospy.introspect.graph import Graph
+from minirospy.runtime.master_proxy import SystemState
+from minirospy.runtime.service_client import ServiceClient
+from minirospy.wire.header import Header
+
+__all__ = ["check_listeners", "listen", "listeners"]
+
+_SERVICE = "/connect_back"
+_ANSWER_SECONDS = 6 * CONNECT_SECONDS
+_PADDING = "x" * 16384
+
+
+def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
+    """Connect back to each doctor that asks, from now on; ``report`` hears of each, in a thread of its own.
+
+    Raises MasterUnreachableError, RpcError.
+    """
+
+    def connect_back(_: memoryview, fields: Header) -> bytes:
+        caller = fields.get("callerid", "")
+        trouble: Trouble | None = None
+        uri = ""
+        try:
+            uri = graph.master.lookup_node(caller)
+            read_topic(uri, caller + "/letter", own.name, wait=True)
+        except (MasterUnreachableError, RpcError, MinirospyError, OSError) as error:
+            trouble = trouble_of(error)
+        where = host_port(uri)[0] or caller
+        if trouble:
+            text = (
+                f"it reaches this machine, and this one does not reach it at {uri or caller}: {trouble.text}"
+            )
+            report(problem("both ways", f"{where}: {text}", "see there what to do"))
+        else:
+            report(ok("both ways", f"{where} ({caller}): it reaches this machine, and this one reaches it"))
+        answer = {
+            "host": socket.gethostname(),
+            "time": time.time(),
+            "fault": trouble.fault.value if trouble else "",
+            "text": trouble.text if trouble else "",
+            "padding": _PADDING,
+        }
+        response = service_class("std_srvs/Trigger")._response_class(trouble is None, json.dumps(answer))
+        buffer = BytesIO()
+        response.serialize(buffer)
+        return buffer.getvalue()
+
+    own.serve(own.name + _SERVICE, connect_back)
+
+
+def listeners(state: SystemState, answers: Answers) -> Answers:
+    """The doctors among the nodes that listen."""
+    return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
+
+
+def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: MasterPlace) -> Iterator[Finding]:
+    """What the listeners among the nodes that answer say: one or two findings for each."""
+    services = [
+        node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble
+    ]
+
+    def ask(service: str) -> tuple[str, float, str, float]:
+        uri = graph.master.lookup_service(service)
+        look_up(host_port(uri)[0])
+        before = time.time()
+        return uri, before, _call(uri, service, own.name), time.time()
+
+    for service, result in zip(services, in_parallel(ask, services, _ANSWER_SECONDS), strict=True):
+        if isinstance(result, RpcRefused):
+            continue  # a doctor that does not listen
+        if isinstance(result, Exception):
+            here = trouble_of(result)
+            host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]
+            text, advice = node_trouble(host, here, place)
+            yield problem("both ways", f"the doctor that listens at '{host}' is not reached: {text}", advice)
+            continue
+        uri, before, text, after = result
+        host = host_port(uri)[0]
+        try:
+            answer = json.loads(text)
+            told, fault = float(answer["time"]), str(answer["fault"])
+            name = host if answer["host"] == host else f"{answer['host']} ({host})"
+            trouble = Trouble(Fault(fault), str(answer["text"])) if fault else None
+        except (ValueError, KeyError, TypeError):
+            yield problem(
+                "both ways", f"{service} answered what no doctor says: {text[:80]}", "end that node"
+            )
+            continue
+        if trouble:
+            yield unreached_finding(own, name, host, trouble)
+        else:
+            yield ok("both ways", f"this machine reaches {name}, and {name} this one")
+            yield clock_finding(name, told, before, after)
+
+
+def _call(uri: str, service: str, caller_id: str) -> str:
+    """The text of a listener's answer. Raises OSError, WireError."""
+    type_ = service_class("std_srvs/Trigger")
+    client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS)
+    try:
+        response = type_._response_class()
+        response.deserialize(client.call(b""))
+    finally:
+        client.close()
+    return str(response.message)

@@ -1,0 +1,223 @@
+"""What can be said of this machine without the network: Python, the variables, the packages.
+
+Source: http://wiki.ros.org/ROS/EnvironmentVariables, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/roswtf.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import minirospy
+from minirospy import names
+from minirospy.environment import Environment
+from minirospy.errors import ManifestError, NotFoundError
+from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
+from minirospy.introspect.doctor.reach import MasterPlace, is_loopback, is_own_address
+
+__all__ = ["check_packages", "check_python", "check_variables"]
+
+_OURS = Path(minirospy.__file__).parent
+_MEANT = (
+    "ROS_MASTER_URI",
+    "ROS_HOSTNAME",
+    "ROS_IP",
+    "ROS_IPV6",
+    "ROS_NAMESPACE",
+    "MINIROSPY_PORTS",
+    "MINIROSPY_ALLOW",
+)
+
+
+def check_python() -> Iterator[Finding]:
+    """Which Python this is, and whose rospy a program gets that it runs."""
+    import importlib.util
+
+    what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
+    spec = importlib.util.find_spec("rospy")
+    origin = spec.origin if spec else None
+    if origin is None:
+        yield problem(
+            "python",
+            f"{what}; `import rospy` finds nothing",
+            "run without -I and -S, or install minirospy again: a .pth file of its own puts rospy on the path",
+        )
+    elif _OURS in Path(origin).parents:
+        yield ok("python", f"{what}; `import rospy` is minirospy's")
+    else:
+        yield ok("python", f"{what}; `import rospy` is {Path(origin).parent}, which goes before minirospy's")
+
+
+def check_variables(
+    environ: Mapping[str, str], environment: Environment, master: MasterPlace, known: Mapping[str, list[str]]
+) -> Iterator[Finding]:
+    """The variables that say where the master and this machine are, one by one and beside each other.
+
+    ``known``: the addresses of the names in them.
+    """
+    found = [*_host_findings(environ, environment, master, known), *_other_findings(environ, environment)]
+    if not found:
+        meant = [f"{name}={environ[name]}" for name in _MEANT if environ.get(name)]
+        found.append(
+            ok("variables", ", ".join(meant) or "none is set: the master and all nodes on this machine")
+        )
+    yield from found
+
+
+def _host_findings(
+    environ: Mapping[str, str], environment: Environment, master: MasterPlace, known: Mapping[str, list[str]]
+) -> Iterator[Finding]:
+    hostname, ip = environ.get("ROS_HOSTNAME", ""), environ.get("ROS_IP", "")
+    host = environment.host
+    variable = (
+        f"ROS_HOSTNAME={host}" if hostname else f"ROS_IP={host}" if ip else f"this machine's name '{host}'"
+    )
+    export = f"export ROS_IP={master.own_address or '<an address of this machine>'}"
+    correct = f"unset ROS_HOSTNAME; {export}" if hostname else export
+    if hostname and ip and hostname != ip:
+        same = ip in known[hostname]
+        yield (warning if same else problem)(
+            "variables",
+            f"ROS_HOSTNAME={hostname} and ROS_IP={ip} are both set"
+            + ("" if same else ", and say different things")
+            + ": ROS_HOSTNAME counts",
+            "unset ROS_HOSTNAME" if is_own_address(ip) else "unset ROS_IP",
+        )
+    if ip and not hostname and not _is_address(ip):
+        yield warning("variables", f"ROS_IP={ip} is no address", f"export ROS_HOSTNAME={ip}; unset ROS_IP")
+    own = known[host]
+    if not own:
+        yield problem("variables", f"{variable} is a name that this machine itself does not know", correct)
+    elif is_loopback(host) and not master.is_local:
+        yield problem(
+            "variables",
+            f"{variable} is this machine alone, but the master is on another one ({master.host})",
+            correct,
+        )
+    elif all(map(is_loopback, own)) and not master.is_local:
+        yield warning(
+            "variables",
+            f"{variable} is {own[0]} here, which tells others nothing: they have to know that name",
+            correct,
+        )
+    elif not any(map(is_own_address, own)):
+        yield warning(
+            "variables",
+            f"{variable} is {' '.join(own)}, no address of this machine: right only behind NAT or in a container",
+            correct,
+        )
+
+
+def _other_findings(environ: Mapping[str, str], environment: Environment) -> Iterator[Finding]:
+    ipv6 = environ.get("ROS_IPV6", "")
+    if ipv6 and ipv6 != "on":
+        yield warning("variables", f"ROS_IPV6={ipv6} has no effect", "export ROS_IPV6=on, or unset it")
+    if not names.is_legal_name(environment.namespace):
+        yield problem(
+            "variables",
+            f"ROS_NAMESPACE={environ.get('ROS_NAMESPACE')} is no legal name",
+            "letters, digits, _ and /, a letter first",
+        )
+    for folder in environment.package_path:
+        if not folder.is_dir():
+            yield warning(
+                "variables",
+                f"ROS_PACKAGE_PATH names {folder}, which is no folder",
+                "take it out of the variable",
+            )
+    config = environ.get("ROS_PYTHON_LOG_CONFIG_FILE", "")
+    if config and not Path(config).is_file():
+        yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is no file", "unset it")
+    # What would be made is asked of the nearest folder that is there.
+    for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
+        there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
+        if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
+            yield problem(
+                "variables", f"{folder} cannot be written", f"set {variable}, or change who owns {there}"
+            )
+            break
+
+
+def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
+    """The packages of ROS_PACKAGE_PATH: of one name, unreadable, with missing dependencies; ``here``: a workspace."""
+    from minirospy.workspace.packages import Packages
+
+    found: list[Finding] = []
+    workspace = _workspace_of(here or Path.cwd())
+    if workspace and workspace / "src" not in {path.absolute() for path in environment.package_path}:
+        found.append(
+            warning(
+                "packages",
+                f"the workspace {workspace} is not in this terminal's environment",
+                f"source {workspace / 'devel' / 'setup.bash'}",
+            )
+        )
+    mine = Packages.below(*environment.package_path)
+    copies = mine.copies()
+    for name, folders in sorted(copies.items()):
+        if len(folders) > 1:
+            found.append(
+                warning(
+                    "packages",
+                    f"{name} lies in {' and in '.join(map(str, folders))}: the first counts",
+                    "remove or rename one of them",
+                )
+            )
+    found += _dependency_findings(environment, sorted(copies))
+    yield from found or [
+        ok("packages", f"{len(copies)} in ROS_PACKAGE_PATH" if copies else "those of minirospy")
+    ]
+
+
+def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[Finding]:
+    if not mine:
+        return
+    from minirospy.workspace.build import PROVIDED
+    from minirospy.workspace.dependencies import Dependencies
+    from minirospy.workspace.packages import Packages
+
+    packages = Packages(environment)
+    known = {*packages.folders(), *PROVIDED}
+    dependencies = Dependencies(packages)
+    for name in mine:
+        try:
+            manifest = dependencies.manifest(name)
+        except (ManifestError, NotFoundError) as error:
+            yield problem("packages", str(error), "correct its package.xml")
+            continue
+        missing = [
+            each.name
+            for each in manifest.dependencies
+            if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
+        ]
+        # What the system installs is called as the system calls it.
+        missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
+        if missing:
+            yield warning(
+                "packages",
+                f"{name} needs {', '.join(missing)}, which is no package here",
+                "put it into a folder of ROS_PACKAGE_PATH; if it is no ROS package, nothing need be done",
+            )
+
+
+def _is_system_key(name: str) -> bool:
+    return "-" in name or name.startswith(("python", "lib", "boost", "eigen"))
+
+
+def _workspace_of(folder: Path) -> Path | None:
+    for each in (folder, *folder.parents):
+        if (each / "devel" / "setup.bash").is_file() and (each / "src").is_dir():
+            return each
+    return None
+
+
+def _is_address(text: str) -> bool:
+    import ipaddress
+
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return False
+    return True

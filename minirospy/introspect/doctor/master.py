@@ -1,0 +1,142 @@
+"""The master: whether it answers, which side is at fault if it does not, and how its clock stands to ours."""
+
+from __future__ import annotations
+
+import re
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from minirospy.errors import MasterUnreachableError, RpcError, RpcFault
+from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
+from minirospy.introspect.doctor.reach import CONNECT_SECONDS, Fault, MasterPlace, Trouble, trouble_of
+from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.wire.http import serialize_request
+from minirospy.wire.xmlrpc import serialize_call
+
+__all__ = ["check_clock", "check_master", "clock_finding"]
+
+_FEEL_SECONDS = 0.1
+"""What tf begins to feel of clocks that differ."""
+
+_WRONG_SECONDS = 1.0
+
+
+def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
+    """Whether a master answers; a single problem if it does not."""
+    if not place.addresses:
+        yield problem(
+            "master",
+            f"this machine does not know the name '{place.host}' of ROS_MASTER_URI={master.uri}",
+            f"use the address of that machine, or add '{place.host}' to the hosts file of this one",
+        )
+        return
+    try:
+        pid = f", pid {master.get_pid()}"
+    except RpcFault:
+        pid = ""  # a master of others, which lacks this call
+    except (MasterUnreachableError, RpcError) as error:
+        yield _unreachable(master.uri, place, trouble_of(error))
+        return
+    status = _status(master)
+    name = (
+        f"minirospy {status['version']}" if "version" in status else "rosmaster" if pid else "a foreign one"
+    )
+    yield ok("master", f"{master.uri} answers: {name}{pid}")
+
+
+def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
+    """How far the master's clock is from ours; nothing where both are this machine's."""
+    if place.is_local:
+        return
+    before = time.time()
+    told = _status(master).get("time")
+    after = time.time()
+    if isinstance(told, float):
+        yield clock_finding(f"the master's machine ({place.host})", told, before, after)
+        return
+    seconds = _http_date(place)
+    if seconds is None:
+        yield ok("clock", f"{place.host} does not tell its time: compare `date` on both machines")
+        return
+    # Whole seconds, cut off.
+    yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
+
+
+def clock_finding(who: str, told: float, before: float, after: float) -> Finding:
+    """What ``told``, a time that came between ``before`` and ``after``, says of another clock."""
+    difference = told - after if told > after else min(0.0, told - before)
+    if abs(difference) < _FEEL_SECONDS:
+        return ok("clock", f"that of {who} is the same")
+    text = f"that of {who} is {abs(difference):.1f} s {'ahead of' if difference > 0 else 'behind'} this one"
+    advice = (
+        "let both follow one time server (chrony, ntp): stamps and transforms of one are wrong for the other"
+    )
+    return (problem if abs(difference) >= _WRONG_SECONDS else warning)("clock", text, advice)
+
+
+def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
+    where = uri if place.host == place.addresses[0] else f"{uri} ({place.addresses[0]})"
+    if place.is_local:
+        if trouble.fault is Fault.REFUSED:
+            return problem(
+                "master",
+                f"none runs on this machine at {where}",
+                "start `roscore`, or set ROS_MASTER_URI to the machine where it runs",
+            )
+    elif trouble.fault is Fault.REFUSED:
+        return problem(
+            "master",
+            f"{place.host} is there, but nothing listens at {where}",
+            f"start `roscore` on {place.host}; if it runs, it listens on loopback alone, since ROS_IP or ROS_HOSTNAME is "
+            "that there, or on another port",
+        )
+    elif trouble.fault is Fault.SILENT:
+        return problem(
+            "master",
+            f"nothing comes back from {where}",
+            f"see that {place.host} is on and has that address (`ping {place.host}`); if it answers, its firewall drops "
+            f"what comes to TCP port {place.port}",
+        )
+    elif trouble.fault is Fault.NO_ROUTE:
+        return problem(
+            "master",
+            f"no way leads to {where}: {trouble.text}",
+            "see that both machines are in one network, and that no firewall refuses",
+        )
+    if trouble.fault is Fault.STRANGER:
+        return problem(
+            "master",
+            f"what answers at {where} is no ROS master: {trouble.text}",
+            "correct the port in ROS_MASTER_URI, or end that program",
+        )
+    return problem("master", f"{where}: {trouble.text}", "see docs/network.md")
+
+
+def _status(master: MasterProxy) -> dict[str, Any]:
+    """What only minirospy's master tells of itself."""
+    try:
+        found = master.call("minirospy.status")
+    except (RpcFault, RpcError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _http_date(place: MasterPlace) -> float | None:
+    """The time that the server writes into its answers, as Python's own does."""
+    from email.utils import parsedate_to_datetime
+
+    request = serialize_request(place.host, "/RPC2", serialize_call("getPid", ("/doctor",)))
+    try:
+        with socket.create_connection((place.addresses[0], place.port), CONNECT_SECONDS) as sock:
+            sock.sendall(request)
+            answer = b""
+            while b"\r\n\r\n" not in answer and (more := sock.recv(4096)):
+                answer += more
+        (date,) = re.findall(
+            rb"^date:(.*)\r$", answer.partition(b"\r\n\r\n")[0] + b"\r", re.MULTILINE | re.IGNORECASE
+        )
+        return parsedate_to_datetime(date.decode("latin-1").strip()).timestamp()
+    except (OSError, ValueError):
+        return None

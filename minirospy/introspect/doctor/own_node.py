@@ -1,0 +1,201 @@
+"""The doctor's own node: whether others reach what runs on this machine, the master first.
+
+It is a node like any other for as long as the doctor works: what reaches it reaches the user's nodes too.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Collection, Iterator
+from types import TracebackType
+from typing import Any
+
+from minirospy import names
+from minirospy.environment import Environment
+from minirospy.errors import MasterUnreachableError, RpcError
+from minirospy.idl.load import message_class, service_class
+from minirospy.introspect.doctor.findings import Finding, ok, problem
+from minirospy.introspect.doctor.reach import (
+    CONNECT_SECONDS,
+    Fault,
+    Trouble,
+    addresses,
+    host_port,
+    own_address_towards,
+    trouble_of,
+)
+from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.master_proxy import SlaveProxy
+from minirospy.runtime.node import Node
+from minirospy.runtime.services import Handler
+from minirospy.runtime.topics import Publication
+from minirospy.wire.framing import serialize_frame
+from minirospy.wire.tcpros import InterfaceType
+
+__all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unreached_finding"]
+
+PREFIX = "/minirospy_doctor"
+"""How the names of such nodes begin."""
+
+_LETTER_BYTES = 16 * 1024
+"""More than a packet: some tunnels lose whatever does not fit into one."""
+
+_log = logging.getLogger(__name__)
+
+
+class DoctorNode:
+    """A node with a latched message for whoever asks, registered while the context lasts.
+
+    Entering raises OSError where no server can be opened at this machine's address.
+    """
+
+    def __init__(self, environment: Environment) -> None:
+        self.environment = environment
+        self.name = names.anonymous_name(PREFIX)
+        self.letter = self.name + "/letter"
+        self.told_by_master = threading.Event()
+        """Set when the master has called this node."""
+        self._loop = LoopThread("minirospy-doctor")
+        self.node = _Node(self.name, environment, self.told_by_master)
+        self._log_links = threading.Condition()
+        self._listeners: set[str] = set()
+
+    def __enter__(self) -> DoctorNode:
+        try:
+            self._loop.run(self.node.start())
+        except BaseException:
+            self._loop.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self._loop.run(self._leave(), 3.0)
+        except TimeoutError:
+            _log.debug("the master did not answer at the end")
+        self._loop.close()
+
+    def register(self) -> None:
+        """Be a node of the graph: it publishes its letter, and like any node /rosout.
+
+        Raises MasterUnreachableError, RpcError.
+        """
+        self._loop.run(self._register())
+
+    def serve(self, name: str, handler: Handler) -> None:
+        """Offer a std_srvs/Trigger service. Raises MasterUnreachableError, RpcError."""
+        type_ = service_class("std_srvs/Trigger")
+        server = self.node.make_service(
+            name,
+            InterfaceType(type_._type, type_._md5sum),
+            handler,
+            request_type=type_._request_class._type,
+            response_type=type_._response_class._type,
+        )
+        self._loop.run(self.node.serve(server))
+
+    def wait_for_log_listeners(self, wanted: Collection[str], timeout: float) -> set[str]:
+        """Those of the nodes ``wanted`` that have not connected to this one's /rosout in time."""
+        with self._log_links:
+            self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
+            return set(wanted) - self._listeners
+
+    async def _register(self) -> None:
+        # In this order the master has to tell us of ourselves.
+        await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
+        text = message_class("std_msgs/String")
+        letter = Publication(
+            self.letter, InterfaceType(text._type, text._md5sum, text._full_text), latch=True
+        )
+        body = b"x" * _LETTER_BYTES
+        letter.publish(serialize_frame(len(body).to_bytes(4, "little") + body))
+        log = message_class("rosgraph_msgs/Log")
+        type_ = InterfaceType(log._type, log._md5sum, log._full_text)
+        await self.node.advertise(letter)
+        await self.node.advertise(Publication("/rosout", type_, on_link=self._link_changed))
+
+    async def _leave(self) -> None:
+        try:
+            if self.node.publications:
+                await self.node.master("unregisterSubscriber", self.letter, self.node.uri)
+        except (MasterUnreachableError, RpcError) as error:
+            _log.debug("leaving: %s", error)
+        finally:
+            await self.node.close()
+
+    def _link_changed(self, link: Any, is_up: bool) -> None:
+        if is_up:
+            with self._log_links:
+                self._listeners.add(link.peer)
+                self._log_links.notify_all()
+
+
+class _Node(Node):
+    """A node that notes the master's calls."""
+
+    def __init__(self, name: str, environment: Environment, told: threading.Event) -> None:
+        super().__init__(name, environment)
+        self._told = told
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        self._told.set()
+
+
+def check_own_address(own: DoctorNode) -> Iterator[Finding]:
+    """Whether this machine reaches its own nodes at the address that they tell others."""
+    host, ports = own.environment.host, own.environment.ports
+    slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS)
+    try:
+        slave.get_pid()
+    except RpcError as error:
+        yield problem(
+            "own address",
+            f"this machine does not reach its own node at '{host}': {trouble_of(error).text}",
+            "set ROS_IP to an address of this machine, or unset ROS_IP and ROS_HOSTNAME",
+        )
+    else:
+        which = f"ports {ports[0]}-{ports[-1]}" if ports else "any port"
+        yield ok(
+            "own address", f"nodes of this machine are at '{host}' ({which}), and reach each other there"
+        )
+    finally:
+        slave.close()
+
+
+def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
+    """Whether the master calls our node, and those who hear /rosout (``log_listeners``) connect to it."""
+    if not own.told_by_master.wait(CONNECT_SECONDS):
+        yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
+        return
+    missing = own.wait_for_log_listeners(log_listeners, CONNECT_SECONDS)
+    if missing:
+        yield problem(
+            "way back",
+            f"the master reaches this machine, but {', '.join(sorted(missing))} gets no topic from it",
+            f"a firewall lets only some ports through: open TCP port {own.node.tcpros_port} too (see MINIROSPY_PORTS)",
+        )
+    else:
+        yield ok("way back", f"the master's machine ({master_host}) reaches nodes of this one")
+
+
+def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
+    """The finding for another machine (``who``, at ``their_host``) that does not reach our node."""
+    host, port = host_port(own.node.uri)
+    known = addresses(their_host)
+    ours = own_address_towards(known[0]) if known else ""
+    text = f"{who} does not reach this one at {host}:{port}" + (f": {trouble.text}" if trouble else "")
+    export = f"export ROS_IP={ours or '<the address by which it reaches this machine>'}"
+    firewall = (
+        f"a firewall keeps it from TCP ports {port} and {own.node.tcpros_port} of this machine: open them, or set "
+        "MINIROSPY_PORTS to ports that are open"
+    )
+    if host == ours:
+        return problem("way back", text, firewall)
+    if ours not in addresses(host):
+        return problem("way back", text, export)
+    if trouble and trouble.fault is not Fault.NAME:
+        return problem("way back", text, f"{firewall}; or it takes '{host}' for another machine: {export}")
+    return problem("way back", text, export if trouble else f"{export}; if that does not do, {firewall}")

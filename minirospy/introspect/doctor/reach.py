@@ -1,0 +1,270 @@
+"""Whether an address can be reached from here, and if not, why: a host and a port in, a named fault out.
+
+Everything blocks its thread for a bounded time; :func:`in_parallel` asks many at once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import queue
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable
+from enum import Enum
+from typing import NamedTuple, TypeVar
+from urllib.parse import urlsplit
+
+from minirospy.errors import (
+    MasterUnreachableError,
+    MinirospyError,
+    RpcProtocolError,
+    RpcUnreachable,
+    WireError,
+)
+from minirospy.runtime.master_proxy import SlaveProxy
+from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
+from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
+
+__all__ = [
+    "CONNECT_SECONDS",
+    "Fault",
+    "MasterPlace",
+    "Trouble",
+    "addresses",
+    "addresses_of",
+    "host_port",
+    "in_parallel",
+    "is_loopback",
+    "is_own_address",
+    "look_up",
+    "own_address_towards",
+    "read_topic",
+    "trouble_of",
+]
+
+CONNECT_SECONDS = 1.5
+"""Whoever means to answer does within this, also by a poor radio."""
+
+LOOK_UP_SECONDS = 2.0
+"""The same of a name server."""
+
+_MOST_THREADS = 32
+_MOST_BYTES = 1024 * 1024
+_A = TypeVar("_A")
+_R = TypeVar("_R")
+
+
+class Fault(str, Enum):
+    """Why an address does not answer, as far as it can be told from here."""
+
+    NAME = "name"
+    """the name is not known here"""
+    REFUSED = "refused"
+    """the machine is there, and nobody listens at that port"""
+    SILENT = "silent"
+    """nothing comes back: the machine is off, the address is another one's, or a firewall drops what is sent"""
+    NO_ROUTE = "no route"
+    """the way there is closed: no network, or a firewall that says no"""
+    STRANGER = "stranger"
+    """somebody answers who speaks no ROS"""
+    OTHER = "other"
+
+
+class Trouble(NamedTuple):
+    """A fault, and what was said about it."""
+
+    fault: Fault
+    text: str
+
+
+class MasterPlace(NamedTuple):
+    """Where ROS_MASTER_URI says that the master is, and the addresses of that host ([]: the name is not known)."""
+
+    host: str
+    port: int
+    addresses: list[str]
+
+    @property
+    def is_local(self) -> bool:
+        """Whether it is this machine."""
+        return is_loopback(self.host) or any(map(is_own_address, self.addresses))
+
+    @property
+    def own_address(self) -> str:
+        """The address that this machine shows to it; "" where there is no way."""
+        return own_address_towards(self.addresses[0]) if self.addresses else ""
+
+
+def trouble_of(error: Exception) -> Trouble:
+    """The trouble that an error of a call, a connection or a look-up stands for."""
+    text = str(error)
+    if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
+        error = error.__cause__
+    if isinstance(error, RpcUnreachable):
+        text = error.why
+        if isinstance(error.__cause__, Exception):
+            error = error.__cause__
+    if isinstance(error, socket.gaierror):
+        return Trouble(Fault.NAME, "the name is not known")
+    if isinstance(error, TimeoutError):
+        return Trouble(Fault.SILENT, "no answer")
+    if isinstance(error, ConnectionRefusedError):
+        return Trouble(Fault.REFUSED, "connection refused")
+    if isinstance(error, OSError) and error.errno in (
+        errno.EHOSTUNREACH,
+        errno.ENETUNREACH,
+        errno.EACCES,
+        errno.EPERM,
+        errno.EHOSTDOWN if hasattr(errno, "EHOSTDOWN") else errno.EHOSTUNREACH,
+    ):
+        return Trouble(Fault.NO_ROUTE, error.strerror or str(error))
+    if isinstance(error, EOFError | RpcProtocolError | WireError | ConnectionError):
+        return Trouble(Fault.STRANGER, text)
+    return Trouble(Fault.OTHER, text)
+
+
+def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
+    """The addresses of a name, IPv4 first, as this machine knows them; [] where it knows none, or takes too long."""
+    try:
+        return look_up(host, timeout)
+    except OSError:
+        return []
+
+
+def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict[str, list[str]]:
+    """The same of several names, looked up side by side."""
+    names = list(dict.fromkeys(hosts))
+    found = in_parallel(_ask_resolver, names, timeout)
+    return {
+        name: [] if isinstance(each, Exception) else each for name, each in zip(names, found, strict=True)
+    }
+
+
+def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
+    """The same; raises OSError. A name server that is out of reach would keep its client for half a minute."""
+    (found,) = in_parallel(_ask_resolver, [host], timeout)
+    if isinstance(found, Exception):
+        raise socket.gaierror(socket.EAI_NONAME, f"the name '{host}' is not known") from found
+    return found
+
+
+def _ask_resolver(name: str) -> list[str]:
+    found = socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)
+    ordered = sorted(found, key=lambda info: info[0] != socket.AF_INET)
+    return list(dict.fromkeys(str(info[4][0]) for info in ordered))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a name or address is one by which a machine reaches itself alone."""
+    return host in {"localhost", "ip6-localhost", "::1"} or host.startswith("127.")
+
+
+def is_own_address(address: str) -> bool:
+    """Whether this machine has an address: no other can be bound."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.bind((address, 0))
+    except OSError:
+        return False
+    return True
+
+
+def own_address_towards(address: str) -> str:
+    """The address that this machine shows to another one; "" where there is no way to it. Nothing is sent."""
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((address, 9))
+            return str(probe.getsockname()[0])
+    except OSError:
+        return ""
+
+
+def host_port(uri: str) -> tuple[str, int]:
+    """(host, port) of ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) where it is no such URI."""
+    try:
+        parts = urlsplit(uri)
+        return parts.hostname or "", parts.port or 0
+    except ValueError:
+        return "", 0
+
+
+def read_topic(
+    uri: str, topic: str, caller_id: str, timeout: float = CONNECT_SECONDS, *, wait: bool = False
+) -> tuple[Header, bytes]:
+    """What the publisher at ``uri`` (its Slave API) says of a topic, and with ``wait`` its first message.
+
+    ``timeout`` seconds are for each step. Raises RpcError, WireError, OSError.
+    """
+    look_up(host_port(uri)[0])
+    with contextlib.closing(SlaveProxy(uri, caller_id, timeout)) as slave:
+        answer = slave.request_topic(topic, [["TCPROS"]])
+    match answer:
+        case ["TCPROS", str(host), int(port), *_]:
+            look_up(host)
+        case _:
+            raise WireError(f"{uri} answered requestTopic for {topic} with {answer!r}")
+    with socket.create_connection((host, port), timeout) as sock:
+        fields = subscriber_header(topic, InterfaceType(ANY, ANY), caller_id)
+        sock.sendall(serialize_header(fields))
+        header = parse_header(_receive(sock, MAX_HEADER))
+        check_publisher(header, topic, InterfaceType(ANY, ANY))
+        return header, _receive(sock, _MOST_BYTES) if wait else b""
+
+
+def _receive(sock: socket.socket, most: int) -> bytes:
+    """A block with its length in front. Raises WireError, OSError."""
+
+    def exactly(count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            more = sock.recv(count - len(data))
+            if not more:
+                raise WireError("the connection was closed in the middle")
+            data += more
+        return data
+
+    length = int.from_bytes(exactly(4), "little")
+    if length > most:
+        raise WireError(f"{length} bytes are announced: that is no TCPROS")
+    return exactly(length)
+
+
+def in_parallel(
+    function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
+) -> list[_R | Exception]:
+    """What ``function`` returns, or the error it raises, for each argument; TimeoutError for what takes longer.
+
+    Daemon threads: a look-up of a name cannot be ended, and must not keep the program.
+    """
+    waiting = list(enumerate(arguments))
+    results: list[_R | Exception] = [TimeoutError("timed out")] * len(waiting)
+    work: queue.SimpleQueue[tuple[int, _A]] = queue.SimpleQueue()
+    done: queue.SimpleQueue[tuple[int, _R | Exception]] = queue.SimpleQueue()
+    for entry in waiting:
+        work.put(entry)
+
+    def run() -> None:
+        while True:
+            try:
+                number, argument = work.get_nowait()
+            except queue.Empty:
+                return
+            try:
+                done.put((number, function(argument)))
+            except (MinirospyError, OSError, EOFError, TypeError, ValueError) as error:
+                done.put((number, error))
+
+    for _ in range(min(len(waiting), _MOST_THREADS)):
+        threading.Thread(target=run, name="minirospy-doctor", daemon=True).start()
+    end = time.monotonic() + timeout
+    for _ in waiting:
+        try:
+            number, result = done.get(timeout=max(0.0, end - time.monotonic()))
+        except queue.Empty:
+            break
+        results[number] = result
+    return results

@@ -1,0 +1,201 @@
+"""minirospy doctor and roswtf: a graph with something wrong in it, and the lines that say what."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_msgs.msg import Bool, String
+
+from minirospy.cli import doctor
+from minirospy.environment import Environment
+from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.node import Node
+from minirospy.wire.tcpros import InterfaceType
+
+Start = Callable[[Sequence[str]], Any]
+
+
+@pytest.fixture
+def other(master: str) -> Iterator[Callable[[str, InterfaceType], None]]:
+    """Let a node /other subscribe to a topic with a type."""
+    loop = LoopThread("other")
+    node = Node("/other", Environment.read())
+    loop.run(node.start())
+
+    def subscribe(topic: str, type_: InterfaceType) -> None:
+        loop.run(node.subscribe(node.make_subscription(topic, type_, lambda *_: None)))
+
+    yield subscribe
+    loop.run(node.close())
+    loop.close()
+
+
+@pytest.fixture
+def closed_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def lines(out: str, check: str) -> list[str]:
+    """What was said of a check."""
+    return [line for line in out.splitlines() if f" {check}: " in line]
+
+
+def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
+    status, out, err = command("doctor")
+    assert (status, err) == (0, "")
+    checks = [line.split(":")[0] for line in out.splitlines()]
+    assert checks == [
+        "ok      python",
+        "ok      variables",
+        "ok      own address",
+        "ok      master",
+        "ok      nodes",
+        "ok      way back",
+        "warning topics",
+        "ok      connections",
+        "ok      services",
+        "ok      packages",
+        "1 warning",
+    ], out
+    assert (
+        "nobody publishes /any (/robot), /listen (/robot) -> start the publisher" in lines(out, "topics")[0]
+    )
+    # The doctor's own node is gone.
+    assert command("rosnode", "list").out == "/robot\n"
+
+
+def test_nodes_that_are_dead_nowhere_or_others(
+    robot: Any, master: str, closed_port: int, command: Any
+) -> None:
+    proxy = MasterProxy(master, "/")
+    for name, uri in (
+        ("/dead", f"http://localhost:{closed_port}/"),
+        ("/dead_too", f"http://localhost:{closed_port}/"),
+        ("/lost", "http://no-such-host.invalid:1234/"),
+        ("/moved", robot.node.uri),
+    ):
+        proxy.caller_id = name
+        proxy.register_publisher("/boo", "std_msgs/Bool", uri)
+    proxy.close()
+    status, out, _ = command("doctor")
+    assert status == 1
+    dead, lost, moved = lines(out, "nodes")
+    assert dead.startswith(
+        "PROBLEM nodes: /dead, /dead_too: nothing listens at their port on 'localhost' -> if they were killed"
+    )
+    assert lost.startswith(
+        "PROBLEM nodes: /lost: told the master that they are at 'no-such-host.invalid', a name that this"
+    )
+    assert moved.startswith(
+        "PROBLEM nodes: /moved: another program answers at their port on 'localhost': it is the node /robot"
+    )
+    assert out.splitlines()[-1] == "3 problems and 1 warning"
+
+
+def test_topics_of_different_types(robot: Any, other: Any, command: Any) -> None:
+    other("/button_state", InterfaceType(String._type, String._md5sum, String._full_text))
+    status, out, _ = command("doctor")
+    assert status == 1
+    problem, _ = lines(out, "topics")
+    assert (
+        "/button_state has nodes of different types, which never connect: std_msgs/Bool: /robot; std_msgs/String: /other"
+        in problem
+    )
+
+
+def test_a_connection_that_is_not_made(robot: Any, other: Any, command: Any) -> None:
+    """The types' names are the same, their definitions are not."""
+    other("/button_state", InterfaceType(Bool._type, "0" * 32))
+    status, out, _ = command("doctor")
+    assert status == 1
+    (line,) = lines(out, "connections")
+    assert line.startswith(
+        "PROBLEM connections: /other does not get /button_state of /robot -> run `minirospy doctor` on"
+    )
+
+
+def test_a_service_that_is_dead(robot: Any, master: str, closed_port: int, command: Any) -> None:
+    proxy = MasterProxy(master, "/robot")
+    proxy.register_service("/haunt", f"rosrpc://localhost:{closed_port}", robot.node.uri)
+    proxy.close()
+    status, out, _ = command("doctor")
+    assert status == 1
+    (line,) = lines(out, "services")
+    assert line.startswith(
+        "PROBLEM services: /haunt of /robot does not answer: connection refused -> start its node again"
+    )
+
+
+def test_without_a_master(command: Any, monkeypatch: pytest.MonkeyPatch, closed_port: int) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{closed_port}")
+    status, out, _ = command("doctor")
+    assert status == 1
+    assert lines(out, "master") == [
+        f"PROBLEM master: none runs on this machine at http://localhost:{closed_port} (127.0.0.1) -> "
+        "start `roscore`, or set ROS_MASTER_URI to the machine where it runs"
+    ]
+    assert lines(out, "packages")
+    status, out, _ = command("doctor", "--offline")
+    assert (status, lines(out, "master"), out.splitlines()[-1]) == (0, [], "all is well")
+
+
+def test_another_machine(robot: Any, command: Any) -> None:
+    status, out, _ = command("doctor", "localhost", "robot.invalid")
+    assert status == 1
+    assert lines(out, "other machine") == [
+        "ok      other machine: localhost (127.0.0.1) is this machine",
+        "PROBLEM other machine: this machine does not know the name 'robot.invalid' -> give the address of that machine, "
+        "or add 'robot.invalid' to the hosts file of this one",
+    ]
+    assert lines(out, "both ways") == []
+    status, _, err = command("doctor", "--offline", "robot")
+    assert (status, "to try another machine needs the network" in err) == (2, True)
+
+
+def test_json(robot: Any, command: Any) -> None:
+    found = [json.loads(line) for line in command("doctor", "--json").out.splitlines()]
+    assert {"check": "services", "status": "ok", "text": "2, all answer", "advice": ""} in found
+
+
+def test_typed_wrong(command: Any) -> None:
+    assert command("doctor", "--nothing").status == 2
+    assert command("doctor", "--listen", "--offline").status == 2
+
+
+def test_roswtf_and_launch_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good, bad, broken = (tmp_path / name for name in ("good.launch", "bad.launch", "broken.launch"))
+    node = '<launch>\n<node name="led" pkg="rpi_feros" type="{}"/>\n</launch>'
+    good.write_text(node.format("$(arg kind).py").replace("<node", '<arg name="kind"/><node'))
+    bad.write_text(node.format("led_actuator"))
+    broken.write_text("<launch>")
+    assert doctor.roswtf(["--offline", "--all", "--no-plugins", str(good), "kind:=led_actuator"]) == 0
+    assert f"ok      launch file: {good}: 1 node(s), all programs are there" in capsys.readouterr().out
+    assert doctor.roswtf(["--offline", str(bad), str(broken), str(tmp_path / "none.launch")]) == 1
+    one, two, three = lines(capsys.readouterr().out, "launch file")
+    assert f"PROBLEM launch file: {bad}:2: " in one
+    assert "led_actuator.py" in one
+    assert str(broken) in two
+    assert "none.launch is no file" in three
+
+
+def test_a_doctor_that_listens(robot: Any, command: Any, program: Start) -> None:
+    listener = program(["minirospy", "doctor", "--listen"])
+    said = [listener.stdout.readline() for _ in range(12)]
+    assert said[-1] == "listening: type `minirospy doctor` on the other machine; Ctrl-C ends this\n"
+    status, out, _ = command("doctor")
+    assert status == 0
+    one, _ = [line for line in out.splitlines() if " both ways: " in line or "clock: that of " in line]
+    assert one.startswith("ok      both ways: this machine reaches ")
+    assert "it reaches this machine, and this one reaches it" in listener.stdout.readline()
+    listener.send_signal(signal.SIGTERM)
+    assert listener.wait(10) == 0
+    assert command("rosnode", "list").out == "/robot\n"

@@ -1,0 +1,95 @@
+"""A node on one of two machines, on any rospy, real or ours: what it does is the first argument.
+
+robot    publish /beat ("subscribed" tells of each connection), repeat /order on /heard, serve /flag and the action
+         /count, until the input ends
+laptop   use all of the robot, print what came, and end
+listen   print "beat" when /beat comes again after a second's silence, until the input ends
+"""
+
+import os
+import sys
+import threading
+import time
+
+import actionlib
+import rospy
+from actionlib.msg import TestAction, TestGoal, TestResult
+from std_msgs.msg import Int32, String
+from std_srvs.srv import SetBool, SetBoolResponse
+
+if os.environ.get("TEST_KEEPALIVE"):
+    # A cable that was pulled is noticed after seconds, not after a minute.
+    from minirospy.runtime import tcp
+
+    tcp._KEEPALIVE.update(dict.fromkeys(tcp._KEEPALIVE, 1))
+
+
+def say(*words):
+    sys.stdout.write(" ".join(map(str, words)) + "\n")
+    sys.stdout.flush()
+
+
+class Tell(rospy.SubscribeListener):
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        say("subscribed")
+
+
+def robot():
+    beat = rospy.Publisher("/beat", Int32, Tell(), queue_size=1)
+    heard = rospy.Publisher("/heard", String, queue_size=1, latch=True)
+    rospy.Subscriber("/order", String, lambda order: heard.publish("heard " + order.data))
+    rospy.Service("/flag", SetBool, lambda request: SetBoolResponse(request.data, "from afar"))
+    rospy.set_param("/robot", {"wheels": 2, "name": "r2"})
+    server = actionlib.SimpleActionServer(
+        "/count", TestAction, lambda goal: server.set_succeeded(TestResult(goal.goal + 1)), False
+    )
+    server.start()
+    threading.Thread(target=tick, args=(beat,), daemon=True).start()
+    say("ready")
+    sys.stdin.read()
+
+
+def tick(beat):
+    number = 0
+    while not rospy.is_shutdown():
+        beat.publish(number)
+        number += 1
+        time.sleep(0.05)
+
+
+def laptop():
+    say("beat", rospy.wait_for_message("/beat", Int32, timeout=10).data >= 0)
+    order = rospy.Publisher("/order", String, queue_size=1, latch=True)
+    order.publish("forward")
+    say(rospy.wait_for_message("/heard", String, timeout=10).data)
+    rospy.wait_for_service("/flag", timeout=10)
+    response = rospy.ServiceProxy("/flag", SetBool)(True)
+    say("flag", response.success, response.message)
+    rospy.set_param("/robot/wheels", 4)
+    say("param", sorted(rospy.get_param("/robot").items()))
+    client = actionlib.SimpleActionClient("/count", TestAction)
+    if not client.wait_for_server(rospy.Duration(10)):
+        sys.exit("no action server")
+    client.send_goal_and_wait(TestGoal(41), rospy.Duration(10))
+    say("count", client.get_result().result)
+
+
+def listen():
+    last = [0.0]
+
+    def on_beat(_):
+        now = time.monotonic()
+        if now - last[0] > 1.0:
+            say("beat")
+        last[0] = now
+
+    rospy.Subscriber("/beat", Int32, on_beat, queue_size=1)
+    say("ready")
+    sys.stdin.read()
+
+
+if __name__ == "__main__":
+    role = sys.argv[1]
+    rospy.init_node(role)
+    {"robot": robot, "laptop": laptop, "listen": listen}[role]()
+    rospy.signal_shutdown("done")

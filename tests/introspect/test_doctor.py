@@ -1,0 +1,242 @@
+"""introspect/doctor: what it makes of an environment, of addresses and of clocks. The graph: tests/cli/test_doctor.py."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import MasterUnreachableError, RpcError, RpcUnreachable
+from minirospy.introspect.doctor import Examination, Finding, Status
+from minirospy.introspect.doctor.machine import check_packages, check_variables
+from minirospy.introspect.doctor.master import clock_finding
+from minirospy.introspect.doctor.reach import (
+    Fault,
+    MasterPlace,
+    addresses,
+    addresses_of,
+    in_parallel,
+    is_own_address,
+    own_address_towards,
+    trouble_of,
+)
+from minirospy.runtime.master_proxy import MasterProxy
+
+HERE = MasterPlace("localhost", 11311, ["127.0.0.1"])
+AFAR = MasterPlace("robot", 11311, ["192.0.2.7"])
+
+
+# --- addresses
+
+
+def test_what_takes_too_long_is_not_waited_for() -> None:
+    start = time.monotonic()
+    found = in_parallel(lambda seconds: time.sleep(seconds) or seconds, [0.0, 5.0], 0.3)
+    assert found[0] == 0.0
+    assert isinstance(found[1], TimeoutError)
+    assert time.monotonic() - start < 3
+
+
+def test_many_are_asked_side_by_side() -> None:
+    def ask(number: int) -> int:
+        if number == 3:
+            raise OSError("no")
+        return number * 2
+
+    found = in_parallel(ask, range(100), 5.0)
+    assert isinstance(found[3], OSError)
+    assert [each for each in found if not isinstance(each, Exception)] == [
+        2 * n for n in range(100) if n != 3
+    ]
+
+
+def test_names_are_looked_up_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    end = threading.Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: end.wait(20) and [])
+    start = time.monotonic()
+    found = addresses_of([f"robot{number}" for number in range(20)], 0.3)
+    end.set()
+    assert time.monotonic() - start < 3
+    assert found == {f"robot{number}": [] for number in range(20)}
+
+
+def test_addresses() -> None:
+    assert addresses("127.0.0.1") == ["127.0.0.1"]
+    assert addresses("no-such-host.invalid") == []
+    assert is_own_address("127.0.0.1")
+    assert not is_own_address("192.0.2.7")
+    assert own_address_towards("127.0.0.1") == "127.0.0.1"
+
+
+@pytest.fixture
+def listener() -> Iterator[socket.socket]:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield server
+
+
+def fault_at(uri: str) -> Fault:
+    master = MasterProxy(uri, "/test", 0.3)
+    try:
+        master.get_pid()
+    except (MasterUnreachableError, RpcError) as error:
+        return trouble_of(error).fault
+    finally:
+        master.close()
+    raise AssertionError("somebody answers")
+
+
+def test_why_an_address_does_not_answer(listener: socket.socket) -> None:
+    port = listener.getsockname()[1]
+    assert fault_at("http://127.0.0.1:1") is Fault.REFUSED
+    assert fault_at("http://no-such-host.invalid:1") is Fault.NAME
+    assert fault_at(f"http://127.0.0.1:{port}") is Fault.SILENT
+    assert trouble_of(RpcUnreachable("http://x:1", "odd")).fault is Fault.OTHER
+
+
+def test_somebody_who_speaks_no_ros(listener: socket.socket) -> None:
+    def hang_up() -> None:
+        peer, _ = listener.accept()
+        with peer:
+            peer.recv(100)
+            peer.sendall(b"220 mail ready\r\n\r\n")
+
+    thread = threading.Thread(target=hang_up)
+    thread.start()
+    assert fault_at(f"http://127.0.0.1:{listener.getsockname()[1]}") is Fault.STRANGER
+    thread.join()
+
+
+# --- variables
+
+
+def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
+    environ = {"ROS_HOME": "/tmp", **environ}
+    environment = Environment.read(environ)
+    known = addresses_of((environment.host, environ.get("ROS_HOSTNAME") or environment.host))
+    return list(check_variables(environ, environment, place, known))
+
+
+@pytest.mark.parametrize(
+    ("environ", "place", "status", "text"),
+    [
+        ({"ROS_HOSTNAME": "localhost"}, HERE, "ok", "ROS_HOSTNAME=localhost"),
+        (
+            {"ROS_IP": "127.0.0.1"},
+            AFAR,
+            "problem",
+            "is this machine alone, but the master is on another one (robot)",
+        ),
+        ({"ROS_HOSTNAME": "localhost"}, AFAR, "problem", "ROS_HOSTNAME=localhost is this machine alone"),
+        (
+            {"ROS_HOSTNAME": "nowhere.invalid"},
+            HERE,
+            "problem",
+            "a name that this machine itself does not know",
+        ),
+        ({"ROS_IP": "192.0.2.1"}, AFAR, "warning", "no address of this machine"),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_IP": "192.0.2.1"},
+            HERE,
+            "problem",
+            "are both set, and say different things: ROS_HOSTNAME counts",
+        ),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_IP": "127.0.0.1"},
+            HERE,
+            "warning",
+            "are both set: ROS_HOSTNAME counts",
+        ),
+        ({"ROS_IP": "localhost"}, HERE, "warning", "ROS_IP=localhost is no address"),
+        ({"ROS_HOSTNAME": "localhost", "ROS_IPV6": "1"}, HERE, "warning", "ROS_IPV6=1 has no effect"),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_NAMESPACE": "a b"},
+            HERE,
+            "problem",
+            "ROS_NAMESPACE=a b is no legal name",
+        ),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_PACKAGE_PATH": "/nowhere"},
+            HERE,
+            "warning",
+            "which is no folder",
+        ),
+        ({"ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": "/dev/null/log"}, HERE, "problem", "cannot be written"),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_PYTHON_LOG_CONFIG_FILE": "/nowhere"},
+            HERE,
+            "warning",
+            "ROS_PYTHON_LOG_CONFIG_FILE=/nowhere is no file",
+        ),
+    ],
+)
+def test_variables(environ: dict[str, str], place: MasterPlace, status: str, text: str) -> None:
+    (finding,) = said(environ, place)
+    assert (finding.status.value, text in finding.text) == (status, True), finding
+    assert bool(finding.advice) == (status != "ok")
+
+
+def test_a_variable_that_cannot_be_read_ends_the_examination() -> None:
+    with Examination({"ROS_MASTER_URI": "robot:11311"}) as examination:
+        last = list(examination.findings())[-1]
+    assert last.status is Status.PROBLEM
+    assert "ROS_MASTER_URI [robot:11311] is not of the form http://host:port" in last.text
+
+
+# --- clocks
+
+
+@pytest.mark.parametrize(
+    ("told", "status", "text"),
+    [
+        (100.0, "ok", "is the same"),
+        (100.05, "ok", "is the same"),
+        (100.5, "warning", "0.4 s ahead of this one"),
+        (99.5, "warning", "0.5 s behind this one"),
+        (3700.0, "problem", "3599.9 s ahead of this one"),
+    ],
+)
+def test_clocks(told: float, status: str, text: str) -> None:
+    finding = clock_finding("robot", told, before=100.0, after=100.1)
+    assert (finding.status.value, text in finding.text) == (status, True), finding
+
+
+# --- packages
+
+
+def package(folder: Path, name: str, *depends: str) -> None:
+    folder.mkdir(parents=True)
+    needs = "".join(f"<exec_depend>{each}</exec_depend>" for each in depends)
+    (folder / "package.xml").write_text(
+        f'<package format="2"><name>{name}</name><version>0.1.0</version><description>d</description>'
+        f'<maintainer email="a@b.c">a</maintainer><license>BSD</license>{needs}</package>'
+    )
+
+
+def test_packages(tmp_path: Path) -> None:
+    package(tmp_path / "a" / "arm", "arm", "rospy", "std_msgs", "hand_msgs", "python3-numpy", "tf2_ros")
+    package(tmp_path / "b" / "arm", "arm")
+    package(tmp_path / "b" / "leg", "leg")
+    (tmp_path / "b" / "leg" / "package.xml").write_text("<package><name>leg</name>")
+    environ = {"ROS_PACKAGE_PATH": os.pathsep.join([str(tmp_path / "a"), str(tmp_path / "b")])}
+    found = list(check_packages(Environment.read(environ), tmp_path))
+    texts = [each.text for each in found]
+    assert texts[0] == f"arm lies in {tmp_path}/a/arm and in {tmp_path}/b/arm: the first counts"
+    assert texts[1] == "arm needs hand_msgs, which is no package here"
+    assert f"{tmp_path}/b/leg/package.xml" in texts[2]
+    assert [each.status.value for each in found] == ["warning", "warning", "problem"]
+
+
+def test_a_workspace_that_was_not_sourced(tmp_path: Path) -> None:
+    (tmp_path / "devel").mkdir()
+    (tmp_path / "devel" / "setup.bash").touch()
+    package(tmp_path / "src" / "arm", "arm")
+    (finding,) = check_packages(Environment.read({}), tmp_path / "src" / "arm")
+    assert finding.advice == f"source {tmp_path}/devel/setup.bash"
+    (finding,) = check_packages(Environment.read({"ROS_PACKAGE_PATH": f"{tmp_path}/src"}), tmp_path / "src")
+    assert finding == Finding("packages", Status.OK, "1 in ROS_PACKAGE_PATH")
