@@ -11,7 +11,9 @@ PACKAGE = Path(__file__).parents[1] / "minirospy"
 
 LAYERS = [
     {"cli"},
-    {"introspect", "launch", "actionlib"},
+    {"testing"},
+    {"launch"},
+    {"introspect", "actionlib"},
     {"workspace"},
     {"client", "aio"},
     {"runtime"},

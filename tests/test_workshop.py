@@ -102,7 +102,6 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
     assert process.stdout is not None
     first = process.stdout.readline()
     assert "This node has been started." in first
-    time.sleep(0.3)  # until it is in rospy.sleep(5): from outside nothing tells when
     output = interrupt(process)
     assert "This node has been terminated." in output
     assert "Exit now" not in output

@@ -22,7 +22,7 @@ from typing import Any, NoReturn
 
 from minirospy.errors import MessageException, MinirospyError, ROSException, ServiceException, UsageError
 
-__all__ = ["Parser", "run"]
+__all__ = ["Parser", "complain", "refuse_bag", "run"]
 
 
 class _Help(argparse.HelpFormatter):
@@ -43,7 +43,21 @@ class Parser(argparse.ArgumentParser):
         super().__init__(*args, **{"formatter_class": _Help, **kwargs})
 
     def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (`{self.prog} -h` shows what there is)")
+        raise UsageError(f"{message}{self._nearest(message)} (`{self.prog} -h` shows what there is)")
+
+    def _nearest(self, message: str) -> str:
+        """The option that may have been meant, where ``message`` complains of one that does not exist."""
+        import difflib
+
+        _, found, words = message.partition("unrecognized arguments: ")
+        option = words.split()[0].partition("=")[0] if found else ""
+        near = difflib.get_close_matches(option, self._option_string_actions, n=1)
+        return f"; did you mean {near[0]}?" if near and option.startswith("--") else ""
+
+
+def refuse_bag(command: str) -> NoReturn:
+    """What an option that reads a bag file ends with. Raises MinirospyError: exit status 1."""
+    raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
 def run(name: str, body: Callable[[], int | None]) -> int:
@@ -53,9 +67,9 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         sys.stdout.flush()
         return status
     except UsageError as error:
-        return _complain(name, error, 2)
+        return complain(name, error, 2)
     except (MinirospyError, ROSException, ServiceException, MessageException) as error:
-        return _complain(name, error, 1)
+        return complain(name, error)
     except BrokenPipeError:
         # The reader (`| head`) has gone: quiet, also for the interpreter's own flush at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -64,7 +78,8 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         return 0
 
 
-def _complain(name: str, error: Exception, status: int) -> int:
+def complain(name: str, error: Exception, status: int = 1) -> int:
+    """One line on stderr, after all that was printed before; ``status`` comes back."""
     sys.stdout.flush()
     print(f"{name}: ERROR: {error}", file=sys.stderr)
     return status

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
 from minirospy.errors import MessageException, ValueTextError
@@ -30,13 +30,22 @@ def fields(message: Any, prefix: str = "") -> Iterator[Field]:
             yield Field(prefix + name, type_, value)
 
 
-def ask_for(message: Any, ask: Callable[[str], str], complain: Callable[[Exception], None]) -> Any:
+def ask_for(
+    message: Any,
+    ask: Callable[[str], str],
+    complain: Callable[[Exception], None],
+    known: Collection[str] = (),
+) -> Any:
     """``message`` with the answers to a question per field; an empty answer leaves a field as it is.
+
+    Of the message's own fields those in ``known`` are not asked for.
 
     ``ask(question)`` gives the answer. ``complain(error)`` is told of one that does not fit: then the question
     is asked again; it may raise instead.
     """
     for field in list(fields(message)):
+        if field.path.partition(".")[0] in known:
+            continue
         answer = ask(_question(field)).strip()
         while answer:
             try:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import minirospy
 from minirospy.cli.command import Parser, run
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
 from minirospy.runtime.access import Access, listening_lines
 from minirospy.runtime.log_file import LogFile
@@ -29,12 +29,7 @@ from minirospy.runtime.rosout import RosoutNode
 from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import is_address_in_use
 
-__all__ = ["main", "roscore"]
-
-DISTRO = "noetic\n"
-"""What /rosdistro says: the ROS 1 distribution whose behaviour is ours; with its line end, as ROS sets it."""
-
-ROS_VERSION = "1.17.0\n"
+__all__ = ["main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 _LEVELS = {
@@ -49,6 +44,11 @@ _LEVELS = {
 def roscore(argv: Sequence[str] | None = None) -> int:
     """The command `roscore`."""
     return _command("roscore", argv)
+
+
+def rosmaster(argv: Sequence[str] | None = None) -> int:
+    """The command `rosmaster`: a roscore without the /rosout node."""
+    return _command("rosmaster", [*(sys.argv[1:] if argv is None else argv), "--no-rosout"])
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, refuse_bag
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import UsageError
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 if TYPE_CHECKING:
@@ -33,22 +32,22 @@ def _show(command: str, kind: Kind, argv: Sequence[str]) -> None:
     parser = Parser(
         f"{command} show", description=f"Print the definition of a {kind.word} type, inner types unfolded."
     )
-    parser.add_argument("type", help=f"pkg/Name, or the Name alone for every {kind.word} type of that name")
+    _add_type(parser, kind)
     parser.add_argument(
         "-r", "--raw", action="store_true", help="print the definition's own text, with comments"
     )
-    if kind is Kind.MESSAGE:
-        parser.add_argument(
-            "-b", "--bag", metavar="BAGFILE", help="not here: types are read from packages alone"
-        )
+    parser.add_argument(
+        "-b", "--bag", metavar="BAGFILE", help=f"show {kind.word} from .bag file (not yet: bags come later)"
+    )
     options = parser.parse_args(argv)
-    if getattr(options, "bag", None):
-        raise UsageError("-b: types are read from packages alone, bags are not")
+    if options.bag:
+        refuse_bag(f"{command} show")
     interfaces = _interfaces(kind)
-    for type_ in interfaces.find(options.type):
-        if "/" not in options.type:
-            print(f"[{type_}]:")
-        print(interfaces.text(type_) if options.raw else interfaces.description(type_))
+    for name in _names(parser, options.type):
+        for type_ in interfaces.find(name.removesuffix(f".{kind.value}")):
+            if "/" not in name:
+                print(f"[{type_}]:")
+            print(interfaces.text(type_) if options.raw else interfaces.description(type_))
 
 
 def _list(command: str, kind: Kind, argv: Sequence[str]) -> None:
@@ -58,20 +57,23 @@ def _list(command: str, kind: Kind, argv: Sequence[str]) -> None:
 
 def _md5(command: str, kind: Kind, argv: Sequence[str]) -> None:
     parser = Parser(f"{command} md5", description=f"Print the md5sum of a {kind.word} type.")
-    parser.add_argument("type", help=f"pkg/Name, or the Name alone for every {kind.word} type of that name")
+    _add_type(parser, kind)
     options = parser.parse_args(argv)
     interfaces = _interfaces(kind)
-    for type_ in interfaces.find(options.type):
-        label = "" if "/" in options.type else f"[{type_}]: "
-        print(label + interfaces.md5sum(type_))
+    for name in _names(parser, options.type):
+        for type_ in interfaces.find(name):
+            label = "" if "/" in name else f"[{type_}]: "
+            print(label + interfaces.md5sum(type_))
 
 
 def _package(command: str, kind: Kind, argv: Sequence[str]) -> None:
     parser = Parser(f"{command} package", description=f"List the {kind.word} types of a package.")
-    parser.add_argument("package", help="the package's name")
+    parser.add_argument("package", nargs="?", help="the package's name; without it, read from standard input")
     parser.add_argument("-s", dest="one_line", action="store_true", help="on a single line")
     options = parser.parse_args(argv)
-    print((" " if options.one_line else "\n").join(_interfaces(kind).in_package(options.package)))
+    interfaces = _interfaces(kind)
+    for package in _names(parser, options.package):
+        print((" " if options.one_line else "\n").join(interfaces.in_package(package)))
 
 
 def _packages(command: str, kind: Kind, argv: Sequence[str]) -> None:
@@ -81,11 +83,31 @@ def _packages(command: str, kind: Kind, argv: Sequence[str]) -> None:
     print((" " if options.one_line else "\n").join(_interfaces(kind).packages()))
 
 
+def _add_type(parser: Parser, kind: Kind) -> None:
+    parser.add_argument(
+        "type",
+        nargs="?",
+        help=f"pkg/Name, or the Name alone for every {kind.word} type of that name; "
+        "without it, read from standard input: rostopic type /t | rosmsg show",
+    )
+
+
+def _names(parser: Parser, name: str | None) -> list[str]:
+    """The name that was typed, else those that a pipe brings."""
+    if name is not None:
+        return [name]
+    import sys
+
+    names = [] if sys.stdin.isatty() else sys.stdin.read().split()
+    if not names:
+        parser.error("a name is missing")
+    return names
+
+
 def _interfaces(kind: Kind) -> Interfaces:
-    from minirospy.environment import Environment
     from minirospy.workspace.packages import Packages
 
-    return Interfaces(Packages(Environment.read(host="localhost")), kind)
+    return Interfaces(Packages(), kind)
 
 
 def _family(command: str, kind: Kind) -> Family:

@@ -1,6 +1,6 @@
 """rosmsg-proto: a message or request of default values as YAML, for completion in shells and editors.
 
-Source: `rosmsg-proto -h` of ROS 1, whose text and exit statuses these are. `-e` and `-x` of the real one are left out.
+Source: `rosmsg-proto -h` of ROS 1, whose text and exit statuses these are.
 """
 
 from __future__ import annotations
@@ -29,6 +29,12 @@ def _main(argv: Sequence[str] | None) -> int:
     parser.add_argument("-s", "--silent", action="store_true", help="print no errors")
     parser.add_argument("-p", "--prefix", default="", help="what to print before each line")
     parser.add_argument("-H", "--no-hyphens", action="store_true", help="no quotation marks around it all")
+    parser.add_argument(
+        "-e", "--empty-arrays", action="store_true", help="arrays of no fixed length are empty"
+    )
+    parser.add_argument(
+        "-x", "--exclude-slots", default="", metavar="FIELDS", help="fields to leave out, with commas between"
+    )
     options = parser.parse_intermixed_args(argv)
 
     def fail(status: int, text: str) -> int:
@@ -42,7 +48,7 @@ def _main(argv: Sequence[str] | None) -> int:
     if options.mode not in ("msg", "srv"):
         return fail(1, f"Invalid mode: .{options.mode}")
     try:
-        text = _prototype(options.mode, options.type)
+        text = _prototype(options.mode, options.type, options.exclude_slots.split(","), options.empty_arrays)
     except (NotFoundError, DefinitionError) as error:
         return fail(1, f"Unknown message class: {options.type} ({error})")
     if options.flow_style:
@@ -53,20 +59,21 @@ def _main(argv: Sequence[str] | None) -> int:
     return 0
 
 
-def _prototype(mode: str, name: str) -> str:
-    from minirospy.environment import Environment
+def _prototype(mode: str, name: str, without: Sequence[str], empty_arrays: bool) -> str:
     from minirospy.idl.load import Catalogue
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.introspect.prototype import prototype
     from minirospy.workspace.packages import Packages
 
-    packages = Packages(Environment.read(host="localhost"))
+    packages = Packages()
     (type_, *_) = Interfaces(packages, Kind(mode)).find(name)
     catalogue = Catalogue(packages.folders())
     if mode == "msg":
-        return prototype(catalogue.message(type_), catalogue)
-    services = catalogue.services(type_.partition("/")[0])
-    return next(prototype(each.request, catalogue) for each in services if each.full_name == type_)
+        spec = catalogue.message(type_)
+    else:
+        services = catalogue.services(type_.partition("/")[0])
+        spec = next(each.request for each in services if each.full_name == type_)
+    return prototype(spec, catalogue, without=without, empty_arrays=empty_arrays)
 
 
 def _restyled(text: str, *, flow: bool) -> str:

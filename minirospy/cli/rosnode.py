@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, complain
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import NodeUnreachableError, NotFoundError, UsageError
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
@@ -45,6 +45,8 @@ def _ping(argv: Sequence[str]) -> int:
         "-c", dest="count", type=int, default=0, metavar="COUNT", help="number of pings to send"
     )
     options = parser.parse_args(argv)
+    if options.all and (options.node or options.count):
+        parser.error("-a pings all nodes once: it takes neither a name nor -c")
     with Graph.open("rosnode") as graph:
         if options.all:
             return _ping_all(graph)
@@ -77,7 +79,7 @@ def _ping_all(graph: Graph) -> int:
         try:
             _ping_once(graph, node, [])
         except NodeUnreachableError as error:
-            print(f"ERROR: {error}", file=sys.stderr)
+            complain("rosnode", error)
             silent += 1
     return 1 if silent else 0
 
@@ -115,7 +117,12 @@ def _info(argv: Sequence[str]) -> int:
     with Graph.open("rosnode") as graph:
         failed = 0
         for name in options.nodes:
-            detail = node_detail(graph, graph.resolve(name))
+            try:
+                detail = node_detail(graph, graph.resolve(name))
+            except NotFoundError as error:
+                complain("rosnode", error)
+                failed += 1
+                continue
             print(f"{_RULE}\nNode [{detail.name}]")
             print(_described(detail))
             if not options.quiet:
@@ -144,8 +151,7 @@ def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
     try:
         connections = node_connections(graph, NodeAddress(detail.name, detail.uri))
     except NodeUnreachableError as error:
-        sys.stdout.flush()
-        print(f"ERROR: {error}", file=sys.stderr)
+        complain("rosnode", error)
         return False
     print(f"Pid: {connections.pid}")
     if connections.links:
@@ -167,7 +173,7 @@ def _direction(direction: str, info: str) -> str:
     import re
 
     words = {"i": "inbound", "o": "outbound", "b": "bidirectional"}
-    match = re.match(r"TCPROS connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)
+    match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)
     numbers = f" ({match[1]} - {match[2]}) [{match[3]}]" if match else ""
     return words.get(direction, direction) + numbers
 
@@ -210,7 +216,9 @@ def _kill(argv: Sequence[str]) -> int:
         if options.all:
             nodes = graph.addresses(list_nodes(graph))
         elif options.nodes:
-            nodes = [find_node(graph, graph.resolve(name)) for name in options.nodes]
+            nodes = _known(graph, [graph.resolve(name) for name in options.nodes])
+            if len(nodes) < len(options.nodes):
+                return 1
         else:
             nodes = [find_node(graph, _chosen(list_nodes(graph)))]
         if not nodes:
@@ -224,6 +232,17 @@ def _kill(argv: Sequence[str]) -> int:
             kill_node(graph, node)
         print("killed")
         return 0
+
+
+def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
+    """The nodes of ``names`` that there are; of each other one it is said that it is not."""
+    found = []
+    for name in names:
+        try:
+            found.append(find_node(graph, name))
+        except NotFoundError as error:
+            complain("rosnode", error)
+    return found
 
 
 def _chosen(nodes: list[str]) -> str:
@@ -258,7 +277,7 @@ def _cleanup(argv: Sequence[str]) -> int:
             answer = sys.stdin.readline().strip()
             if answer in ("", "n"):
                 print("aborting")
-                return 1
+                return 0
             if answer == "y":
                 break
         for node in silent:

@@ -133,9 +133,7 @@ def _checked(line: _Line) -> _Verb:
 
 
 def _dependencies(complain: Callable[[ManifestError], None]) -> Dependencies:
-    from minirospy.environment import Environment
-
-    return Dependencies(Packages(Environment.read(host="localhost")), os.environ, complain)
+    return Dependencies(Packages(), os.environ, complain)
 
 
 def _not_found(verb: str, error: NotFoundError) -> str:

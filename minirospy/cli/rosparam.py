@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from minirospy.cli.command import Parser
 from minirospy.cli.verbs import Family, Verb
@@ -77,9 +76,11 @@ def _load(argv: Sequence[str]) -> None:
         if options.verbose:
             print(f"reading parameters from {'stdin' if from_stdin else f'[{options.file}]'}", flush=True)
         text = sys.stdin.read() if from_stdin else _read(options.file)
-        for file in parameters.parse_parameters(text, where, graph.resolve(options.namespace)):
+        files = parameters.parse_parameters(text, where, graph.resolve(options.namespace))
+        for file in files:
             if options.verbose and file.own_namespace:
                 print(f"reading parameters into namespace [{file.namespace}]")
+        for file in files:
             for name, value in parameters.set_parameter(graph, file.namespace, file.values):
                 if options.verbose:
                     print(f"{name}={value}")
@@ -88,7 +89,7 @@ def _load(argv: Sequence[str]) -> None:
 def _dump(argv: Sequence[str]) -> None:
     parser = Parser("rosparam dump", description="Write parameters to a YAML file, or to standard output.")
     parser.add_argument("file", nargs="?", default="-", help="the file; - for standard output")
-    parser.add_argument("namespace", nargs="?", default="/", help="only those below this name")
+    parser.add_argument("namespace", nargs="?", default="", help="only those below this name")
     _add_verbose(parser)
     options = parser.parse_args(argv)
     with Graph.open("rosparam") as graph:
@@ -101,7 +102,8 @@ def _dump(argv: Sequence[str]) -> None:
             print(f"dumping namespace [{namespace}] to file [{options.file}]")
             print("\n".join(f"{name}={value}" for name, value in parameters.flatten(namespace, values)))
         try:
-            Path(options.file).write_text(parameters.dump_parameters(values), encoding="utf-8")
+            with open(options.file, "w", encoding="utf-8") as stream:
+                stream.write(parameters.dump_parameters(values))
         except OSError as error:
             raise ValueTextError(options.file, f"cannot be written: {error.strerror}") from error
 
@@ -138,8 +140,11 @@ def _read(file: str) -> str:
 
 def _read_bytes(file: str) -> bytes:
     try:
-        return Path(file).read_bytes()
+        with open(file, "rb") as stream:
+            return stream.read()
     except FileNotFoundError:
+        from pathlib import Path
+
         beside = [str(Path(file).parent / each.name) for each in Path(file).absolute().parent.glob("*")]
         raise NotFoundError("file", file, beside) from None
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import subprocess
@@ -17,8 +18,9 @@ __all__ = ["main"]
 _USAGE = """usage: rosrun [--prefix COMMAND] [--debug] PACKAGE PROGRAM [arguments ...]
 
 Runs PROGRAM of PACKAGE with the arguments. Its exit status is the program's own; 1 where it is not found.
-  --prefix COMMAND  put COMMAND in front, as 'gdb --args'
-  --debug           print what is run
+PROGRAM is a file's name, wherever in PACKAGE it lies, or its path from there.
+  -p, --prefix COMMAND  put COMMAND in front, as 'gdb --args'
+  -d, --debug           print what is run
 """
 
 
@@ -33,37 +35,86 @@ def _rosrun(words: list[str]) -> int:
     debug = False
     # By hand: what follows PROGRAM is its own, also where it looks like an option of ours.
     while words and words[0].startswith("-"):
-        option = words.pop(0)
+        option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
             print(_USAGE, end="")
             return 0
-        if option in ("-d", "--debug"):
+        if option in ("-d", "--debug") and not equals:
             debug = True
-        elif option in ("-p", "--prefix") and words:
-            prefix = shlex.split(words.pop(0))
+        elif option in ("-p", "--prefix") and (equals or words):
+            prefix = _split(value if equals else words.pop(0))
         else:
             raise UsageError(
                 f"option {option} is unknown, or lacks its value (`rosrun -h` shows what there is)"
             )
+    packages = Packages()
     if len(words) < 2:
-        raise UsageError("type rosrun PACKAGE PROGRAM (`rosrun -h` shows more)")
+        programs = ", ".join(packages.executables(words[0])) if words else ""
+        raise UsageError(
+            "type rosrun PACKAGE PROGRAM"
+            + (f": [{words[0]}] has {programs}" if programs else " (`rosrun -h` shows more)")
+        )
     package, program, *arguments = words
-    command = [*prefix, *Packages().find_executable(package, program), *arguments]
+    commands = packages.find_executables(package, program)
+    chosen = commands[0] if len(commands) == 1 else _choose(package, commands, packages)
+    command = [*prefix, *chosen, *arguments]
     if debug:
-        print(shlex.join(command), file=sys.stderr, flush=True)
+        print(f"[rosrun] Looking in rospack dir: {packages.find(package)}", file=sys.stderr)
+        print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)
+    sys.stdout.flush()
+    return _replace(command)
+
+
+def _split(prefix: str) -> list[str]:
+    try:
+        return shlex.split(prefix)
+    except ValueError as error:
+        raise UsageError(f"--prefix [{prefix}]: {error}") from error
+
+
+def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
+    """The program that the person at the terminal chooses of several of one name."""
+    paths = [command[-1] for command in commands]
+    print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
+    for number, path in enumerate(paths, 1):
+        print(f"{number}) {path}", file=sys.stderr)
+    while True:
+        print("#? ", end="", file=sys.stderr, flush=True)
+        answer = sys.stdin.readline()
+        if not answer:
+            near = os.path.relpath(paths[0], packages.find(package)).replace(os.sep, "/")
+            raise UsageError(f"nobody chose: name the path, as `rosrun {package} {near}`")
+        if answer.strip().isdecimal() and 1 <= int(answer) <= len(commands):
+            return commands[int(answer) - 1]
+
+
+def _replace(command: list[str]) -> int:
+    """Become the program: its signals and its exit status are this process's."""
     if sys.platform == "win32":
         # Windows has no exec that keeps the console: wait, and let Ctrl-C be the program's.
-        with subprocess.Popen(command) as popen:
-            while True:
-                try:
-                    return popen.wait()
-                except KeyboardInterrupt:
-                    continue
-    sys.stdout.flush()
+        try:
+            with subprocess.Popen(command) as popen:
+                while True:
+                    try:
+                        return popen.wait()
+                    except KeyboardInterrupt:
+                        continue
+        except OSError as error:
+            raise UsageError(f"cannot run {command[0]}: {error.strerror}") from error
     try:
         os.execvp(command[0], command)
     except OSError as error:
-        raise UsageError(f"cannot run {command[0]}: {error.strerror}") from error
+        if error.errno == errno.ENOEXEC:
+            # A script without a first line that says what runs it: shells run it themselves.
+            os.execv("/bin/sh", ["/bin/sh", *command])
+        why = error.strerror or str(error)
+        if error.errno == errno.ENOENT and os.path.isfile(command[0]):
+            with open(command[0], "rb") as file:
+                line = file.readline(200).decode("utf-8", "replace").rstrip("\n")
+            why = f"its first line asks for [{line.removeprefix('#!').strip()}], which is not there"
+            if line.endswith("\r"):
+                why = "its lines end as those of Windows: save it with Unix line ends (`sed -i 's/\\r$//' FILE`)"
+        raise UsageError(f"cannot run {command[0]}: {why}") from error
 
 
 if __name__ == "__main__":

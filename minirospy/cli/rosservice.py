@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, complain
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 from minirospy.introspect import services
@@ -75,7 +75,7 @@ def _call(argv: Sequence[str]) -> None:
         epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order.',
     )
     parser.add_argument("service", help="the service's name")
-    parser.add_argument("args", nargs="*", help="the request's values")
+    parser.add_argument("args", nargs="*", help="the request's values; a terminal asks for missing ones")
     parser.add_argument("-v", dest="verbose", action="store_true", help="print the request, too")
     parser.add_argument("--wait", action="store_true", help="wait until the service is there")
     options = parser.parse_intermixed_args(argv)
@@ -84,30 +84,47 @@ def _call(argv: Sequence[str]) -> None:
         if options.wait:
             services.wait_for_service(graph, service)
         type_ = services.service_type(graph, service)
-        for values in _requests(type_, options.args):
-            request = services.fill_request(type_, values)
+        for request in _requests(type_, options.args):
             if options.verbose:
                 print(f"{request}\n---", flush=True)
             print(services.call_service(graph, service, type_, request), flush=True)
 
 
-def _requests(type_: str, texts: Sequence[str]) -> Iterator[list[Any]]:
-    """The values of each request: one from the command line, or one for each document on standard input."""
-    from minirospy.introspect.values import parse_documents, parse_value
+def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
+    """Each request: one of the values typed, or one for each document on standard input.
+
+    In a terminal the fields that have no value yet are asked for.
+    """
+    from minirospy.introspect.values import message_values, parse_arguments, parse_lines
 
     names = services.service_arguments(type_)
-    if texts:
-        yield [parse_value(text) for text in texts]
-    elif not names:
-        yield []
-    elif sys.stdin.isatty():
-        raise UsageError(f"please specify service arguments: {' '.join(names)}")
+    values = parse_arguments(texts)
+    by_name = len(values) == 1 and isinstance(values[0], dict)
+    if sys.stdin.isatty() and len(values) < len(names) and not by_name:
+        yield _asked_for(
+            services.fill_request(type_, [dict(zip(names, values, strict=False))]), names[: len(values)]
+        )
+    elif texts or not names:
+        yield services.fill_request(type_, values)
     else:
-        documents = [each for each in parse_documents(sys.stdin.read(), "standard input") if each is not None]
-        if not documents:
+        found = False
+        for each in message_values(parse_lines(sys.stdin, "standard input")):
+            found = True
+            yield services.fill_request(type_, each)
+        if not found:
             raise UsageError(f"please specify service arguments: {' '.join(names)}")
-        for document in documents:
-            yield document if isinstance(document, list) else [document]
+
+
+def _asked_for(request: Any, known: Sequence[str]) -> Any:
+    from minirospy.cli.form import ask_for
+
+    def refuse(error: Exception) -> None:
+        complain("rosservice", error)
+
+    try:
+        return ask_for(request, input, refuse, known)
+    except EOFError:
+        raise UsageError("the input ended before all values were given") from None
 
 
 def _one_service(verb: str, description: str, argv: Sequence[str]) -> str:

@@ -5,32 +5,26 @@ Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
 
 from __future__ import annotations
 
-import re
+import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, refuse_bag
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import NotFoundError, UsageError
+from minirospy.errors import NotFoundError
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Callable, Iterator, Sequence
 
     from minirospy.introspect.graph import NodeAddress
-    from minirospy.introspect.rates import Spread
-    from minirospy.introspect.streams import Received, ToolNode, TopicPublisher
+    from minirospy.introspect.streams import Received, ToolNode
 
 __all__ = ["main"]
 
 _CLEAR_SCREEN = "\033[2J\033[;H"
-_LATCH_SECONDS = 3.0
-_FILE_RATE = 10.0
-_CONNECT_SECONDS = 0.5
-_NEGATIVE_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
-_SHIELD = "\0"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -44,12 +38,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _list(argv: Sequence[str]) -> None:
     parser = Parser("rostopic list", description="List the topics, or those in a namespace.")
     parser.add_argument("namespace", nargs="?", help="only topics at or below this name")
+    _add_bag(parser, "list topics in .bag file")
     parser.add_argument("-v", "--verbose", action="store_true", help="list full details about each topic")
     side = parser.add_mutually_exclusive_group()
     side.add_argument("-p", dest="publishers", action="store_true", help="list only publishers")
     side.add_argument("-s", dest="subscribers", action="store_true", help="list only subscribers")
     parser.add_argument("--host", action="store_true", help="group by host name")
     options = parser.parse_args(argv)
+    if options.bag:
+        refuse_bag("rostopic list")
     with Graph.open("rostopic") as graph:
         namespace = graph.resolve(options.namespace) if options.namespace else "/"
         if not options.verbose and not options.host:
@@ -137,45 +134,47 @@ def _one_topic(verb: str, description: str, argv: Sequence[str]) -> str:
 
 def _echo(argv: Sequence[str]) -> None:
     parser = Parser("rostopic echo", description="Print the messages of a topic, or one field of them.")
-    parser.add_argument(
-        "topic", help="the topic, with a field's path behind it where wanted: /pose/position/x"
-    )
-    parser.add_argument(
-        "-c", "--clear", action="store_true", help="clear screen before printing next message"
-    )
-    parser.add_argument(
-        "-n", dest="count", type=int, default=0, metavar="COUNT", help="number of messages to echo"
-    )
-    parser.add_argument("-p", dest="plot", action="store_true", help="echo in a plotting friendly format")
-    parser.add_argument(
-        "-w", dest="width", type=int, metavar="NUM_WIDTH", help="fixed width for numeric values"
-    )
-    parser.add_argument(
-        "--filter", metavar="EXPRESSION", help="print only messages m for which this Python is true"
-    )
-    parser.add_argument("--nostr", action="store_true", help="exclude string fields")
-    parser.add_argument("--noarr", action="store_true", help="exclude arrays")
-    parser.add_argument(
-        "--offset", action="store_true", help="display time as offsets from current time (in seconds)"
-    )
+    add = parser.add_argument
+    add("topic", nargs="?", help="the topic, with a field's path behind it where wanted: /pose/position/x")
+    _add_bag(parser, "echo messages from .bag file")
+    add("-p", dest="plot", action="store_true", help="echo in a plotting friendly format")
+    add("-w", dest="width", type=int, metavar="NUM_WIDTH", help="fixed width for numeric values, at least 2")
+    add("--filter", metavar="EXPRESSION", help="print only messages m for which this Python is true")
+    add("--nostr", action="store_true", help="exclude string fields")
+    add("--noarr", action="store_true", help="exclude arrays")
+    add("-c", "--clear", action="store_true", help="clear screen before printing next message")
+    add("-a", "--all", action="store_true", help="display all messages of a bag, with -b only")
+    add("-n", dest="count", type=int, metavar="COUNT", help="number of messages to echo")
+    add("--offset", action="store_true", help="display time as offsets from current time (in seconds)")
     options = parser.parse_intermixed_args(argv)
+    if options.bag:
+        refuse_bag("rostopic echo")
+    if options.topic is None:
+        parser.error("a topic is missing")
+    if options.all:
+        parser.error("-a displays all messages of a bag: it needs -b")
+    if options.width is not None and options.width < 2:
+        parser.error("-w: the fixed width of numbers is at least 2")
     from minirospy.introspect.echo import Echo, Filter
     from minirospy.introspect.streams import wait_for_topic
 
     keep = Filter(options.filter) if options.filter else None
     with Graph.open("rostopic") as graph:
         topic = graph.resolve(options.topic)
+        if options.count is not None and options.count <= 0:
+            return
         field = wait_for_topic(graph, topic, lambda: _warn_unpublished(topic))
-    echo = Echo(
-        field,
-        plot=options.plot,
-        strings=not options.nostr,
-        arrays=not options.noarr,
-        width=options.width,
-        offset=options.offset,
-    )
     printed = 0
-    with _tool_node() as node:
+    with _tool_node(ros_time=True) as node:
+        echo = Echo(
+            field,
+            plot=options.plot,
+            strings=not options.nostr,
+            arrays=not options.noarr,
+            width=options.width,
+            offset=options.offset,
+            now=node.clock.now,
+        )
         for received in node.inbox(field.topic):
             message = echo.message(received)
             if keep and not keep(message, field.topic):
@@ -185,7 +184,7 @@ def _echo(argv: Sequence[str]) -> None:
             except IndexError as error:
                 print(f"rostopic: {error}", file=sys.stderr)
                 continue
-            sys.stdout.write(_CLEAR_SCREEN + text if options.clear else text)
+            sys.stdout.write(_CLEAR_SCREEN + text if options.clear and not options.plot else text)
             sys.stdout.flush()
             printed += 1
             if printed == options.count:
@@ -200,16 +199,18 @@ def _hz(argv: Sequence[str]) -> None:
         "--filter", metavar="EXPRESSION", help="only measure messages m for which this Python is true"
     )
     parser.add_argument(
-        "--wall-time", action="store_true", help="measure by the wall's clock, as is done anyway"
+        "--wall-time",
+        action="store_true",
+        help="measure by the machine's clock, even where /clock tells another",
     )
     parser.add_argument("--tcpnodelay", action="store_true", help="use the TCP_NODELAY transport hint")
     options = parser.parse_intermixed_args(argv)
     from minirospy.introspect.echo import Filter
-    from minirospy.introspect.rates import RateWindow
+    from minirospy.introspect.rates import RateWindow, rate_text
 
     keep = Filter(options.filter) if options.filter else None
     windows: dict[str, RateWindow] = {}
-    with _tool_node() as node:
+    with _tool_node(ros_time=not options.wall_time) as node:
         for name in _published_topics(options.topics):
             window = windows[name] = RateWindow(options.window)
 
@@ -217,74 +218,34 @@ def _hz(argv: Sequence[str]) -> None:
                 if keep is None or keep(node.classes.read(received), topic):
                     window.add(received.time)
 
-            node.measure(name, count, tcp_nodelay=options.tcpnodelay)
-            print(f"subscribed to [{name}]", flush=True)
+            _measure(node, name, count, options.tcpnodelay)
         while not node.wait(1.0):
-            print(_rates({name: window.report() for name, window in windows.items()}), flush=True)
-
-
-def _rates(reports: dict[str, Spread | None]) -> str:
-    if len(reports) == 1:
-        (report,) = reports.values()
-        if report is None:
-            return "no new messages"
-        return f"average rate: {report.rate:.3f}\n\t{_spread(report)}"
-    rows = [
-        (name, *(_four_digits(number) for number in (r.rate, r.min, r.max, r.std_dev)), str(r.window))
-        for name, r in reports.items()
-        if r is not None
-    ]
-    if not rows:
-        return "no new messages"
-    head = ("topic", "rate", "min_delta", "max_delta", "std_dev", "window")
-    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
-    lines = ["   ".join(text.center(width) for text, width in zip(head, widths, strict=True)).rstrip()]
-    lines.append("=" * (sum(widths) + 3 * (len(widths) - 1)))
-    lines += ["   ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join(lines) + "\n"
-
-
-def _four_digits(number: float) -> str:
-    return str(float(f"{number:.4g}"))
-
-
-def _spread(report: Spread) -> str:
-    return (
-        f"min: {report.min:.3f}s max: {report.max:.3f}s "
-        f"std dev: {report.std_dev:.5f}s window: {report.window}"
-    )
+            print(rate_text({name: window.report() for name, window in windows.items()}), flush=True)
 
 
 def _bw(argv: Sequence[str]) -> None:
-    parser = Parser("rostopic bw", description="Print the bandwidth that a topic takes, once a second.")
-    parser.add_argument("topic", help="the topic's name")
+    parser = Parser("rostopic bw", description="Print the bandwidth that topics take, once a second.")
+    parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics")
     _add_window(parser, default=100)
-    options = parser.parse_args(argv)
-    from minirospy.introspect.rates import BandwidthWindow
+    options = parser.parse_intermixed_args(argv)
+    import time
 
-    window = BandwidthWindow(options.window)
+    from minirospy.introspect.rates import BandwidthWindow, bandwidth_text
+
+    windows: dict[str, BandwidthWindow] = {}
     with _tool_node() as node:
-        (topic,) = _published_topics([options.topic])
-        node.measure(topic, lambda received: window.add(received.time, len(received.body)))
-        print(f"subscribed to [{topic}]", flush=True)
-        import time
+        for name in _published_topics(options.topics):
+            window = windows[name] = BandwidthWindow(options.window)
 
+            def add(received: Received, window: BandwidthWindow = window) -> None:
+                window.add(received.time, len(received.body))
+
+            _measure(node, name, add)
         while not node.wait(1.0):
-            report = window.report(time.time())
-            if report is None:
-                continue
-            unit, size = _unit(report.rate)
-            mean, low, high = (
-                f"{number / size:.2f}{unit}" for number in (report.mean, report.min, report.max)
-            )
-            print(f"average: {report.rate / size:.2f}{unit}/s")
-            print(f"\tmean: {mean} min: {low} max: {high} window: {report.window}", flush=True)
-
-
-def _unit(rate: float) -> tuple[str, float]:
-    if rate < 1000.0:
-        return "B", 1.0
-    return ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
+            now = time.time()
+            text = bandwidth_text({name: window.report(now) for name, window in windows.items()})
+            if text:
+                print(text, flush=True)
 
 
 def _delay(argv: Sequence[str]) -> None:
@@ -295,10 +256,10 @@ def _delay(argv: Sequence[str]) -> None:
     _add_window(parser, default=0)
     parser.add_argument("--tcpnodelay", action="store_true", help="use the TCP_NODELAY transport hint")
     options = parser.parse_args(argv)
-    from minirospy.introspect.rates import DelayWindow
+    from minirospy.introspect.rates import DelayWindow, delay_text
 
     window = DelayWindow(options.window)
-    with _tool_node() as node:
+    with _tool_node(ros_time=True) as node:
         (topic,) = _published_topics([options.topic])
         unstamped: list[str] = []
 
@@ -310,18 +271,20 @@ def _delay(argv: Sequence[str]) -> None:
                 unstamped.append(message._type)
                 node.stop()
 
-        node.measure(topic, add, tcp_nodelay=options.tcpnodelay)
-        print(f"subscribed to [{topic}]", flush=True)
+        _measure(node, topic, add, options.tcpnodelay)
         while not node.wait(1.0):
-            report = window.report()
-            if report is None:
-                print("no new messages", flush=True)
-            else:
-                print(f"average delay: {report.mean:.3f}\n\t{_spread(report)}", flush=True)
+            print(delay_text(window.report()), flush=True)
         if unstamped:
             raise NotFoundError(
                 "header", topic, hint=f"messages of [{unstamped[0]}] have no stamp to measure by"
             )
+
+
+def _measure(
+    node: ToolNode, topic: str, add: Callable[[Received], object], tcp_nodelay: bool = False
+) -> None:
+    node.measure(topic, add, tcp_nodelay=tcp_nodelay)
+    print(f"subscribed to [{topic}]", flush=True)
 
 
 def _add_window(parser: Parser, default: int) -> None:
@@ -330,14 +293,19 @@ def _add_window(parser: Parser, default: int) -> None:
     )
 
 
+def _add_bag(parser: Parser, what: str) -> None:
+    parser.add_argument("-b", "--bag", metavar="BAGFILE", help=f"{what} (not yet: bags come later)")
+
+
 def _published_topics(names: Sequence[str]) -> list[str]:
-    """The global names of topics; one that nobody publishes yet is warned of."""
+    """The global names of topics, also where a field of one is named; one that nobody publishes yet is warned of."""
+    found = []
     with Graph.open("rostopic") as graph:
-        found = [graph.resolve(name) for name in names]
-        published = graph.state().publishers
-    for topic in found:
-        if topic not in published:
-            _warn_unpublished(topic)
+        for name in map(graph.resolve, names):
+            field = topics.find_topic(graph, name)
+            found.append(field.topic if field else name)
+            if not field:
+                _warn_unpublished(name)
     return found
 
 
@@ -346,175 +314,28 @@ def _warn_unpublished(topic: str) -> None:
     print(f"WARNING: topic [{topic}] does not appear to be published yet", file=sys.stderr)
 
 
-# --- publishing
-
-
 def _pub(argv: Sequence[str]) -> None:
-    parser = Parser(
-        "rostopic pub",
-        description="Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
-        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
-        "Without arguments, messages are read from standard input, with --- between them.",
-    )
-    parser.add_argument("topic", help="the topic's name")
-    parser.add_argument("type", help="the message type, as std_msgs/Bool")
-    parser.add_argument(
-        "args", nargs="*", help="the message's values; `now` is the time, header: auto is stamped"
-    )
-    parser.add_argument("-v", dest="verbose", action="store_true", help="print verbose output")
-    parser.add_argument("-r", "--rate", type=_positive, metavar="RATE", help="publishing rate (hz)")
-    parser.add_argument("-1", "--once", action="store_true", help="publish one message and exit")
-    parser.add_argument(
-        "-f", "--file", metavar="FILE", help="read messages from a YAML file, with --- between them"
-    )
-    parser.add_argument(
-        "-l", "--latch", action="store_true", help="latch: whoever joins later gets the last message"
-    )
-    parser.add_argument(
-        "-s",
-        "--substitute-keywords",
-        action="store_true",
-        help="with a rate: `now` and `auto` anew for each message",
-    )
-    options = parser.parse_intermixed_args([_shield(word) for word in argv])
-    options.args = [word.removeprefix(_SHIELD) for word in options.args]
-    from minirospy.idl.load import message_class
-    from minirospy.introspect.echo import fill_message
-    from minirospy.names import is_legal_name
+    from minirospy.cli.rostopic_pub import publish
 
-    cls = message_class(options.type)
-    with Graph.open("rostopic") as graph:
-        topic = graph.resolve(options.topic)
-        if not is_legal_name(topic):
-            raise UsageError(f"[{options.topic}] is not a legal name of a topic: letters, digits, _ and /")
-        all_values = _messages_to_publish(cls, options)
-        values = next(all_values)
-        # Before the node is there, so that a typing error shows at once.
-        message = fill_message(cls, values)
-        _warn_other_type(graph, topic, cls._type)
-    # One message stays for late subscribers; a stream of them does not, unless asked to.
-    from_documents = bool(not options.args and (cls.__slots__ or options.file))
-    streaming = options.rate is not None or from_documents
-    with _tool_node() as node:
-        publisher = node.publisher(topic, cls, latch=options.once or options.latch or not streaming)
-        shown = f"[{message}]" if options.verbose else "message"
-        if options.once:
-            print(f"publishing and latching {shown} for {_LATCH_SECONDS} seconds", flush=True)
-            publisher.publish(message)
-            node.wait(_LATCH_SECONDS)
-        elif not streaming or (options.latch and options.rate is None):
-            print(f"publishing and latching {shown}. Press ctrl-C to terminate", flush=True)
-            publisher.publish(message)
-            while not node.wait(3600.0):
-                pass
-        elif from_documents:
-            _publish_all(node, publisher, message, (fill_message(cls, each) for each in all_values), options)
-        else:
-            anew = options.substitute_keywords
-            _publish_at_rate(node, publisher, lambda: fill_message(cls, values) if anew else message, options)
+    publish(argv, lambda ros_time: _tool_node(ros_time=ros_time))
 
 
-def _publish_at_rate(
-    node: ToolNode, publisher: TopicPublisher, message: Callable[[], Any], options: argparse.Namespace
-) -> None:
-    import time
+@contextlib.contextmanager
+def _tool_node(*, ros_time: bool = False) -> Iterator[ToolNode]:
+    import signal
 
-    start, sent = time.monotonic(), 0
-    while not node.ended.is_set():
-        current = message()
-        if options.verbose:
-            print(f"publishing {current}", flush=True)
-        publisher.publish(current)
-        sent += 1
-        # From the start, not from the last message: pauses that come out too long do not add up.
-        if node.wait(max(0.0, start + sent / options.rate - time.monotonic())):
-            return
-
-
-def _publish_all(
-    node: ToolNode, publisher: TopicPublisher, first: Any, rest: Iterator[Any], options: argparse.Namespace
-) -> None:
-    pause = 1.0 / (options.rate or _FILE_RATE)
-    # The first messages of a stream have nobody to go to before subscribers have connected.
-    node.wait(_CONNECT_SECONDS)
-    for message in (each for part in ((first,), rest) for each in part):
-        if options.verbose:
-            print(f"publishing {message}", flush=True)
-        publisher.publish(message)
-        if node.wait(pause):
-            return
-
-
-def _messages_to_publish(cls: type[Any], options: argparse.Namespace) -> Iterator[list[Any]]:
-    """The YAML values of each message: from the command line, a file, or standard input. At least one."""
-    from minirospy.introspect.values import parse_documents, parse_value
-
-    if options.args:
-        yield [parse_value(word) for word in options.args]
-        return
-    if options.file is None and not cls.__slots__:
-        yield []
-        return
-    where = options.file or "standard input"
-    if options.file is not None:
-        text = _read_text(options.file)
-    elif sys.stdin.isatty():
-        raise UsageError(f"please specify message values: {' '.join(cls.__slots__)}")
-    else:
-        text = sys.stdin.read()
-    found = False
-    for document in parse_documents(text, where):
-        if document is not None:
-            found = True
-            yield document if isinstance(document, list) else [document]
-    if not found:
-        raise UsageError(
-            f"{where} holds no message; please specify message values: {' '.join(cls.__slots__)}"
-        )
-
-
-def _read_text(file: str) -> str:
-    from pathlib import Path
-
-    try:
-        return Path(file).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise NotFoundError(
-            "file", file, hint=getattr(error, "strerror", None) or "it is not UTF-8 text"
-        ) from error
-
-
-def _warn_other_type(graph: Graph, topic: str, type_: str) -> None:
-    state = graph.state()
-    # The master remembers the type of a topic that everybody has left: that one is free.
-    used = topic in state.publishers or topic in state.subscribers
-    other = graph.master.get_topic_types().get(topic, "*")
-    if used and other not in ("*", type_):
-        print(f"WARNING: topic [{topic}] is of type [{other}] already, not [{type_}]", file=sys.stderr)
-
-
-def _positive(text: str) -> float:
-    import argparse
-
-    try:
-        rate = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"rate must be a number, not {text}") from None
-    if not 0.0 < rate < 1e6:
-        raise argparse.ArgumentTypeError("rate must be greater than zero")
-    return rate
-
-
-def _shield(word: str) -> str:
-    """Negative numbers as values beside an option that is called `-1`."""
-    return _SHIELD + word if word != "-1" and _NEGATIVE_NUMBER.match(word) else word
-
-
-def _tool_node() -> ToolNode:
     from minirospy.environment import Environment
     from minirospy.introspect.streams import ToolNode
 
-    return ToolNode(Environment.read(), "rostopic")
+    # Ended as by Ctrl-C: a tool that is killed in passing must not stay registered.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with ToolNode(Environment.read(), "rostopic", ros_time=ros_time) as node:
+            if node.simulated:
+                print("WARNING: may be using simulated time", file=sys.stderr)
+            yield node
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 _FAMILY = Family(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -43,7 +44,8 @@ class Echo:
     """Turns the messages of a topic, or a field of them, into what is printed, each ending with a line feed.
 
     ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
-    such fields are shown. ``width``: of numbers. ``offset``: times as differences from now.
+    such fields are shown. ``width``: of numbers. ``offset``: times as differences from ``now()``, which is
+    the time in nanoseconds.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Echo:
         arrays: bool = True,
         width: int | None = None,
         offset: bool = False,
+        now: Callable[[], int] = time.time_ns,
     ) -> None:
         self._path = field.path
         self._steps = parse_path(field.path)
@@ -63,6 +66,8 @@ class Echo:
         self._arrays = arrays
         self._width = width
         self._offset = offset
+        self._now = now
+        self._type = ""
         self._classes = MessageClasses()
         self._checked: type[Any] | None = None
         self._header_written = False
@@ -75,7 +80,7 @@ class Echo:
         if type(message) is not self._checked:
             self._checked = type(message)
             if get_message_class(message._type) is type(message):
-                field_type(type(message), self._path)
+                self._type = field_type(type(message), self._path)
         return message
 
     def text(self, message: Any, received: Received) -> str:
@@ -85,12 +90,14 @@ class Echo:
 
     def _row(self, value: Any, received: Received) -> str:
         stamped = getattr(value, "_has_header", False)
-        nanoseconds = value.header.stamp.to_nsec() if stamped else received.nanoseconds
+        origin = self._now() if self._offset else 0
+        nanoseconds = (value.header.stamp.to_nsec() if stamped else received.nanoseconds) - origin
         header = ""
         if not self._header_written:
             self._header_written = True
             header = plot_header(value, strings=self._strings, arrays=self._arrays) + "\n"
-        return header + plot_row(value, nanoseconds, strings=self._strings, arrays=self._arrays) + "\n"
+        row = plot_row(value, nanoseconds, strings=self._strings, arrays=self._arrays, origin=origin)
+        return header + row + "\n"
 
     def _block(self, value: Any) -> str:
         from minirospy.idl.message import strify_message
@@ -98,17 +105,17 @@ class Echo:
         if isinstance(value, bytes):
             value = list(value)
         if not (self._strings and self._arrays):
-            value = _elided(value, "", self._strings, self._arrays)
-        now = Time.from_sec(_now()) if self._offset else None
+            value = _elided(value, self._type, self._strings, self._arrays)
+        now = Time(*divmod(self._now(), 10**9)) if self._offset else None
         return strify_message(value, time_offset=now, fixed_numeric_width=self._width) + "\n---\n"
 
 
-def fill_message(cls: type[Any], values: Sequence[Any]) -> Any:
-    """A message of YAML values; ``now`` is the time, ``auto`` a stamped header.
+def fill_message(cls: type[Any], values: Sequence[Any], nanoseconds: int | None = None) -> Any:
+    """A message of YAML values; ``now`` is the time, ``auto`` a stamped header (``nanoseconds``: what time it is).
 
     Raises MessageException where they do not fit, with the names of the fields that there are.
     """
-    now = Time.from_sec(_now())
+    now = Time(*divmod(time.time_ns() if nanoseconds is None else nanoseconds, 10**9))
     from minirospy.idl.load import get_message_class
 
     keys: dict[str, Any] = {"now": now}
@@ -152,9 +159,3 @@ def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
 @lru_cache(maxsize=256)
 def _class_with_types(cls: Any, types: tuple[str, ...]) -> type[Any]:
     return type(cls.__name__, cls.__bases__, {"__slots__": cls.__slots__, "_slot_types": list(types)})
-
-
-def _now() -> float:
-    import time
-
-    return time.time()

@@ -13,7 +13,7 @@ from minirospy.errors import NotFoundError, UsageError
 
 __all__ = ["Step", "field_type", "field_value", "parse_path"]
 
-_STEP = re.compile(r"^(\w+)(?:\[(-?\d*)(:?)(-?\d*)\])?$")
+_STEP = re.compile(r"^(\w+)(?:\[(-?\d+|-?\d*(?::-?\d*){1,2})\])?$")
 
 
 _TIMES = {
@@ -42,6 +42,8 @@ def field_value(message: Any, steps: tuple[Step, ...]) -> Any:
     """
     value: Any = message
     for at, (name, index) in enumerate(steps):
+        if isinstance(value, list | tuple | bytes):
+            raise _array_as_message(steps[at - 1].name, name)
         value = _attribute(value, name)
         if index is None:
             continue
@@ -65,7 +67,12 @@ def field_type(message_class: type[Any], path: str) -> str:
     from minirospy.idl.load import message_class as load_class
 
     type_: str = message_class._type
-    for at, (name, index) in enumerate(parse_path(path)):
+    before = Step("", None)
+    for at, step in enumerate(parse_path(path)):
+        name, index = step
+        if type_.endswith("]") and before.element is None:
+            raise _array_as_message(before.name, name)
+        before = step
         if type_ in _TIMES:
             if name not in _TIMES[type_]:
                 raise NotFoundError("field", name, _TIMES[type_], f"[{type_}] has {' '.join(_TIMES[type_])}")
@@ -84,15 +91,14 @@ def field_type(message_class: type[Any], path: str) -> str:
 def _parse_step(part: str, path: str) -> Step:
     match = _STEP.match(part)
     if not match:
-        raise UsageError(f"field path [{path}]: [{part}] is none of field, field[0], field[1:3]")
-    name, first, colon, last = match.groups()
-    if first is None:
+        raise UsageError(f"field path [{path}]: [{part}] is none of field, field[0], field[1:3], field[::2]")
+    name, index = match.groups()
+    if index is None:
         return Step(name, None)
-    if colon:
-        return Step(name, slice(int(first) if first else None, int(last) if last else None))
-    if not first or last:
-        raise UsageError(f"field path [{path}]: [{part}] has no index")
-    return Step(name, int(first))
+    numbers = [int(number) if number else None for number in index.split(":")]
+    if numbers[2:] == [0]:
+        raise UsageError(f"field path [{path}]: [{part}] has a step of 0")
+    return Step(name, slice(*numbers) if ":" in index else numbers[0])
 
 
 def _attribute(value: Any, name: str) -> Any:
@@ -100,6 +106,11 @@ def _attribute(value: Any, name: str) -> Any:
         return getattr(value, name)
     except AttributeError:
         raise _no_field(type(value), name) from None
+
+
+def _array_as_message(array: str, name: str) -> NotFoundError:
+    hint = f"[{array}] is an array: {array}[0]/{name} is that of its first element, {array}[:]/{name} of all"
+    return NotFoundError("field", name, hint=hint)
 
 
 def _no_field(message_class: type[Any], name: str) -> NotFoundError:

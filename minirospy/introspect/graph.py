@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy import names
+from minirospy.environment import master_and_namespace
 from minirospy.errors import NotFoundError, RpcRefused
 from minirospy.runtime.master_proxy import MasterProxy
 
@@ -39,11 +41,8 @@ class Graph:
     @classmethod
     def open(cls, tool: str, environ: Mapping[str, str] | None = None) -> Graph:
         """The graph that the environment names. Raises UsageError on a bad ROS_MASTER_URI."""
-        from minirospy.environment import Environment
-
-        # A tool that only asks is reached by nobody: no look-up of this machine's own name.
-        environment = Environment.read(environ, host="localhost")
-        return cls(MasterProxy(environment.master_uri, "/" + tool), tool, environment.namespace)
+        master_uri, namespace = master_and_namespace(os.environ if environ is None else environ)
+        return cls(MasterProxy(master_uri, "/" + tool), tool, namespace)
 
     def __enter__(self) -> Graph:
         return self

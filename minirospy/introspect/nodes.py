@@ -9,7 +9,7 @@ import contextlib
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import NodeUnreachableError, NotFoundError, RpcError, RpcRefused
+from minirospy.errors import NodeUnreachableError, NotFoundError, RpcError, RpcRefused, RpcUnreachable
 from minirospy.introspect.graph import Graph, NodeAddress, in_namespace
 from minirospy.introspect.topics import UNKNOWN_TYPE
 from minirospy.runtime.master_proxy import SlaveProxy
@@ -17,16 +17,18 @@ from minirospy.runtime.master_proxy import SlaveProxy
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from minirospy.runtime.master_proxy import BusConnection
+    from minirospy.runtime.master_proxy import BusConnection, SystemState
 
 __all__ = [
     "Connections",
+    "Neighbours",
     "NodeDetail",
     "TypedName",
     "find_node",
     "forget_node",
     "kill_node",
     "list_nodes",
+    "neighbours",
     "node_connections",
     "node_detail",
     "ping_node",
@@ -58,6 +60,13 @@ class Connections(NamedTuple):
     links: list[BusConnection]
 
 
+class Neighbours(NamedTuple):
+    """The nodes that send to a node, and those that it sends to, by what is registered."""
+
+    senders: list[str]
+    receivers: list[str]
+
+
 def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
     """The sorted names of the nodes at or below ``namespace``."""
     state = graph.state()
@@ -66,6 +75,22 @@ def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
         for nodes in table.values():
             found.update(nodes)
     return sorted(node for node in found if in_namespace(node, namespace))
+
+
+def neighbours(state: SystemState) -> dict[str, Neighbours]:
+    """Each node that publishes or subscribes, sorted, and the other ends of its topics."""
+    senders: dict[str, set[str]] = {}
+    receivers: dict[str, set[str]] = {}
+    for topic in {*state.publishers, *state.subscribers}:
+        publishing, subscribing = state.publishers.get(topic, []), state.subscribers.get(topic, [])
+        for node in publishing:
+            receivers.setdefault(node, set()).update(subscribing)
+        for node in subscribing:
+            senders.setdefault(node, set()).update(publishing)
+    return {
+        name: Neighbours(sorted(senders.get(name, ())), sorted(receivers.get(name, ())))
+        for name in sorted({*senders, *receivers})
+    }
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
@@ -163,5 +188,7 @@ def _named(node: NodeAddress) -> Iterator[None]:
     """Faults of a call to ``node``, named after it."""
     try:
         yield
+    except RpcUnreachable as error:
+        raise NodeUnreachableError(node.name, error.uri, error.why) from error
     except RpcError as error:
         raise NodeUnreachableError(node.name, node.uri or "?", str(error)) from error

@@ -19,15 +19,17 @@ class _Cell(NamedTuple):
 
 def plot_header(value: Any, *, strings: bool = True, arrays: bool = True) -> str:
     """The line of column names for messages like ``value``."""
-    return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays))
+    return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays, 0))
 
 
-def plot_row(value: Any, nanoseconds: int, *, strings: bool = True, arrays: bool = True) -> str:
-    """The line of values, with the message's time in front."""
-    return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays))
+def plot_row(
+    value: Any, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
+) -> str:
+    """The line of values, with the message's time in front; ``origin`` (nanoseconds) is taken off times inside."""
+    return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays, origin))
 
 
-def _cells(name: str, value: Any, strings: bool, arrays: bool) -> Iterator[_Cell]:
+def _cells(name: str, value: Any, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
     # Plain ``if``s, most frequent first: this runs for every value of every message.
     if isinstance(value, bool):
         yield _Cell(name, str(int(value)))
@@ -37,11 +39,12 @@ def _cells(name: str, value: Any, strings: bool, arrays: bool) -> Iterator[_Cell
         if strings:
             yield _Cell(name, value)
     elif hasattr(value, "to_nsec"):
-        yield _Cell(name, str(value.to_nsec()))
+        # A point in time is seen from the origin; a duration is the same from everywhere.
+        yield _Cell(name, str(value.to_nsec() - (origin if hasattr(value, "to_time") else 0)))
     elif isinstance(value, list | tuple):
         if arrays:
             for index, element in enumerate(value):
-                yield from _cells(f"{name}{index}", element, strings, arrays)
+                yield from _cells(f"{name}{index}", element, strings, arrays, origin)
     else:
         for field in getattr(value, "__slots__", ()):
-            yield from _cells(f"{name}.{field}", getattr(value, field), strings, arrays)
+            yield from _cells(f"{name}.{field}", getattr(value, field), strings, arrays, origin)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Collection
+from typing import Any, NamedTuple
 
 from minirospy.idl.load import Catalogue
 from minirospy.idl.spec import FieldType, MessageSpec
@@ -12,29 +13,40 @@ __all__ = ["prototype"]
 _WIDE = 5
 
 
-def prototype(spec: MessageSpec, catalogue: Catalogue) -> str:
+def prototype(
+    spec: MessageSpec, catalogue: Catalogue, *, without: Collection[str] = (), empty_arrays: bool = False
+) -> str:
     """A message of default values as YAML, as `rosmsg-proto` writes it: to be changed and published.
 
-    An array of no fixed length has one element, which shows what its elements are.
+    An array of no fixed length has one element, which shows what its elements are, or with ``empty_arrays``
+    none. ``without``: names of fields to leave out, also of inner messages.
     """
-    return "\n".join(_yaml(_defaults(spec, catalogue), tight=False))
+    return "\n".join(_yaml(_Defaults(catalogue, without, empty_arrays).of(spec), tight=False))
 
 
-def _defaults(spec: MessageSpec, catalogue: Catalogue) -> dict[str, Any]:
-    return {field.name: _default(field.type, catalogue) for field in spec.fields}
+class _Defaults(NamedTuple):
+    catalogue: Catalogue
+    without: Collection[str]
+    empty_arrays: bool
 
+    def of(self, spec: MessageSpec) -> dict[str, Any]:
+        """The values of a message's fields."""
+        fields = (field for field in spec.fields if field.name not in self.without)
+        return {field.name: self._value(field.type) for field in fields}
 
-def _default(type_: FieldType, catalogue: Catalogue) -> Any:
-    if type_.is_array:
-        if type_.length is None and type_.base in ("float32", "float64"):
-            return [0]
-        single = type_._replace(is_array=False, length=None)
-        return [_default(single, catalogue)] * (1 if type_.length is None else type_.length)
-    if not type_.is_primitive:
-        return _defaults(catalogue.message(type_.base), catalogue)
-    if type_.base in ("time", "duration"):
-        return {"secs": 0, "nsecs": 0}
-    return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(type_.base, 0)
+    def _value(self, type_: FieldType) -> Any:
+        if type_.is_array:
+            if type_.length is None and self.empty_arrays:
+                return []
+            if type_.length is None and type_.base in ("float32", "float64"):
+                return [0]
+            single = type_._replace(is_array=False, length=None)
+            return [self._value(single)] * (1 if type_.length is None else type_.length)
+        if not type_.is_primitive:
+            return self.of(self.catalogue.message(type_.base))
+        if type_.base in ("time", "duration"):
+            return {"secs": 0, "nsecs": 0}
+        return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(type_.base, 0)
 
 
 def _yaml(value: Any, *, tight: bool) -> list[str]:

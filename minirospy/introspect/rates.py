@@ -8,13 +8,25 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-__all__ = ["Bandwidth", "BandwidthWindow", "DelayWindow", "RateWindow", "Spread"]
+__all__ = [
+    "Bandwidth",
+    "BandwidthWindow",
+    "DelayWindow",
+    "RateWindow",
+    "Spread",
+    "bandwidth_text",
+    "delay_text",
+    "rate_text",
+]
 
 UNBOUNDED = 50000
 """Messages that a window without a limit keeps: a long measurement must not eat the memory."""
+
+
+_NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
@@ -109,6 +121,71 @@ class DelayWindow:
             return None
         self._reported = self._arrived
         return _spread(list(self._delays), len(self._delays))
+
+
+def rate_text(reports: Mapping[str, Spread | None]) -> str:
+    """What `rostopic hz` prints once a second: of one topic two lines, of several a table."""
+    if len(reports) == 1:
+        (report,) = reports.values()
+        return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
+    rows = [
+        (name, *(_four_digits(number) for number in (r.rate, r.min, r.max, r.std_dev)), str(r.window))
+        for name, r in reports.items()
+        if r
+    ]
+    return _table(("topic", "rate", "min_delta", "max_delta", "std_dev", "window"), rows)
+
+
+def delay_text(report: Spread | None) -> str:
+    """What `rostopic delay` prints once a second."""
+    return f"average delay: {report.mean:.3f}\n\t{_extremes(report)}" if report else _NOTHING
+
+
+def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
+    """What `rostopic bw` prints once a second: of one topic two lines, of several a table; "" for nothing."""
+    rows = [
+        (
+            name,
+            f"{_bytes(r.rate, r.rate)}/s",
+            *(_bytes(n, r.rate) for n in (r.mean, r.min, r.max)),
+            str(r.window),
+        )
+        for name, r in reports.items()
+        if r
+    ]
+    if len(reports) > 1:
+        return _table(("topic", "bandwidth", "mean", "min", "max", "window"), rows)
+    return "".join(
+        f"average: {rate}\n\tmean: {mean} min: {low} max: {high} window: {window}"
+        for _, rate, mean, low, high, window in rows
+    )
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    if not rows:
+        return _NOTHING
+    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
+    lines = ["   ".join(text.center(width) for text, width in zip(head, widths, strict=True)).rstrip()]
+    lines.append("=" * (sum(widths) + 3 * (len(widths) - 1)))
+    lines += ["   ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _extremes(report: Spread) -> str:
+    return (
+        f"min: {report.min:.3f}s max: {report.max:.3f}s "
+        f"std dev: {report.std_dev:.5f}s window: {report.window}"
+    )
+
+
+def _four_digits(number: float) -> str:
+    return str(float(f"{number:.4g}"))
+
+
+def _bytes(number: float, rate: float) -> str:
+    """A number of bytes in the unit that suits the rate."""
+    unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
+    return f"{number / size:.2f}{unit}"
 
 
 def _spread(values: Sequence[float], window: int) -> Spread:

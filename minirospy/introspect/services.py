@@ -21,7 +21,8 @@ from minirospy.introspect.graph import Graph, in_namespace, unknown_service
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from minirospy.runtime.services import ServiceClient
+    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.wire.header import Header
 
 __all__ = [
     "ServiceDetail",
@@ -32,6 +33,7 @@ __all__ = [
     "list_services",
     "service_arguments",
     "service_detail",
+    "service_header",
     "service_type",
     "service_uri",
     "wait_for_service",
@@ -141,7 +143,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Any) -> Any:
     except HandshakeRefused as error:
         raise ServiceException(f"service [{service}] refused the connection: {error}") from error
     except (OSError, WireError) as error:
-        raise NodeUnreachableError(service, uri, str(error)) from error
+        raise NodeUnreachableError(service, uri, _why(error), kind="service") from error
     try:
         body = client.call(serialize(request))
     except CallFailed as error:
@@ -165,20 +167,30 @@ def _probed_type(graph: Graph, service: str) -> str | None:
         return None
 
 
-def _probe(graph: Graph, service: str, uri: str) -> str:
+def service_header(graph: Graph, service: str, uri: str) -> Header:
+    """The connection header that a service at ``uri`` answers with. Raises NodeUnreachableError."""
     try:
         client = _connect(graph, service, uri, _ANY, probe=True)
     except (OSError, WireError) as error:
-        raise NodeUnreachableError(service, uri, str(error)) from error
+        raise NodeUnreachableError(service, uri, _why(error), kind="service") from error
     client.close()
-    type_ = client.header.get("type")
+    return client.header
+
+
+def _probe(graph: Graph, service: str, uri: str) -> str:
+    type_ = service_header(graph, service, uri).get("type")
     if not type_:
-        raise NodeUnreachableError(service, uri, "it does not tell its type")
+        raise NodeUnreachableError(service, uri, "it does not tell its type", kind="service")
     return type_
 
 
+def _why(error: Exception) -> str:
+    """`Connection refused` rather than `[Errno 111] Connection refused`."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
-    # Imported here: it stands beside asyncio code, which listing needs none of.
-    from minirospy.runtime.services import ServiceClient
+    # Imported here: listing needs none of it.
+    from minirospy.runtime.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

@@ -8,17 +8,22 @@ from __future__ import annotations
 
 import os
 import queue
+import struct
 import sys
 import threading
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minirospy.errors import MessageException, MinirospyError
+from minirospy.clock import Clock, SimulatedClock, WallClock
+from minirospy.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.introspect.messages import MessageClasses, serialize
 from minirospy.introspect.topics import TopicField, find_topic
 from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.node import Node
 from minirospy.runtime.topics import Publication
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
@@ -27,7 +32,6 @@ if TYPE_CHECKING:
 
     from minirospy.environment import Environment
     from minirospy.introspect.graph import Graph
-    from minirospy.wire.header import Header
 
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
@@ -55,13 +59,16 @@ class Received(NamedTuple):
 class ToolNode:
     """A node ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it is asked to stop.
 
-    Raises MasterUnreachableError where no master answers.
+    ``clock`` tells when messages come: the machine's time; with ``ros_time`` that of /clock where the parameter
+    /use_sim_time asks for it, which ``simulated`` says then. Raises MasterUnreachableError where no master answers.
     """
 
-    def __init__(self, environment: Environment, tool: str) -> None:
+    def __init__(self, environment: Environment, tool: str, *, ros_time: bool = False) -> None:
         self.name = f"{environment.namespace.rstrip('/')}/{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
         self.ended = threading.Event()
         self.classes = MessageClasses()
+        self.clock: Clock = WallClock()
+        self.simulated = False
         self._fault: Exception | None = None
         self._on_end: list[Callable[[], object]] = []
         self._loop = LoopThread(f"{tool}-loop")
@@ -71,6 +78,8 @@ class ToolNode:
         except BaseException:
             self._loop.close()
             raise
+        if ros_time:
+            self._follow_clock(environment.master_uri)
 
     def __enter__(self) -> ToolNode:
         return self
@@ -98,8 +107,14 @@ class ToolNode:
             raise self._fault
         return True
 
+    def wait_for_time(self, seconds: float) -> None:
+        """Wait until /clock has told the time, or so long."""
+        end = time.monotonic() + seconds
+        while not self.clock.now() and time.monotonic() < end and not self.wait(0.01):
+            pass
+
     def listen(
-        self, topic: str, deliver: Callable[[memoryview, Header], None], *, tcp_nodelay: bool = False
+        self, topic: str, deliver: Callable[[Frame, Header], None], *, tcp_nodelay: bool = False
     ) -> None:
         """Call ``deliver(bytes, header)`` in a worker with each message of a topic, whatever its type.
 
@@ -113,9 +128,9 @@ class ToolNode:
     def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
         """Call ``add`` in a worker with each message of a topic; a fault of it is raised in :meth:`wait`."""
 
-        def deliver(body: memoryview, header: Header) -> None:
+        def deliver(body: Frame, header: Header) -> None:
             try:
-                add(Received(bytes(body), header, time.time_ns()))
+                add(Received(bytes(body), header, self.clock.now()))
             except (MinirospyError, MessageException) as error:
                 self._fault = error
                 self._end()
@@ -128,7 +143,7 @@ class ToolNode:
 
     def inbox(self, topic: str) -> Inbox:
         """The messages of a topic, to be read by one thread."""
-        inbox = Inbox()
+        inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
         return inbox
@@ -142,6 +157,24 @@ class ToolNode:
         self._loop.run(self._node.advertise(publication))
         return TopicPublisher(publication, bool(message_class._has_header))
 
+    def _follow_clock(self, master_uri: str) -> None:
+        master = MasterProxy(master_uri, self.name)
+        try:
+            self.simulated = bool(master.get_param("/use_sim_time"))
+        except RpcRefused:
+            return  # nobody set it
+        finally:
+            master.close()
+        if self.simulated:
+            clock = self.clock = SimulatedClock()
+
+            def tell(body: Frame, _: Header) -> None:
+                # rosgraph_msgs/Clock is one time: seconds and nanoseconds.
+                secs, nsecs = struct.unpack("<II", body)
+                clock.set(secs * 10**9 + nsecs)
+
+            self.listen("/clock", tell)
+
     def _asked_to_stop(self, _reason: str) -> None:
         self._end()
 
@@ -154,13 +187,14 @@ class ToolNode:
 class Inbox:
     """Messages between the workers that receive them and the one thread that reads them."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._messages: queue.Queue[Received | None] = queue.Queue(_WAITING)
         self._closed = threading.Event()
 
-    def put(self, body: memoryview, header: Header) -> None:
+    def put(self, body: Frame, header: Header) -> None:
         """A message has come; waits while too many are unread."""
-        received = Received(bytes(body), header, time.time_ns())
+        received = Received(bytes(body), header, self._clock.now())
         while not self._closed.is_set():
             try:
                 self._messages.put(received, timeout=0.2)
@@ -202,6 +236,12 @@ class TopicPublisher:
     def connections(self) -> int:
         """How many subscribers are connected."""
         return len(self._publication.links)
+
+    def wait_for_subscriber(self, wait: Callable[[float], bool], seconds: float) -> None:
+        """``wait(seconds)`` in small steps until somebody is connected, or so long, or ``wait`` says to stop."""
+        end = time.monotonic() + seconds
+        while not self.connections and time.monotonic() < end and not wait(0.02):
+            pass
 
     def publish(self, message: Any) -> None:
         """Send a message; its header is numbered. Raises MessageException where a value does not fit."""

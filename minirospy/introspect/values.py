@@ -8,35 +8,41 @@ Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
 from minirospy.errors import ValueTextError
 
-__all__ = ["check_parameter", "format_pretty", "format_value", "parse_documents", "parse_value"]
+__all__ = [
+    "add_angles",
+    "check_parameter",
+    "format_pretty",
+    "format_value",
+    "message_values",
+    "parse_arguments",
+    "parse_documents",
+    "parse_lines",
+    "parse_value",
+]
 
-_PLAIN_TEXT = re.compile(r"[A-Za-z/_][A-Za-z0-9/_]+\Z", re.ASCII)
-_PLAIN_INT = re.compile(r"(?:0|-?[1-9][0-9]{0,8})\Z", re.ASCII)
-_PLAIN_FLOAT = re.compile(r"-?[0-9]{1,9}\.[0-9]{1,9}\Z", re.ASCII)
 _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "null"})
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_ANGLE = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
 
 
 def parse_value(text: str) -> Any:
     """The value of a YAML text. Raises ValueTextError."""
     word = text.strip()
-    if _PLAIN_INT.match(word):
-        return int(word)
-    if _PLAIN_FLOAT.match(word):
+    whole, dot, fraction = word.removeprefix("-").partition(".")
+    if _is_digits(whole) and dot and _is_digits(fraction):
         return float(word)
+    if word == "0" or (_is_digits(whole) and not dot and whole[0] != "0"):
+        return int(word)
     if word in _TRUTH:
         return _TRUTH[word]
-    if _PLAIN_TEXT.match(word) and word.lower() not in _WORDS_WITH_MEANING:
+    if _is_plain_text(word):
         return word
     import yaml
 
@@ -56,13 +62,37 @@ def parse_documents(text: str, where: str) -> Iterator[Any]:
         raise ValueTextError(where, _complaint(error)) from error
 
 
+def parse_lines(lines: Iterable[str], where: str) -> Iterator[Any]:
+    """Like :func:`parse_documents`, each as soon as its last line has come: `rostopic echo /a | rostopic pub /b TYPE`."""
+    text: list[str] = []
+    for line in lines:
+        if line.rstrip() != "---":
+            text.append(line)
+            continue
+        yield from parse_documents("".join(text), where)
+        text.clear()
+    yield from parse_documents("".join(text), where)
+
+
+def parse_arguments(words: Sequence[str]) -> list[Any]:
+    """The values that a command line gives a message. An empty word is the empty text; to YAML it would be null."""
+    return [parse_value(word) if word else "" for word in words]
+
+
+def message_values(documents: Iterable[Any]) -> Iterator[list[Any]]:
+    """The values that each document gives a message: a list has one for each field."""
+    for document in documents:
+        if document is not None:
+            yield document if isinstance(document, list) else [document]
+
+
 def format_value(value: Any) -> str:
     """A value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
         return str(value)
-    if isinstance(value, str) and _PLAIN_TEXT.match(value) and value.lower() not in _WORDS_WITH_MEANING:
+    if isinstance(value, str) and _is_plain_text(value):
         return value
     import yaml
 
@@ -97,6 +127,21 @@ def check_parameter(value: Any, name: str) -> None:
         )
 
 
+def _is_digits(text: str) -> bool:
+    """Nine digits at most: what YAML reads as Python does. By hand: to compile expressions takes a start's time."""
+    return text.isascii() and text.isdecimal() and len(text) <= 9
+
+
+def _is_plain_text(word: str) -> bool:
+    """Whether YAML reads a text as itself, for it has only letters, digits, / and _."""
+    return (
+        len(word) > 1
+        and word.isascii()
+        and word.replace("/", "_").isidentifier()
+        and word.lower() not in _WORDS_WITH_MEANING
+    )
+
+
 def _pretty_lines(table: dict[str, Any], indent: str) -> Iterator[str]:
     for key in sorted(table):
         value = table[key]
@@ -120,16 +165,28 @@ def _complaint(error: Exception) -> str:
 
 @lru_cache(maxsize=1)
 def _loader() -> type[Any]:
-    """A safe YAML loader that knows angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
+    """A safe YAML loader that knows angles."""
     import yaml
 
     class AngleLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
         pass
 
+    add_angles(AngleLoader)
+    return AngleLoader
+
+
+def add_angles(loader_class: Any) -> None:
+    """Teach a YAML loader angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
+    import re
+
+    import yaml
+
+    in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
+
     def construct(unit: float) -> Any:
         def angle(loader: Any, node: Any) -> float:
             text = loader.construct_scalar(node)
-            match = _ANGLE.match(text)
+            match = in_brackets.match(text)
             try:
                 return unit * _arithmetic(match.group(2) if match else text)
             except (ValueError, SyntaxError, ArithmeticError) as error:
@@ -140,9 +197,8 @@ def _loader() -> type[Any]:
         return angle
 
     for tag, name, unit in (("!degrees", "deg", math.pi / 180.0), ("!radians", "rad", 1.0)):
-        AngleLoader.add_constructor(tag, construct(unit))
-        AngleLoader.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
-    return AngleLoader
+        loader_class.add_constructor(tag, construct(unit))
+        loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
 
 
 def _arithmetic(text: str) -> float:

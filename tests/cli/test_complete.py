@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -11,12 +12,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from minirospy.cli import complete
-from minirospy.cli.complete import candidates, main
+from minirospy.cli import sources
+from minirospy.cli.complete import _MODULES, candidates, main
 from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
 from minirospy.introspect.prototype import prototype
+from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
 from .conftest import Robot
@@ -86,6 +88,26 @@ def test_asking_a_command_leaves_it_as_it_was(capsys: pytest.CaptureFixture[str]
     tab("rostopic pub -")
     assert rostopic.main(["-h"]) == 0
     assert "rostopic pub" in capsys.readouterr().out
+
+
+def test_the_small_commands(workspace: Path) -> None:
+    assert tab("rosclean p") == ["purge"]
+    assert set(tab("rosclean purge --")) == {"--help", "--size"}
+    assert tab("minirospy clean c") == ["check"]
+    assert tab("rosconsole set n rosout w") == ["warn"]
+    assert tab("rosversion my_") == ["my_robot"]
+    assert tab("rosgraph --o") == ["--once"]
+    assert tab("rosmsg-proto msg std_msgs/Boo") == ["std_msgs/Bool"]
+
+
+def test_every_command_that_is_installed_is_completed() -> None:
+    """The table of commands, and the entrances of each, are those of pyproject.toml."""
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    section = text.partition("[project.scripts]")[2].partition("\n[")[0]
+    installed = dict(re.findall(r'^([\w-]+) = "minirospy\.cli\.(\w+:\w+)"$', section, re.MULTILINE))
+    by_hand = {name: installed.pop(name) for name in ("minirospy", "rosrun", "rospack")}
+    assert {name: ":".join(entry) for name, entry in _MODULES.items()} == installed
+    assert {*by_hand} - {"minirospy"} <= {*sources.BY_HAND}
 
 
 def test_choices_of_an_argument() -> None:
@@ -275,6 +297,27 @@ def test_parameters(robot: Robot, command: object) -> None:
     assert tab("rosparam list /ro") == ["/robot/speed"]
 
 
+def test_the_value_that_a_parameter_has(robot: Robot) -> None:
+    from minirospy.cli import rosparam
+
+    assert rosparam.main(["set", "/speed", "3.5"]) == 0
+    assert rosparam.main(["set", "/gains", "{p: 1, i: [2, 3]}"]) == 0
+    assert tab("rosparam set /speed ") == ["3.5"]
+    assert tab("rosparam set speed ") == ["3.5"]
+    assert tab("rosparam set /gains ") == ['"{i: [2, 3], p: 1}"']
+    assert tab("rosparam set /none ") == []
+
+
+def test_a_thousand_topics(master: str) -> None:
+    proxy = MasterProxy(master, "/many")
+    for number in range(1000):
+        proxy.call("registerPublisher", f"/many/topic_{number:04}", "std_msgs/Bool", "http://localhost:1")
+    proxy.close()
+    assert len(tab("rostopic echo ")) == 1000
+    assert tab("rostopic echo /many/topic_0999") == ["/many/topic_0999"]
+    assert tab("rostopic pub /many/topic_0999 ") == ["std_msgs/Bool"]
+
+
 # --- whatever happens
 
 
@@ -290,7 +333,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         start = time.monotonic()
         assert tab("rostopic echo ") == []
-        assert time.monotonic() - start < complete._LIVE_SECONDS + 0.5
+        assert time.monotonic() - start < sources.LIVE_SECONDS + 0.5
 
 
 def test_packages_are_found_with_a_bad_master_uri(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -189,3 +189,22 @@ def test_typed_wrong(words: list[str], says: str, capsys: pytest.CaptureFixture[
     error: Any = capsys.readouterr().err
     assert says in error
     assert error.count("\n") == 1
+
+
+def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(
+    start: Start, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As /rosout of real ROS, a node of roscpp: its root logger is `ros`."""
+    from minirospy.cli.rosservice import main as rosservice
+
+    start()
+    assert rosservice(["list"]) == 0
+    assert capsys.readouterr().out.split() == ["/rosout/get_loggers", "/rosout/set_logger_level"]
+    assert rosservice(["call", "/rosout/get_loggers"]) == 0
+    assert 'name: "ros"\n    level: "info"' in capsys.readouterr().out
+    assert rosservice(["call", "/rosout/set_logger_level", "ros.runtime.notifier", "Debug"]) == 0
+    assert rosservice(["call", "/rosout/set_logger_level", "mine", "error"]) == 0
+    rosservice(["call", "/rosout/get_loggers"])
+    assert 'name: "ros.runtime.notifier"\n    level: "debug"' in capsys.readouterr().out
+    assert rosservice(["call", "/rosout/set_logger_level", "ros", "loud"]) != 0
+    assert "[loud] is none of the levels debug, info, warn, error, fatal" in capsys.readouterr().err

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
+from std_msgs.msg import Bool, Empty
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
@@ -61,11 +64,14 @@ def test_lists(command: Any) -> None:
         (["rosmsg", "show", "nope/Nope"], 1, "message type [nope/Nope] not found"),
         (["rossrv", "md5", "SetBol"], 1, "service type [SetBol] not found; did you mean SetBool"),
         (["rosmsg", "package", "std_msg"], 1, "package [std_msg] not found; did you mean std_msgs"),
-        (["rosmsg", "show"], 2, "arguments are required"),
+        (["rosmsg", "show"], 2, "a name is missing"),
         (["rosmsg", "shw"], 2, "did you mean show"),
     ],
 )
-def test_what_cannot_be(command: Any, argv: list[str], status: int, why: str) -> None:
+def test_what_cannot_be(
+    command: Any, argv: list[str], status: int, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
     result = command(*argv)
     assert (result.status, result.out) == (status, "")
     assert why in result.err
@@ -82,3 +88,14 @@ def test_help(command: Any) -> None:
 def test_the_programs(program: Start) -> None:
     assert program(["rosmsg", "show", "std_msgs/Bool"]).communicate(timeout=20) == ("bool data\n\n", "")
     assert program(["rossrv", "show", "std_srvs/Empty"]).communicate(timeout=20) == ("---\n\n", "")
+
+
+def test_names_from_a_pipe(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`rostopic type /t | rosmsg show`, `rosservice type /s | rossrv show`."""
+    for words, text, out in (
+        (("rosmsg", "show"), "std_msgs/Bool\n", "bool data\n\n"),
+        (("rosmsg", "md5"), "std_msgs/Bool\nstd_msgs/Empty\n", f"{Bool._md5sum}\n{Empty._md5sum}\n"),
+        (("rossrv", "package", "-s"), "std_srvs\n", "std_srvs/Empty std_srvs/SetBool std_srvs/Trigger\n"),
+    ):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
+        assert command(*words) == (0, out, "")

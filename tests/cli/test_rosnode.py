@@ -64,7 +64,9 @@ def test_info_shows_connections(robot: Any, program: Start, command: Any) -> Non
     (name,) = [each for each in command("rosnode", "list").out.split() if each != "/robot"]
     there = command("rosnode", "info", "/robot").out
     assert f"Connections:\n * topic: /button_state\n    * to: {name}\n    * direction: outbound" in there
-    assert "    * transport: TCPROS\n" in there
+    transport = "UNIXROS" if sys.platform == "linux" else "TCPROS"
+    assert f"    * transport: {transport}\n" in there
+    assert re.search(r"outbound \(\d+ - \S+\) \[\d+\]\n", there)
     here = command("rosnode", "info", name).out
     assert f" * topic: /button_state\n    * to: /robot ({robot.node.uri})\n    * direction: inbound" in here
 
@@ -73,7 +75,7 @@ def test_a_node_that_does_not_answer(robot: Any, ghost: str, command: Any) -> No
     status, out, err = command("rosnode", "info", "/ghost")
     assert status == 1
     assert out.endswith(f"contacting node {ghost} ...\n")
-    assert err.startswith(f"ERROR: node [/ghost] does not answer at {ghost}")
+    assert err.startswith(f"rosnode: ERROR: node [/ghost] does not answer at {ghost}")
     assert command("rosnode", "ping", "/ghost").status == 1
     status, out, err = command("rosnode", "ping", "-a")
     assert status == 1
@@ -123,7 +125,8 @@ def test_kill(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_cleanup(robot: Any, ghost: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO("n\n"))
-    assert command("rosnode", "cleanup").status == 1
+    assert command("rosnode", "cleanup").out.endswith("aborting\n")
+    assert "/ghost\n" in command("rosnode", "list").out
     monkeypatch.setattr(sys, "stdin", io.StringIO("what\ny\n"))
     status, out, _ = command("rosnode", "cleanup")
     assert status == 0
@@ -159,3 +162,19 @@ def test_help_and_no_master(command: Any) -> None:
 
 def test_the_program(robot: Any, program: Start) -> None:
     assert program(["rosnode", "list"]).communicate(timeout=20) == ("/robot\n", "")
+
+
+def test_one_unknown_node_among_several(robot: Any, command: Any) -> None:
+    status, out, err = command("rosnode", "info", "-q", "/nope", "/robot")
+    assert status == 1
+    assert "Node [/robot]\n" in out
+    assert err == "rosnode: ERROR: node [/nope] not found\n"
+    status, out, err = command("rosnode", "kill", "/robot", "/nope", "/nada")
+    assert (status, out) == (1, "")
+    assert err == "rosnode: ERROR: node [/nope] not found\nrosnode: ERROR: node [/nada] not found\n"
+    assert not robot.stopped
+
+
+def test_ping_all_takes_nothing_else(robot: Any, command: Any) -> None:
+    assert command("rosnode", "ping", "-a", "-c", "2").status == 2
+    assert command("rosnode", "ping", "-a", "/robot").status == 2

@@ -67,8 +67,8 @@ def test_files(master: str, command: Any, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     Path("in.yaml").write_text("a: 1\n---\n_ns: inner\nb: deg(180)\n")
     assert command("rosparam", "load", "-v", "in.yaml", "/ns").out == (
-        "reading parameters from [in.yaml]\n/ns/a=1\n"
-        "reading parameters into namespace [/ns/inner]\n/ns/inner/b=3.141592653589793\n"
+        "reading parameters from [in.yaml]\nreading parameters into namespace [/ns/inner]\n"
+        "/ns/a=1\n/ns/inner/b=3.141592653589793\n"
     )
     assert command("rosparam", "dump", "-v", "out.yaml", "/ns").out == (
         "dumping namespace [/ns] to file [out.yaml]\n/ns/a=1\n/ns/inner/b=3.141592653589793\n"

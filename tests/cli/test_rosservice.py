@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from minirospy.runtime.master_proxy import MasterProxy
 
+BIN = Path(sys.executable).parent
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
 
@@ -34,6 +38,18 @@ def test_what_a_service_is(robot: Any, command: Any) -> None:
     )
     assert command("rosservice", "find", "std_srvs/Trigger").out == "/fail\n"
     assert command("rosservice", "find", "std_srvs/Nope").out == "\n"
+
+
+def test_a_call_imports_little(robot: Any) -> None:
+    code = (
+        "import sys; from minirospy.cli.rosservice import main; assert main(['type', '/fail']) == 0; "
+        "assert main(['call', '/set_led_state', 'True']) == 0; "
+        "print(*sorted({'asyncio', 'numpy', 'logging', 'xmlrpc'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    assert done.stdout.splitlines()[-1] == ""
 
 
 @pytest.mark.parametrize(
@@ -123,3 +139,31 @@ def test_help_and_no_master(command: Any) -> None:
 def test_the_program(robot: Any, program: Start) -> None:
     out, err = program(["rosservice", "call", "/set_led_state", "data: True"]).communicate(timeout=20)
     assert (out, err) == ('success: True\nmessage: "Successfully changed LED state."\n', "")
+
+
+def test_a_service_that_does_not_answer(master: str, command: Any) -> None:
+    with closing(MasterProxy(master, "/ghost")) as ghost:
+        ghost.register_service("/gone", "rosrpc://localhost:9", "http://localhost:9/")
+    for verb in ("type", "call", "info"):
+        status, out, err = command("rosservice", verb, "/gone")
+        assert (status, out) == (1, "")
+        assert err.startswith("rosservice: ERROR: service [/gone] does not answer at rosrpc://localhost:9 (")
+    assert command("rosservice", "find", "std_srvs/Empty") == (0, "\n", "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of Unix")
+def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
+    import pty
+
+    terminal, ours = pty.openpty()
+    with open(ours, closefd=True) as stdin:
+        call = subprocess.Popen(
+            [str(BIN / "rosservice"), "call", "/set_led_state"],
+            stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+    os.write(terminal, b"maybe\nTrue\n")
+    out, err = call.communicate(timeout=20)
+    os.close(terminal)
+    assert call.returncode == 0
+    assert out == "data (bool) [False]: " * 2 + 'success: True\nmessage: "Successfully changed LED state."\n'
+    assert err == "rosservice: ERROR: field data is not a bool ([std_srvs/SetBoolRequest] has bool data)\n"

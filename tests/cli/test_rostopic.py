@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import io
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from typing import Any
 
+import genpy
 import pytest
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
+
+from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import InterfaceType
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
@@ -150,7 +158,7 @@ def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
 
 
 def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic._LATCH_SECONDS", 0.5)
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.5)
     words = ("std_msgs/Bool", "data: True")
     assert command("rostopic", "pub", "-1", "/listen", *words).out == (
         "publishing and latching message for 0.5 seconds\n"
@@ -204,7 +212,7 @@ def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: 
 
 
 def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "/listen", "std_msgs/String", "x")
     assert (
         "WARNING: topic [/listen] is of type [std_msgs/Bool] already, not [std_msgs/String]\n" in result.err
@@ -283,3 +291,93 @@ def _until(is_so: Callable[[], bool]) -> None:
     while not is_so():
         assert time.monotonic() < deadline
         time.sleep(0.01)
+
+
+def test_echo_options_that_cannot_be(master: str, command: Any) -> None:
+    for words, why in (
+        (["-w", "1", "/t"], "the fixed width of numbers is at least 2"),
+        (["-a", "/t"], "it needs -b"),
+        ([], "a topic is missing"),
+        (["--fliter", "m.data", "/t"], "did you mean --filter?"),
+    ):
+        result = command("rostopic", "echo", *words)
+        assert (result.status, result.out) == (2, "")
+        assert why in result.err
+    assert command("rostopic", "echo", "-n", "0", "/t") == (0, "", "")
+
+
+def test_bags_come_later(command: Any) -> None:
+    for words in (["list", "-b", "x.bag"], ["echo", "-b", "x.bag", "/t"], ["echo", "-b", "x.bag"]):
+        assert command("rostopic", *words) == (
+            1, "", f"rostopic: ERROR: `rostopic {words[0]} -b`: bag files cannot be read yet, "
+            "they come with a later version\n",
+        )  # fmt: skip
+
+
+def test_pub_options_that_exclude_each_other(master: str, command: Any) -> None:
+    for words in (["-1", "-r", "5", "/t", "std_msgs/Bool", "1"], ["-f", "x", "/t", "std_msgs/Bool", "1"]):
+        result = command("rostopic", "pub", *words)
+        assert (result.status, result.out) == (2, "")
+        assert "exclude each other" in result.err
+
+
+def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "")
+    assert result == (0, "publishing and latching [data: ''] for 0.1 seconds\n", "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
+def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
+    """`rostopic echo /a | rostopic pub /b TYPE`: each message goes out when it has come, not when all have."""
+    pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool"])
+    assert pub.stdin is not None
+    for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
+        pub.stdin.write(text)
+        pub.stdin.flush()
+        _until(lambda expected=heard: robot.heard == expected)  # type: ignore[misc]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there at once")
+def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, command: Any) -> None:
+    pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "True"])
+    _until(lambda: robot.heard == [b"\x01"])
+    pub.terminate()
+    assert pub.wait(10) == 0
+    assert command("rosnode", "list").out == "/robot\n"
+
+
+def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
+    """With /use_sim_time, `now` and the time of arrival are those of /clock."""
+    with closing(MasterProxy(robot.node.environment.master_uri, "/test")) as master:
+        master.set_param("/use_sim_time", True)
+    type_ = InterfaceType(Clock._type, Clock._md5sum, Clock._full_text)
+    robot.loop.run(robot.node.advertise(Publication("/clock", type_, latch=True)))
+    robot.publish("/clock", Clock(genpy.Time(100)))
+    row = program(["rostopic", "echo", "-p", "-n1", "/button_state"])
+    now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
+    out, err = row.communicate(timeout=20)
+    # The message may have come before the clock's.
+    assert re.fullmatch(r"%time,field.data\n(100000000000|0),1\n", out)
+    assert err == "WARNING: may be using simulated time\n"
+    assert now.stdout is not None
+    assert [now.stdout.readline() for _ in range(3)] == [
+        "publishing and latching [data: \n", "  secs: 100\n", "  nsecs:         0] for 3.0 seconds\n"
+    ]  # fmt: skip
+
+
+def test_hz_of_a_field_and_bw_of_several_topics(robot: Any, program: Start) -> None:
+    rate = program(["rostopic", "hz", "/poly/header"])
+    width = program(["rostopic", "bw", "/poly", "/ns/chatter"])
+    assert rate.stdout is not None
+    assert width.stdout is not None
+    assert rate.stdout.readline() == "subscribed to [/poly]\n"
+    assert [width.stdout.readline() for _ in range(2)] == [
+        "subscribed to [/poly]\n", "subscribed to [/ns/chatter]\n"
+    ]  # fmt: skip
+    line = "no new messages\n"
+    while line == "no new messages\n":
+        for _ in range(3):
+            robot.publish("/ns/chatter", String("hello"))
+        line = width.stdout.readline()
+    assert line.split() == ["topic", "bandwidth", "mean", "min", "max", "window"]

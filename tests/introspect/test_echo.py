@@ -140,3 +140,22 @@ def test_values_that_do_not_fit_are_one_line(cls: type[Any], values: list[Any], 
     with pytest.raises(MessageException, match=why) as caught:
         fill_message(cls, values)
     assert "\n" not in str(caught.value)
+
+
+def test_notes_in_the_place_of_a_field_name_its_type() -> None:
+    joints = JointState(name=["a", "b"])
+    assert echo(joints, "name", arrays=False) == '"<array type: string, length: 2>"\n---\n'
+    assert echo(joints, "name", strings=False) == '"<array type: string, length: 2>"\n---\n'
+    polygon = Polygon([Point32()])
+    assert echo(polygon, "points", arrays=False) == '"<array type: geometry_msgs/Point32, length: 1>"\n---\n'
+
+
+def test_times_as_offsets_from_now() -> None:
+    pose = PoseStamped()
+    pose.header.stamp.secs = 12
+    assert (
+        echo(pose, "header/stamp", offset=True, now=lambda: 10 * 10**9)
+        == "\nsecs: 2\nnsecs:         0\n---\n"
+    )
+    row = echo(pose, plot=True, offset=True, now=lambda: 10 * 10**9).splitlines()[1]
+    assert row.startswith("2000000000,0,2000000000,")

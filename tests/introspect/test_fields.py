@@ -16,10 +16,14 @@ def test_paths_are_parsed() -> None:
     assert parse_path("a[0]/b") == (Step("a", 0), Step("b", None))
     assert parse_path("a[-1]") == (Step("a", -1),)
     assert parse_path("a[1:3]") == (Step("a", slice(1, 3)),)
+    assert parse_path("a[::2]") == (Step("a", slice(None, None, 2)),)
+    assert parse_path("a[3:0:-1]") == (Step("a", slice(3, 0, -1)),)
     assert parse_path("a[:]/x") == (Step("a", slice(None, None)), Step("x", None))
 
 
-@pytest.mark.parametrize("path", ["a[", "a[]", "a[x]", "a[1.5]", "a//b", "[0]", "a/", "a[1][2]", "a b"])
+@pytest.mark.parametrize(
+    "path", ["a[", "a[]", "a[x]", "a[1.5]", "a//b", "[0]", "a/", "a[1][2]", "a b", "a[::0]", "a[1:2:3:4]"]
+)
 def test_what_is_no_path_is_refused(path: str) -> None:
     with pytest.raises(UsageError, match=r"field path \["):
         parse_path(path)
@@ -63,3 +67,16 @@ def test_fields_are_typed() -> None:
         field_type(PoseStamped, "pose/position/w")
     with pytest.raises(NotFoundError, match=r"\[time\] has secs nsecs"):
         field_type(PoseStamped, "header/stamp/sec")
+
+
+def test_a_field_of_an_array_needs_an_element() -> None:
+    polygon = PolygonStamped()
+    polygon.polygon.points = [Point32(1, 2, 3)]
+    for find in (
+        lambda: field_type(PolygonStamped, "polygon/points/x"),
+        lambda: field_value(polygon, parse_path("polygon/points/x")),
+    ):
+        with pytest.raises(
+            NotFoundError, match=r"points\[0\]/x is that of its first element, points\[:\]/x of all"
+        ):
+            find()

@@ -114,7 +114,7 @@ def test_rosservice(node: ToolNode) -> None:
     assert rosservice.get_service_args("/set_flag") == "data"
     request, response = rosservice.call_service("/set_flag", [True])
     assert (request.data, response.success, response.message) == (True, True, "done")
-    with pytest.raises(rosservice.ROSServiceException, match="not found"):
+    with pytest.raises(rosservice.ROSServiceException, match="is not available"):
         rosservice.call_service("/nope", [True])
 
 
@@ -129,7 +129,7 @@ def test_rosparam(master: str, tmp_path: Path) -> None:
     rosparam.dump_params(str(file), "/ns")
     assert file.read_text() == "x: 1\ny:\n  z: two\n"
     rosparam.delete_param("/ns")
-    with pytest.raises(rosparam.RosParamException, match="not found"):
+    with pytest.raises(rosgraph.MasterError, match="is not set"):
         rosparam.get_param("/ns")
     with pytest.raises(rosparam.RosParamException, match="cannot be read"):
         rosparam.load_file("/nope.yaml")
@@ -155,3 +155,48 @@ def test_rosmsg() -> None:
     assert rosmsg.list_srvs("std_srvs") == ["std_srvs/Empty", "std_srvs/SetBool", "std_srvs/Trigger"]
     with pytest.raises(rosmsg.ROSMsgException, match="not found"):
         rosmsg.get_msg_text("std_msgs/Nope")
+
+
+def test_the_commands_as_functions(master: str, capsys: pytest.CaptureFixture[str]) -> None:
+    rosgraph.Master("/tester").registerPublisher("/t", "std_msgs/Bool", "http://localhost:1")
+    rosgraph.Master("/tester").setParam("/p", 5)
+    for call, said in (
+        (lambda: rosnode.rosnodemain(["rosnode", "list"]), "/tester\n"),
+        (lambda: rosnode.rosnode_listnodes(list_uri=True), "http://localhost:1\n"),
+        (lambda: rostopic.rostopicmain(["rostopic", "type", "/t"]), "std_msgs/Bool\n"),
+        (lambda: rosservice.rosservicemain(["rosservice", "list"]), "\n"),
+        (lambda: rosparam.yamlmain(["rosparam", "get", "/p"]), "5\n"),
+    ):
+        call()
+        assert capsys.readouterr().out.rstrip("\n") == said.rstrip("\n")
+
+
+def test_what_ros_leaks_has_a_name_here(master: str) -> None:
+    """ROS raises whatever its YAML or XML-RPC library raises."""
+    for name, value in (("/a", "{a: "), ("/a", "")):
+        with pytest.raises(rosparam.RosParamException):
+            rosparam.set_param(name, value)
+    with pytest.raises(rosparam.RosParamException, match="32 bits"):
+        rosparam.set_param_raw("/a", 2**40)
+
+
+def test_windows_of_rates(capsys: pytest.CaptureFixture[str]) -> None:
+    class AnyMsg:
+        _buff = b"x" * 1500
+
+    bandwidth = rostopic.ROSTopicBandwidth(10)
+    bandwidth.callback(AnyMsg)
+    bandwidth.print_bw()
+    assert capsys.readouterr().out == ""
+    bandwidth.callback(AnyMsg)
+    bandwidth.print_bw()
+    assert "mean: 1.50KB min: 1.50KB max: 1.50KB window: 2" in capsys.readouterr().out
+    with pytest.raises(rostopic.ROSTopicException, match="header"):
+        rostopic.ROSTopicDelay(10).callback_delay(Bool())
+
+
+def test_a_node_that_nobody_knows(master: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert not rosnode.rosnode_ping("/nobody", max_count=1, verbose=True)
+    assert capsys.readouterr() == ("", "cannot ping [/nobody]: unknown node\n")
+    with pytest.raises(rosnode.ROSNodeException, match="cannot resolve machine name"):
+        rosnode.get_nodes_by_machine("no.such.machine.invalid")

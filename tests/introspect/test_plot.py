@@ -5,7 +5,7 @@ from __future__ import annotations
 import genpy
 from geometry_msgs.msg import Point32, Polygon
 from sensor_msgs.msg import Image, JointState
-from std_msgs.msg import Bool, Duration, Empty
+from std_msgs.msg import Bool, Duration, Empty, Time
 
 from minirospy.introspect.plot import plot_header, plot_row
 
@@ -36,3 +36,8 @@ def test_strings_and_arrays_can_be_left_out() -> None:
     assert plot_row(joints, 1) == "1,0,0,,a,b c,1.0"
     assert plot_row(joints, 1, strings=False) == "1,0,0,1.0"
     assert plot_row(joints, 1, arrays=False) == "1,0,0,"
+
+
+def test_times_from_an_origin() -> None:
+    assert plot_row(Time(genpy.Time(5, 7)), 3, origin=5) == "3,5000000002"
+    assert plot_row(Duration(genpy.Duration(5, 7)), 3, origin=5) == "3,5000000007"

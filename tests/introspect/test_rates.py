@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 import statistics
 
-from minirospy.introspect.rates import BandwidthWindow, DelayWindow, RateWindow
+from minirospy.introspect.rates import (
+    Bandwidth,
+    BandwidthWindow,
+    DelayWindow,
+    RateWindow,
+    Spread,
+    bandwidth_text,
+    rate_text,
+)
 
 
 def test_a_rate_needs_two_messages_and_something_new() -> None:
@@ -59,3 +67,22 @@ def test_delay() -> None:
     assert report is not None
     assert (report.mean, report.min, report.max, report.window) == (0.375, 0.25, 0.5, 2)
     assert window.report() is None
+
+
+def test_several_topics_make_a_table() -> None:
+    spread = Spread(0.05, 0.04897, 0.05128, 0.0002319, 60)
+    assert rate_text({"/fast": spread, "/slow": None}) == (
+        "topic   rate   min_delta   max_delta    std_dev    window\n"
+        "=========================================================\n"
+        "/fast   20.0   0.04897     0.05128     0.0002319   60    \n"
+    )
+    assert rate_text({"/a": None, "/b": None}) == rate_text({"/a": None}) == "no new messages"
+    wide = Bandwidth(2.5e6, 1000.0, 900, 1100, 7)
+    assert bandwidth_text({"/a": wide}) == (
+        "average: 2.50MB/s\n\tmean: 0.00MB min: 0.00MB max: 0.00MB window: 7"
+    )
+    assert bandwidth_text({"/a": None}) == ""
+    assert bandwidth_text({"/a": wide, "/b": Bandwidth(10.0, 5.0, 5, 5, 2)}).splitlines()[2:] == [
+        "/a      2.50MB/s    0.00MB   0.00MB   0.00MB   7     ",
+        "/b      10.00B/s    5.00B    5.00B    5.00B    2     ",
+    ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import pytest
 import yaml
@@ -14,7 +15,10 @@ from minirospy.introspect.values import (
     check_parameter,
     format_pretty,
     format_value,
+    message_values,
+    parse_arguments,
     parse_documents,
+    parse_lines,
     parse_value,
 )
 
@@ -22,7 +26,8 @@ WORDS = [
     "", "1", "-5", "0", "007", "010", "0x10", "1_000", "1:30", "1.5", "-1.5", ".5", "1.", "1e3", "1.0e3", "1.0e+3",
     "true", "True", "TRUE", "yes", "no", "on", "off", "null", "~", "y", "n", "hello", "hello world", "a/b", "/a/b",
     "a-b", "a: 1", "{x: 1, y: [2, three]}", "[1, 2.5, x]", "'1'", '"a"', ".inf", ".nan", "inf", "a#b", "a #b", "e5",
-    "12345678901", "-0", "+5", "_x", "x_", "ünï", " 5 ", "5 6",
+    "12345678901", "-0", "-", "-.5", "٣", "1.٣", "a٣", "-007", "00.5", "1.2.3", "/", "_", "//", "é_",
+    "+5", "_x", "x_", "ünï", " 5 ", "5 6",
 ]  # fmt: skip
 
 
@@ -100,3 +105,20 @@ def test_what_a_parameter_cannot_hold() -> None:
     ):
         with pytest.raises(ValueTextError, match=why):
             check_parameter(value, "/p")
+
+
+def test_documents_of_a_pipe_come_one_by_one() -> None:
+    def lines() -> Iterator[str]:
+        yield from ("data: 1\n", "---\n")
+        read.append("second")
+        yield from ("- 2\n", "- 3\n", "---\n", "---\n", "x\n")
+
+    read: list[str] = []
+    documents = message_values(parse_lines(lines(), "standard input"))
+    assert next(documents) == [{"data": 1}]
+    assert not read
+    assert list(documents) == [[2, 3], ["x"]]
+
+
+def test_an_empty_argument_is_the_empty_text() -> None:
+    assert parse_arguments(["", "1", "a b", "{x: 1}"]) == ["", 1, "a b", {"x": 1}]

@@ -1,7 +1,9 @@
-"""Every public name and signature of real rospy beside ours: writes docs/rospy_compatibility.md.
+"""Every public name and signature of real rospy, and of the modules around it, beside ours: writes two pages of docs.
 
-    .venv/bin/python tests/referee/compare_surface.py            write the page
-    .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 where it would change
+docs/rospy_compatibility.md compares rospy; docs/modules_compatibility.md rosgraph, rosnode, rostopic and their kin.
+
+    .venv/bin/python tests/referee/compare_surface.py            write the pages
+    .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 where one would change
 
 Real rospy is what /usr/bin/python3 imports. The same file describes one of the two with --describe, so it runs
 under both.
@@ -21,7 +23,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-MODULES = [
+ROSPY = [
     "rospy",
     "rospy.client",
     "rospy.core",
@@ -34,9 +36,42 @@ MODULES = [
     "rospy.exceptions",
     "rospy.msg",
 ]
+AROUND = [
+    "rosgraph",
+    "rosgraph.masterapi",
+    "rosgraph.names",
+    "rosgraph.network",
+    "rosgraph.rosenv",
+    "rosgraph.xmlrpc",
+    "rosgraph.impl.graph",
+    "rosnode",
+    "rostopic",
+    "rosservice",
+    "rosparam",
+    "rosmsg",
+    "rosclean",
+    "roslib",
+    "roslib.message",
+    "roslib.names",
+    "roslib.packages",
+    "roslib.rosenv",
+    "roslib.scriptutil",
+    "roslib.launcher",
+    "roslib.exceptions",
+    "genpy",
+    "genpy.base",
+    "genpy.message",
+    "genpy.rostime",
+    "genpy.dynamic",
+]
+"""The modules of the second page."""
+
 REAL_PYTHON = "/usr/bin/python3"
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "rospy_compatibility.md"
-OF_ROS = ("rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+OF_ROS = (
+    "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
+    "rosparam", "rosmsg", "rosclean", "roslib",
+)  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
     "LoggingOnce": "bookkeeping inside rospy's log functions",
@@ -45,7 +80,6 @@ REASONS = {
     "deprecated": "a decorator for rospy's own use",
     "set_initialized": "called by rospy's own init_node",
     "set_node_uri": "called by rospy's own init_node",
-    "get_rostime_cond": "the lock inside rospy's simulated time",
     "Poller": "rospy's select loop; ours is asyncio's",
     "QueuedConnection": "rospy's thread each connection; ours has an outbox",
     "SubscriberStatisticsLogger": "rospy's inside of topic statistics",
@@ -59,6 +93,81 @@ REASONS = {
     "ProtocolHandler": "rospy's inside of TCPROS",
     "TIMEOUT_READY": "not used by rospy itself",
     "python3": "a leftover of Python 2",
+    **dict.fromkeys(
+        (
+            "CallbackEcho",
+            "argv_publish",
+            "create_field_filter",
+            "create_publisher",
+            "create_value_transform",
+            "file_yaml_arg",
+            "param_publish",
+            "param_publish_once",
+            "publish_message",
+            "stdin_publish",
+            "stdin_yaml_arg",
+            "wait_for_subscriber",
+            "get_api",
+            "get_info_text",
+            "SUBSCRIBER_TIMEOUT",
+        ),
+        "the inside of the command rostopic",
+    ),
+    **dict.fromkeys(
+        (
+            "cleanup_master_blacklist",
+            "cleanup_master_whitelist",
+            "get_node_connection_info_description",
+            "get_node_info_description",
+            "lookup_uri",
+            "rosnode_debugnode",
+        ),
+        "the inside of the command rosnode",
+    ),
+    **dict.fromkeys(
+        (
+            "construct_angle_degrees",
+            "construct_angle_radians",
+            "construct_yaml_binary",
+            "represent_foo",
+            "represent_xml_binary",
+        ),
+        "given to PyYAML when rosparam is imported",
+    ),
+    **dict.fromkeys(
+        (
+            "MAX_DEFAULT_NON_FLOW_ITEMS",
+            "RosMsgProtoArgsException",
+            "RosMsgProtoException",
+            "construct_ordered_mapping",
+            "construct_yaml_map_with_ordered_dict",
+            "create_names_filter",
+            "fullusage",
+            "get_array_type_instance",
+            "get_yaml_for_msg",
+            "init_rosmsg_proto",
+            "represent_ordered_mapping",
+            "rosmsg_cmd_list",
+            "rosmsg_cmd_md5",
+            "rosmsg_cmd_package",
+            "rosmsg_cmd_packages",
+            "rosmsg_cmd_prototype",
+            "rosmsg_cmd_show",
+            "rosmsg_debug",
+            "spec_to_str",
+        ),
+        "the inside of the commands rosmsg and rosmsg-proto",
+    ),
+    "ForkingXMLRPCServer": "a server that forks: not on every system",
+    "isstring": "a leftover of Python 2",
+    "SIOCGIFADDR": "Linux's own number of a call",
+    "SIOCGIFCONF": "Linux's own number of a call",
+    "ROS_BINDEPS_PATH": "of rosbuild",
+    "ROS_BOOST_ROOT": "of rosbuild",
+    "PIPE": "passed on from subprocess",
+    "generate_dynamic": "genpy.dynamic has it",
+    "msg_generator": "genpy's own compiler; ours is minirospy.idl",
+    "get_depends": "the inside of load_manifest",
 }
 """Why a name of real rospy is not offered: nothing but rospy itself has a use for it."""
 
@@ -70,6 +179,20 @@ MEMBERS_INSIDE = {
     "get_num_connections": "Publisher and Subscriber have it",
     "unregister": "Publisher and Subscriber have it",
     "error_handler": "rospy's inside",
+    **dict.fromkeys(
+        (
+            "get_last_printed_tn",
+            "set_last_printed_tn",
+            "get_msg_t0",
+            "set_msg_t0",
+            "get_msg_tn",
+            "set_msg_tn",
+            "get_times",
+            "set_times",
+        ),
+        "the inside of ROSTopicHz",
+    ),
+    "decode": "xmlrpc's own",
 }
 
 Description = dict[str, dict[str, Any]]
@@ -83,7 +206,7 @@ def describe() -> Description:
             for name in dir(importlib.import_module(module))
             if not name.startswith("_") and (value := describe_value(getattr(sys.modules[module], name)))
         }
-        for module in MODULES
+        for module in (*ROSPY, *AROUND)
     }
 
 
@@ -120,6 +243,8 @@ def parameters(value: Any) -> list[list[str]] | None:
 def shown_default(default: Any) -> str:
     if default is os.environ:
         return "os.environ"
+    if default is sys.argv:
+        return "sys.argv"
     return re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default))
 
 
@@ -188,29 +313,29 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
     return rows
 
 
-def page(real: Description, ours: Description) -> str:
-    """The page's text."""
+def page(title: str, modules: list[str], real: Description, ours: Description) -> str:
+    """A page's text."""
     tables, counts = [], Counter[str]()
-    for module in MODULES:
+    for module in modules:
         rows = rows_of(module, real[module], ours[module])
         counts.update(state for _, _, state, _ in rows)
         lines = [f"| `{name}` | `{signature}` | {state} | {note} |" for name, signature, state, note in rows]
         lines = [line.replace("| `` |", "| |") for line in lines]
         tables.append(
-            f"## {module}\n\n| name | real rospy | ours | |\n|---|---|---|---|\n" + "\n".join(lines) + "\n"
+            f"## {module}\n\n| name | real ROS | ours | |\n|---|---|---|---|\n" + "\n".join(lines) + "\n"
         )
     total = ", ".join(
         f"{counts[state]} {state}" for state in ("same", "wider", "differs", "left out", "missing")
     )
-    return f"""# rospy beside minirospy, name by name
+    return f"""# {title}
 
-Generated by `tests/referee/compare_surface.py` from a real rospy (Debian's) and ours: do not edit. `--check` tells
+Generated by `tests/referee/compare_surface.py` from a real ROS 1 (Debian's) and ours: do not edit. `--check` tells
 whether it is up to date.
 
 {total}.
 
-*same*: the same parameters and defaults (of a constant: the same value). *wider*: every call that real rospy takes, ours
-takes too. *left out*: the inside of rospy, which nothing else has a use for. Names that a module only passes on from
+*same*: the same parameters and defaults (of a constant: the same value). *wider*: every call that real ROS takes, ours
+takes too. *left out*: an inside that nothing else has a use for. Names that a module only passes on from
 another are listed once, where they are at home; here only where they are not there. What the functions do is
 compared by the programs in `tests/referee/cases`.
 
@@ -239,15 +364,22 @@ def main() -> int:
     if options.describe:
         print(json.dumps(describe()))
         return 0
-    text = page(described_by(REAL_PYTHON), described_by(sys.executable))
-    if options.check:
-        if PAGE.exists() and PAGE.read_text() == text:
-            return 0
-        print(f"{PAGE} is not up to date: run {sys.executable} {__file__}", file=sys.stderr)
-        return 1
-    PAGE.write_text(text)
-    print(*text.split("\n\n")[2:3])
-    return 0
+    real, ours = described_by(REAL_PYTHON), described_by(sys.executable)
+    pages = {
+        DOCS / "rospy_compatibility.md": page("rospy beside minirospy, name by name", ROSPY, real, ours),
+        DOCS / "modules_compatibility.md": page(
+            "rosgraph, rosnode, rostopic and their kin beside minirospy, name by name", AROUND, real, ours
+        ),
+    }
+    status = 0
+    for path, text in pages.items():
+        if not options.check:
+            path.write_text(text)
+            print(path.name, *text.split("\n\n")[2:3])
+        elif not path.exists() or path.read_text() != text:
+            print(f"{path} is not up to date: run {sys.executable} {__file__}", file=sys.stderr)
+            status = 1
+    return status
 
 
 if __name__ == "__main__":

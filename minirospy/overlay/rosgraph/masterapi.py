@@ -3,19 +3,29 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import Any
 
-from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.runtime.master_proxy import MasterProxy
+from rosgraph.names import make_caller_id
+from rosgraph.network import parse_http_host_and_port
+from rosgraph.rosenv import get_master_uri
 
-__all__ = ["Error", "Failure", "Master", "MasterError", "MasterException", "MasterFailure", "is_online"]
+__all__ = [
+    "Error", "Failure", "Master", "MasterError", "MasterException", "MasterFailure", "ROSMasterException",
+    "get_master_uri", "is_online",
+]  # fmt: skip
 
 _UNSET = object()
 
 
 class MasterException(Exception):
     """The master cannot be asked, or says no."""
+
+
+ROSMasterException = MasterException
+"""An older name of it."""
 
 
 class MasterFailure(MasterException):
@@ -33,10 +43,17 @@ class Master:
     """The master at ``master_uri`` (default: that of the environment), asked in the name of ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
-        uri = master_uri or Environment.read(host="localhost").master_uri
+        uri = master_uri or get_master_uri()
         self.master_uri = uri
-        self.caller_id = caller_id if caller_id.startswith("/") else "/" + caller_id
+        try:
+            parse_http_host_and_port(uri)
+        except ValueError as error:
+            raise ValueError(f"invalid master URI: {uri}") from error
+        # As rosgraph has it, without the slash at its end.
+        self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._proxy = MasterProxy(uri, self.caller_id)
+        # ROS's Master has no close(): its connections go with it.
+        weakref.finalize(self, self._proxy.close)
 
     def _call(self, method: str, *args: Any) -> Any:
         try:
@@ -69,7 +86,7 @@ class Master:
         """[publishers, subscribers, services], each a list of [name, [nodes]]."""
         return self._call("getSystemState")
 
-    def getPublishedTopics(self, subgraph: str = "") -> Any:
+    def getPublishedTopics(self, subgraph: str) -> Any:
         """[[topic, type]] of what is published."""
         return self._call("getPublishedTopics", subgraph)
 

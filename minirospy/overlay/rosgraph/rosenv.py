@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping, Sequence
+
 from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.names import parse_arguments
 
 __all__ = [
     "DEFAULT_MASTER_PORT",
+    "DEFAULT_MASTER_URI",
     "ROS_HOSTNAME",
     "ROS_IP",
+    "ROS_IPV6",
     "ROS_MASTER_URI",
     "ROS_NAMESPACE",
     "get_master_uri",
@@ -15,10 +21,13 @@ __all__ = [
 
 ROS_MASTER_URI = "ROS_MASTER_URI"
 ROS_IP = "ROS_IP"
+ROS_IPV6 = "ROS_IPV6"
 ROS_HOSTNAME = "ROS_HOSTNAME"
 ROS_NAMESPACE = "ROS_NAMESPACE"
+DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 
-def get_master_uri(env: dict[str, str] | None = None, argv: list[str] | None = None) -> str:
-    """The URI of the master that the environment names."""
-    return Environment.read(env, host="localhost").master_uri
+def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
+    """The URI of the master that the command line (``__master:=``) or else the environment names."""
+    named = parse_arguments(sys.argv if argv is None else argv).special.get("__master")
+    return named or Environment.read(env, host="localhost").master_uri

@@ -8,19 +8,20 @@ from rosgraph.names import (
     PRIV_NAME,
     REMAP,
     SEP,
+    anonymous_name,
     canonicalize_name,
     get_ros_namespace,
     is_global,
     is_legal_base_name,
     is_legal_name,
     is_private,
+    load_mappings,
+    make_caller_id,
     make_global_ns,
     namespace,
     ns_join,
     resolve_name,
 )
-
-from minirospy.names import anonymous_name
 
 __all__ = [
     "ANYTYPE", "GLOBALNS", "PRIV_NAME", "PRN_SEPARATOR", "REMAP", "SEP", "TYPE_SEPARATOR", "anonymous_name",
@@ -31,17 +32,6 @@ __all__ = [
 ]  # fmt: skip
 
 PRN_SEPARATOR = TYPE_SEPARATOR = "/"
-
-
-def load_mappings(argv: list[str]) -> dict[str, str]:
-    """The remappings in a command line; private parameters (``_name:=value``) are none."""
-    pairs = [arg.split(REMAP, 1) for arg in argv if REMAP in arg]
-    return {old.strip(): new.strip() for old, new in pairs if not re.match(r"_[^_]", old.strip())}
-
-
-def make_caller_id(name: str) -> str:
-    """A global name in the namespace of the environment, with a slash at its end."""
-    return make_global_ns(ns_join(get_ros_namespace(), name))
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from minirospy.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError
@@ -11,9 +13,13 @@ from minirospy.introspect import nodes
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 
 __all__ = [
-    "ROSNodeException", "ROSNodeIOException", "get_api_uri", "get_machines_by_nodes", "get_node_names",
-    "get_nodes_by_machine", "kill_nodes", "rosnode_ping", "rosnode_ping_all",
+    "ID", "NAME", "ROSNodeException", "ROSNodeIOException", "get_api_uri", "get_machines_by_nodes", "get_node_names",
+    "get_nodes_by_machine", "kill_nodes", "rosnode_cleanup", "rosnode_info", "rosnode_listnodes", "rosnode_ping",
+    "rosnode_ping_all", "rosnodemain",
 ]  # fmt: skip
+
+NAME = "rosnode"
+ID = "/rosnode"
 
 
 class ROSNodeException(Exception):
@@ -45,7 +51,7 @@ def rosnode_ping(
         uri = graph.node_uri(name)
         if uri is None:
             if verbose:
-                print(f"cannot ping [{name}]: unknown node")
+                print(f"cannot ping [{name}]: unknown node", file=sys.stderr)
             return False
         if verbose:
             print(f"pinging {name} with a timeout of 3.0s")
@@ -59,7 +65,7 @@ def rosnode_ping(
     return True
 
 
-def rosnode_ping_all(verbose: bool = False) -> tuple[list[str], list[str]]:
+def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
     """(nodes that answer, nodes that do not). Raises ROSNodeIOException."""
     with _graph() as graph:
         answers = {
@@ -92,11 +98,48 @@ def get_machines_by_nodes() -> list[str]:
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """The nodes on a machine."""
+    """The nodes on a machine. Raises ROSNodeException where its name does not resolve."""
+    try:
+        wanted = socket.gethostbyname(machine)
+    except OSError as error:
+        raise ROSNodeException(f"cannot resolve machine name [{machine}] to address") from error
     with _graph() as graph:
         return [
-            node.name for node in graph.addresses(nodes.list_nodes(graph)) if node_host(node.uri) == machine
+            node.name
+            for node in graph.addresses(nodes.list_nodes(graph))
+            if (host := node_host(node.uri)) and (host == machine or _address(host) == wanted)
         ]
+
+
+def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list_all: bool = False) -> None:
+    """Print what `rosnode list` prints."""
+    rosnodemain(
+        ["rosnode", "list", *(["-u"] * list_uri), *(["-a"] * list_all), *([namespace] if namespace else [])]
+    )
+
+
+def rosnode_info(node_name: str, quiet: bool = False) -> None:
+    """Print what `rosnode info` prints."""
+    rosnodemain(["rosnode", "info", *(["-q"] * quiet), node_name])
+
+
+def rosnode_cleanup() -> None:
+    """What `rosnode cleanup` does, its question included."""
+    rosnodemain(["rosnode", "cleanup"])
+
+
+def rosnodemain(argv: Sequence[str] | None = None) -> int:
+    """The command; ``argv`` begins with its name. Its exit status."""
+    from minirospy.cli.rosnode import main
+
+    return main(list(sys.argv if argv is None else argv)[1:])
+
+
+def _address(host: str) -> str | None:
+    try:
+        return socket.gethostbyname(host)
+    except OSError:
+        return None
 
 
 def _answers(graph: Graph, node: NodeAddress, verbose: bool) -> bool:
@@ -104,7 +147,7 @@ def _answers(graph: Graph, node: NodeAddress, verbose: bool) -> bool:
         seconds = nodes.ping_node(graph, node)
     except NodeUnreachableError as error:
         if verbose:
-            print(f"ERROR: {error}")
+            print(f"ERROR: {error}", file=sys.stderr)
         return False
     if verbose:
         print(f"xmlrpc reply from {node.uri}\ttime={seconds * 1000.0:f}ms")

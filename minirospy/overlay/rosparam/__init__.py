@@ -2,20 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from minirospy.errors import MasterUnreachableError, MinirospyError
+import yaml
+from rosgraph.masterapi import Master, MasterError
+from rosgraph.names import (
+    GLOBALNS,
+    get_ros_namespace,
+    make_caller_id,
+    make_global_ns,
+    ns_join,
+    script_resolve_name,
+)
+
+from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.values import parse_value
+from minirospy.introspect.values import add_angles, parse_value
 
 __all__ = [
-    "RosParamException", "RosParamIOException", "delete_param", "dump_params", "get_param", "list_params", "load_file",
-    "load_str", "set_param", "set_param_raw", "upload_params",
+    "GLOBALNS", "NAME", "NS", "RosParamException", "RosParamIOException", "delete_param", "dump_params", "get_param",
+    "get_param_server", "get_ros_namespace", "list_params", "load_file", "load_str", "make_caller_id", "make_global_ns",
+    "ns_join", "print_params", "script_resolve_name", "set_param", "set_param_raw", "upload_params", "yamlmain",
 ]  # fmt: skip
+
+NAME = "rosparam"
+NS = "_ns"
+
+# Programs that import rosparam read deg(90) and rad(pi/2) with yaml.safe_load, as with ROS's.
+add_angles(yaml.SafeLoader)
 
 
 class RosParamException(Exception):
@@ -27,9 +46,13 @@ class RosParamIOException(RosParamException):
 
 
 def get_param(param: str) -> Any:
-    """A parameter's value. Raises RosParamException where it is not set."""
+    """A parameter's value. Raises rosgraph.MasterError where it is not set."""
     with _graph() as graph:
-        return parameters.get_parameter(graph, graph.resolve(param))
+        name = graph.resolve(param)
+        try:
+            return parameters.get_parameter(graph, name)
+        except NotFoundError as error:
+            raise MasterError(f"Parameter [{name}] is not set") from error
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
@@ -48,16 +71,38 @@ def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
 
 
 def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
-    """Set all values below a namespace."""
-    set_param_raw(ns, values, verbose)
+    """Set all values below a namespace. Raises RosParamException where they have no names at the root."""
+    if ns == GLOBALNS and not isinstance(values, dict):
+        raise RosParamException("global / can only be set to a dictionary")
+    if verbose:
+        print_params(values, ns)
+    set_param_raw(ns, values)
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raises RosParamException where it is not set."""
+    """Delete a parameter. Raises rosgraph.MasterError where it is not set."""
     with _graph() as graph:
-        parameters.delete_parameter(graph, graph.resolve(param))
+        name = graph.resolve(param)
+        try:
+            parameters.delete_parameter(graph, name)
+        except NotFoundError as error:
+            raise MasterError(f"parameter [{name}] is not set") from error
     if verbose:
         print(f"deleted parameter [{param}]")
+
+
+def print_params(params: Any, ns: str) -> None:
+    """Print parameters, ``name=value`` a line; a single value by itself."""
+    if isinstance(params, dict):
+        for name, value in parameters.flatten(ns, params):
+            print(f"{name}={value}")
+    else:
+        print(params)
+
+
+def get_param_server() -> Master:
+    """The master that the environment names, which keeps the parameters."""
+    return Master("/" + NAME)
 
 
 def list_params(ns: str) -> list[str]:
@@ -86,7 +131,20 @@ def load_str(
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
     """Write the parameters below a name to a file. Raises RosParamException."""
-    Path(filename).write_text(parameters.dump_parameters(get_param(param)), encoding="utf-8")
+    values = get_param(param)
+    if verbose:
+        print_params(values, param)
+    try:
+        Path(filename).write_text(parameters.dump_parameters(values), encoding="utf-8")
+    except OSError as error:
+        raise RosParamException(f"file [{filename}] cannot be written: {error.strerror}") from error
+
+
+def yamlmain(argv: Sequence[str] | None = None) -> int:
+    """The command; ``argv`` begins with its name. Its exit status."""
+    from minirospy.cli.rosparam import main
+
+    return main(list(sys.argv if argv is None else argv)[1:])
 
 
 @contextmanager

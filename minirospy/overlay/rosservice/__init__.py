@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +11,7 @@ from minirospy.errors import (
     MasterUnreachableError,
     MessageException,
     MinirospyError,
+    NodeUnreachableError,
     NotFoundError,
     ServiceException,
 )
@@ -17,9 +19,12 @@ from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
 __all__ = [
-    "ROSServiceException", "ROSServiceIOException", "call_service", "get_service_args", "get_service_class_by_name",
-    "get_service_list", "get_service_node", "get_service_type", "get_service_uri", "rosservice_find",
+    "NAME", "ROSServiceException", "ROSServiceIOException", "call_service", "get_service_args",
+    "get_service_class_by_name", "get_service_headers", "get_service_list", "get_service_node", "get_service_type",
+    "get_service_uri", "has_service_args", "rosservice_find", "rosservicemain",
 ]  # fmt: skip
+
+NAME = "rosservice"
 
 
 class ROSServiceException(Exception):
@@ -97,12 +102,33 @@ def call_service(
         return request, services.call_service(graph, name, type_, request)
 
 
+def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
+    """The connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    with _graph() as graph:
+        return services.service_header(graph, graph.resolve(service_name), service_uri)
+
+
+def has_service_args(service_name: str, service_class: Any = None) -> bool:
+    """Whether a service's request has fields."""
+    return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
+
+
+def rosservicemain(argv: Sequence[str] | None = None) -> int:
+    """The command; ``argv`` begins with its name. Its exit status."""
+    from minirospy.cli.rosservice import main
+
+    return main(list(sys.argv if argv is None else argv)[1:])
+
+
 @contextmanager
 def _graph() -> Iterator[Graph]:
     try:
         with Graph.open("rosservice") as graph:
             yield graph
-    except MasterUnreachableError as error:
+    except (MasterUnreachableError, NodeUnreachableError) as error:
         raise ROSServiceIOException(str(error)) from error
+    except NotFoundError as error:
+        text = f"Service [{error.name}] is not available." if error.kind == "service" else str(error)
+        raise ROSServiceException(text) from error
     except (MinirospyError, MessageException, ServiceException) as error:
         raise ROSServiceException(str(error)) from error

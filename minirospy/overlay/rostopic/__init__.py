@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from minirospy.errors import MasterUnreachableError, MinirospyError
+from minirospy.errors import MasterUnreachableError, MinirospyError, UsageError
 from minirospy.introspect import topics
 from minirospy.introspect.fields import field_value, parse_path
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.rates import RateWindow
+from minirospy.introspect.rates import BandwidthWindow, DelayWindow, RateWindow
 
 __all__ = [
-    "ROSTopicException", "ROSTopicHz", "ROSTopicIOException", "find_by_type", "get_topic_class", "get_topic_list",
-    "get_topic_type", "msgevalgen",
+    "NAME", "ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicException", "ROSTopicHz", "ROSTopicIOException",
+    "find_by_type", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "rostopicmain",
 ]  # fmt: skip
+
+NAME = "rostopic"
 
 
 class ROSTopicException(Exception):
@@ -26,6 +29,10 @@ class ROSTopicException(Exception):
 
 class ROSTopicIOException(ROSTopicException):
     """The master does not answer."""
+
+
+class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
+    """As programs expect it of some of ROS's functions, also an error of sockets."""
 
 
 def get_topic_type(
@@ -75,8 +82,15 @@ def find_by_type(topic_type: str) -> list[str]:
 
 
 def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
-    """A function that takes the field at a path (``/pose/x``) out of a message; None for the message itself."""
-    steps = parse_path(pattern.strip("/"))
+    """A function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
+
+    None, too, where the path does not parse, which is then said on stderr.
+    """
+    try:
+        steps = parse_path(pattern.strip("/"))
+    except UsageError as error:
+        print(f"rostopic: {error}", file=sys.stderr)
+        return None
     return (lambda message: field_value(message, steps)) if steps else None
 
 
@@ -120,12 +134,82 @@ class ROSTopicHz:
             print(f"\tmin: {low:.3f}s max: {high:.3f}s std dev: {std_dev:.5f}s window: {window}")
 
 
+class ROSTopicBandwidth:
+    """Measures the bandwidth of a topic: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``."""
+
+    def __init__(self, window_size: int = 100) -> None:
+        self._window = BandwidthWindow(window_size)
+        self._lock = threading.Lock()
+
+    def callback(self, data: Any) -> None:
+        """A message has come."""
+        with self._lock:
+            self._window.add(time.time(), len(data._buff or b""))
+
+    def print_bw(self) -> None:
+        """Print the bandwidth, where two messages have come."""
+        with self._lock:
+            report = self._window.report(time.time())
+        if report is None:
+            return
+        rate, mean, low, high = (_bytes(each) for each in (report.rate, report.mean, report.min, report.max))
+        print(f"average: {rate}/s\n\tmean: {mean} min: {low} max: {high} window: {report.window}")
+
+
+class ROSTopicDelay:
+    """Measures how late a topic's stamped messages come: ``rospy.Subscriber(topic, Type, delay.callback_delay)``."""
+
+    def __init__(self, window_size: int) -> None:
+        self._window = DelayWindow(max(window_size, 0))
+        self._lock = threading.Lock()
+
+    def callback_delay(self, msg: Any) -> None:
+        """A message has come. Raises ROSTopicException where it has no header."""
+        if not msg._has_header:
+            raise ROSTopicException("msg does not have header")
+        from minirospy.client import get_time
+
+        with self._lock:
+            self._window.add(get_time(), msg.header.stamp.to_sec())
+
+    def get_delay(self) -> tuple[float, float, float, float, int] | None:
+        """(mean, least, longest, standard deviation, messages); None where nothing new has come."""
+        with self._lock:
+            report = self._window.report()
+        return (
+            None if report is None else (report.mean, report.min, report.max, report.std_dev, report.window)
+        )
+
+    def print_delay(self) -> None:
+        """Print the delay, where something new has come."""
+        found = self.get_delay()
+        if found is None:
+            return
+        mean, low, high, std_dev, window = found
+        print(f"average delay: {mean:.3f}")
+        print(f"\tmin: {low:.3f}s max: {high:.3f}s std dev: {std_dev:.5f}s window: {window}")
+
+
+def rostopicmain(argv: Sequence[str] | None = None) -> int:
+    """The command; ``argv`` begins with its name. Its exit status."""
+    from minirospy.cli.rostopic import main
+
+    return main(list(sys.argv if argv is None else argv)[1:])
+
+
+def _bytes(size: float) -> str:
+    """A number of bytes as `rostopic bw` prints it."""
+    if size < 1000:
+        return f"{size:.2f}B"
+    return f"{size / 1000:.2f}KB" if size < 1000000 else f"{size / 1000000:.2f}MB"
+
+
 @contextmanager
 def _graph() -> Iterator[Graph]:
     try:
         with Graph.open("rostopic") as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise ROSTopicIOException(str(error)) from error
+        raise _NoMaster(str(error)) from error
     except MinirospyError as error:
         raise ROSTopicException(str(error)) from error

@@ -1,0 +1,155 @@
+"""rosclean: how much the log files take, and removing them.
+
+Source: http://wiki.ros.org/rosclean. What is printed is what ROS prints; sizes are those of the files' blocks, as du
+counts them. Where nobody answers (no terminal, an empty pipe) nothing is removed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.cli.command import Parser
+from minirospy.cli.verbs import Family, Verb
+from minirospy.errors import MinirospyError, UsageError
+
+__all__ = ["disk_usage", "human_size", "main"]
+
+_MEGABYTE = 1024 * 1024
+_BLOCK = 4096
+
+
+class _Logs(NamedTuple):
+    folder: Path
+    label: str
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status."""
+    return _FAMILY.main(argv)
+
+
+def _check(argv: Sequence[str]) -> None:
+    Parser("rosclean check", description="Print how much the log files take.").parse_args(argv)
+    for folder, label in _places():
+        print(f"{human_size(disk_usage(folder))} {label}")
+
+
+def _purge(argv: Sequence[str]) -> None:
+    parser = Parser("rosclean purge", description="Remove log files; asks before it does.")
+    parser.add_argument("-y", dest="yes", action="store_true", help="remove them without a question")
+    parser.add_argument("--size", type=int, metavar="MB", help="keep the newest, so many MB of them")
+    options = parser.parse_args(argv)
+    if options.size is not None and options.size < 0:
+        raise UsageError(f"--size {options.size} is less than nothing")
+    for logs in _places():
+        if options.size is None:
+            print(f"Purging {logs.label}.", flush=True)
+            if options.yes or _agreed(f"rm -rf {logs.folder}"):
+                _remove(logs.folder)
+            continue
+        size = _size(logs.folder)
+        if size <= options.size * _MEGABYTE:
+            print(f"Directory size of {logs.label} is {size // _MEGABYTE} MB which is already below the "
+                  f"requested threshold of {options.size} MB.", flush=True)  # fmt: skip
+            continue
+        print(f"Purging {logs.label} until directory size is at most {options.size} MB "
+              f"(currently {size // _MEGABYTE} MB).", flush=True)  # fmt: skip
+        if options.yes or _agreed(f"Purge some of old logs in {logs.folder}"):
+            _remove_oldest(logs.folder, size - options.size * _MEGABYTE)
+
+
+def _places() -> list[_Logs]:
+    """The folders of logs that there are."""
+    from minirospy.workspace.rospkg import get_log_dir, get_ros_home
+
+    places = (
+        _Logs(Path(get_log_dir()), "ROS node logs"),
+        _Logs(Path(get_ros_home(), "rosmake"), "rosmake logs"),
+    )
+    return [each for each in places if each.folder.is_dir()]
+
+
+def _agreed(command: str) -> bool:
+    """Whether the person at the terminal says yes to ``command``; asked again on anything but y and n."""
+    question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\n{command}\n(y/n)?"
+    while True:
+        print(question, flush=True)
+        try:
+            answer = input().strip().lower()
+        except EOFError:
+            return False
+        if answer in ("y", "n"):
+            return answer == "y"
+
+
+def _remove_oldest(folder: Path, excess: int) -> None:
+    """Remove what was changed first in a folder until ``excess`` bytes have gone."""
+    entries = [path for path in folder.iterdir() if not path.is_symlink()]
+    for path in sorted(entries, key=lambda path: path.stat().st_mtime):
+        if excess <= 0:
+            break
+        excess -= _size(path)
+        _remove(path)
+    for link in folder.iterdir():
+        # `latest`, where what it points to has gone.
+        if link.is_symlink() and not link.exists():
+            link.unlink()
+
+
+def _remove(path: Path) -> None:
+    try:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+    except OSError as error:
+        raise MinirospyError(f"cannot remove {error.filename or path}: {error.strerror}") from error
+
+
+def _statuses(path: Path) -> Iterator[os.stat_result]:
+    """Of all files and folders at and below a path; of what goes meanwhile, none."""
+    for each in (path, *path.rglob("*")):
+        try:
+            yield each.lstat()
+        except OSError:
+            continue
+
+
+def _size(path: Path) -> int:
+    return sum(status.st_size for status in _statuses(path))
+
+
+def disk_usage(folder: Path) -> int:
+    """Bytes of whole blocks; on Windows, whose files tell none, of blocks of the usual size."""
+    return sum(
+        status.st_blocks * 512
+        if hasattr(status, "st_blocks")
+        else math.ceil(status.st_size / _BLOCK) * _BLOCK
+        for status in _statuses(folder)
+    )
+
+
+def human_size(size: float) -> str:
+    """A size as `du -h` prints it: 4.0K, 11M; rounded up."""
+    if size < 1024:
+        return f"{size:.0f}"
+    for unit in "KMGT":
+        size /= 1024
+        if math.ceil(size * 10) / 10 < 10:
+            return f"{math.ceil(size * 10) / 10:.1f}{unit}"
+        if math.ceil(size) < 1024:
+            return f"{math.ceil(size)}{unit}"
+    return f"{math.ceil(size)}T"
+
+
+_FAMILY = Family(
+    "rosclean",
+    "rosclean is a command-line tool for the log files of ROS.",
+    (Verb("check", "check usage of log files", _check), Verb("purge", "remove log files", _purge)),
+    "Type rosclean <command> -h for more detailed usage, e.g. 'rosclean purge -h'",
+)

@@ -1,0 +1,152 @@
+"""rosconsole: the levels of a node's loggers, and what nodes log.
+
+Source: http://wiki.ros.org/rosconsole (the command). What is printed is what ROS prints.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any
+
+from minirospy.cli.command import Parser
+from minirospy.cli.verbs import Family, Verb
+from minirospy.errors import MinirospyError, NotFoundError, UsageError
+from minirospy.introspect.graph import Graph
+from minirospy.introspect.nodes import find_node
+from minirospy.introspect.services import call_service, fill_request
+
+if TYPE_CHECKING:
+    from re import Pattern
+
+__all__ = ["main"]
+
+_LEVELS = {"debug": 1, "info": 2, "warn": 4, "error": 8, "fatal": 16}
+"""Names -> the levels of rosgraph_msgs/Log."""
+
+_COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status."""
+    return _FAMILY.main(argv)
+
+
+def _list(argv: Sequence[str]) -> None:
+    parser = Parser("rosconsole list", description="List the loggers of a node.")
+    parser.add_argument("node", help="the node's name")
+    options = parser.parse_args(argv)
+    with Graph.open("rosconsole") as graph:
+        print("\n".join(_loggers(graph, options.node)))
+
+
+def _get(argv: Sequence[str]) -> None:
+    parser = Parser("rosconsole get", description="Print the level of a node's logger.")
+    parser.add_argument("node", help="the node's name")
+    parser.add_argument("logger", help="the logger, as rosout")
+    options = parser.parse_args(argv)
+    with Graph.open("rosconsole") as graph:
+        print(_level(graph, options.node, options.logger).upper())
+
+
+def _set(argv: Sequence[str]) -> None:
+    parser = Parser("rosconsole set", description="Set the level of a node's logger.")
+    parser.add_argument("node", help="the node's name")
+    parser.add_argument("logger", help="the logger, as rosout")
+    parser.add_argument("level", type=str.lower, choices=list(_LEVELS), help="what it says at least")
+    options = parser.parse_args(argv)
+    with Graph.open("rosconsole") as graph:
+        # A node takes any name; asked first, one that it does not have is told of.
+        _level(graph, options.node, options.logger)
+        _ask(
+            graph, options.node, "set_logger_level", "roscpp/SetLoggerLevel", [options.logger, options.level]
+        )
+
+
+def _echo(argv: Sequence[str]) -> int:
+    parser = Parser("rosconsole echo", description="Print what nodes log, until Ctrl-C.")
+    parser.add_argument("filter", metavar="FILTER", nargs="?", default=".*",
+                        help="a regular expression: only nodes whose name begins so (default: .*)")  # fmt: skip
+    parser.add_argument("-l", "--level", type=str.lower, choices=list(_LEVELS), default="warn",
+                        help="only what has at least this level (default: warn)")  # fmt: skip
+    parser.add_argument("-1", "--once", action="store_true", help="end after the first line")
+    parser.add_argument("--topic", default="/rosout", help="listen to this topic (default: /rosout)")
+    parser.add_argument("--nocolor", action="store_true", help="no colours")
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print the time and the place in the code, too"
+    )
+    options = parser.parse_args(argv)
+    try:
+        wanted = re.compile(options.filter)
+    except re.error as error:
+        raise UsageError(f"[{options.filter}] is not a regular expression: {error}") from error
+    return _print_lines(wanted, options)
+
+
+def _print_lines(wanted: Pattern[str], options: Any) -> int:
+    from minirospy.environment import Environment
+    from minirospy.introspect.streams import ToolNode
+
+    environment = Environment.read()
+    with ToolNode(environment, "rosconsole") as node, Graph.open("rosconsole") as graph:
+        for received in node.inbox(graph.resolve(options.topic)):
+            log = node.classes.read(received)
+            if log._type != "rosgraph_msgs/Log":
+                raise MinirospyError(f"[{options.topic}] carries {log._type}, not rosgraph_msgs/Log")
+            if log.level < _LEVELS[options.level] or not wanted.match(log.name):
+                continue
+            print(_shown(log, colour=not options.nocolor, verbose=options.verbose), flush=True)
+            if options.once:
+                break
+    return 0
+
+
+def _shown(log: Any, *, colour: bool, verbose: bool) -> str:
+    name = next((name for name, level in _LEVELS.items() if level == log.level), str(log.level))
+    label = f"{name.upper():5}"
+    if colour:
+        label = f"\033[{_COLOURS.get(name, 97)}m{label}\033[0m"
+    text = f"[ {label} ] [\033[1m{log.name}\033[21m]: {log.msg}"
+    if verbose:
+        seconds = log.header.stamp.to_sec()
+        when = datetime.fromtimestamp(seconds, timezone.utc).astimezone()
+        text += f"\n          [{when} ({seconds:.6f})] [{log.function}]: {log.file}:{log.line}"
+    return text
+
+
+def _loggers(graph: Graph, node: str) -> dict[str, str]:
+    """Logger -> level (in small letters), as the node tells them."""
+    response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
+    return {logger.name: logger.level for logger in response.loggers}
+
+
+def _level(graph: Graph, node: str, logger: str) -> str:
+    loggers = _loggers(graph, node)
+    if logger not in loggers:
+        raise NotFoundError(f"logger of node {node}", logger, loggers)
+    return loggers[logger]
+
+
+def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Any:
+    """The response of a node's own service."""
+    name = find_node(graph, graph.resolve(node)).name
+    try:
+        return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))
+    except NotFoundError as error:
+        raise MinirospyError(
+            f"node [{name}] tells nothing of its loggers: it has no service {service}"
+        ) from error
+
+
+_FAMILY = Family(
+    "rosconsole",
+    "rosconsole is a command-line tool for configuring the logger level of ROS nodes.",
+    (
+        Verb("get", "display level for a logger", _get),
+        Verb("list", "list loggers for a node", _list),
+        Verb("set", "set level for a logger", _set),
+        Verb("echo", "print logger messages", _echo),
+    ),
+    "Type rosconsole <command> -h for more detailed usage, e.g. 'rosconsole list -h'",
+)

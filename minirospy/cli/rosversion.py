@@ -1,0 +1,48 @@
+"""rosversion: the version of a package, or of the ROS distribution.
+
+Source: http://wiki.ros.org/rosversion. minirospy is no distribution: -d prints ROS_DISTRO where a workspace or a real
+ROS has set it, else noetic, the last of ROS 1 and the one whose files and wire these are.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from minirospy.cli.command import Parser, run
+from minirospy.errors import UsageError
+from minirospy.workspace.manifest import read_manifest
+from minirospy.workspace.packages import Packages
+from minirospy.workspace.rospkg import current_distro_codename
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; exit status as in minirospy.cli.command."""
+    return run("rosversion", lambda: _rosversion(argv))
+
+
+def _rosversion(argv: Sequence[str] | None) -> None:
+    parser = Parser(
+        "rosversion", description="Print the version of a package, or the name of the ROS distribution."
+    )
+    parser.add_argument("package", nargs="?", help="the package's name, as rpi_feros")
+    parser.add_argument("-s", "--skip-newline", action="store_true", help="print no line feed at the end")
+    parser.add_argument("-d", "--distro", action="store_true", help="print the name of the ROS distribution")
+    parser.add_argument("-a", "--all", action="store_true", help="print every package and its version")
+    options = parser.parse_args(argv)
+    if (options.package is not None) + options.distro + options.all != 1:
+        raise UsageError("name one package, or -d for the distribution, or -a for every package")
+    if options.distro:
+        text = current_distro_codename()
+    elif options.all:
+        folders = Packages().folders()
+        text = "\n".join(f"{name}: {read_manifest(folders[name]).version}" for name in sorted(folders))
+    else:
+        text = read_manifest(Packages().find(options.package)).version
+    sys.stdout.write(text if options.skip_newline else text + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""What `rostopic pub` publishes: YAML values of a command line, a file or a stream become messages, at a rate.
+
+Source: http://wiki.ros.org/rostopic#rostopic_pub.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import NotFoundError, UsageError
+from minirospy.introspect.values import message_values, parse_arguments, parse_documents, parse_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from minirospy.introspect.graph import Graph
+    from minirospy.introspect.streams import ToolNode, TopicPublisher
+
+__all__ = ["other_type", "publish_all", "values_to_publish"]
+
+
+def values_to_publish(
+    fields: Sequence[str], arguments: Sequence[str], file: str | None
+) -> Iterator[list[Any]]:
+    """The YAML values of each message with ``fields``; at least one.
+
+    ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raises
+    UsageError where there are no values, NotFoundError where there is no file, ValueTextError on what is not YAML.
+    """
+    if arguments or (file is None and not fields):
+        yield parse_arguments(arguments)
+        return
+    where = file or "standard input"
+    if file is not None:
+        documents = parse_documents(_read_text(file), where)
+    elif sys.stdin.isatty():
+        raise UsageError(f"please specify message values: {' '.join(fields)}")
+    else:
+        documents = parse_lines(sys.stdin, where)
+    found = False
+    for values in message_values(documents):
+        found = True
+        yield values
+    if not found:
+        raise UsageError(f"{where} holds no message; please specify message values: {' '.join(fields)}")
+
+
+def publish_all(
+    node: ToolNode,
+    publisher: TopicPublisher,
+    messages: Iterable[Any],
+    rate: float,
+    on_message: Callable[[Any], object],
+) -> None:
+    """Publish ``rate`` messages a second by the node's clock until they end or the node is asked to stop."""
+    start = node.clock.now()
+    for sent, message in enumerate(messages, 1):
+        on_message(message)
+        publisher.publish(message)
+        # From the start, not from the last message: pauses that come out too long do not add up.
+        pause = round(start + sent * 1e9 / rate) - node.clock.now()
+        if not node.clock.sleep(max(0, pause), node.ended):
+            return
+
+
+def other_type(graph: Graph, topic: str, type_: str) -> str | None:
+    """The type of a topic that somebody uses with another than ``type_``."""
+    state = graph.state()
+    # The master remembers the type of a topic that everybody has left: that one is free.
+    used = topic in state.publishers or topic in state.subscribers
+    other = graph.master.get_topic_types().get(topic, "*")
+    return other if used and other not in ("*", type_) else None
+
+
+def _read_text(file: str) -> str:
+    try:
+        with open(file, encoding="utf-8") as stream:
+            return stream.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise NotFoundError(
+            "file", file, hint=getattr(error, "strerror", None) or "it is not UTF-8 text"
+        ) from error

@@ -1,0 +1,3 @@
+"""rosgraph.impl, filled in by minirospy."""
+
+from rosgraph.impl import graph as graph

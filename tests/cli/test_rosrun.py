@@ -1,0 +1,166 @@
+"""cli/rosrun: which program of a package is run, in which way, and what is said where none can be."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from minirospy.cli import rosrun
+
+BIN = Path(sys.executable).parent
+posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX systems")
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """my: Python and shell scripts, two of them named alike."""
+    folder = tmp_path / "src" / "my"
+    for name, text in {
+        "scripts/talker.py": "import sys\nprint('talks', *sys.argv[1:])\nsys.exit(7)\n",
+        "scripts/deep/down": '#!/bin/sh\necho deep down "$@"\n',
+        "scripts/twin": "#!/bin/sh\necho twin of scripts\n",
+        "nodes/twin": "#!/bin/sh\necho twin of nodes\n",
+        "scripts/bare": 'echo no first line "$1"\n',
+        "scripts/elsewhere": "#!/no/such/shell -x\n",
+        "scripts/windows": "#!/bin/sh\r\necho x\r\n",
+        "scripts/dies": "#!/bin/sh\nkill -TERM $$\n",
+        "package.xml": "<package><name>my</name></package>",
+    }.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(text.encode())
+        if "." not in name:
+            (folder / name).chmod(0o755)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
+    return folder
+
+
+def rosrun_(*words: str, stdin: str = "", **environ: str) -> tuple[int, str, str]:
+    """The exit status of the command, and what it and the program print."""
+    done = subprocess.run(
+        [str(BIN / "rosrun"), *words],
+        input=stdin, capture_output=True, text=True, timeout=20, check=False, env={**os.environ, **environ},
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_words_and_status_are_the_programs_own(package: Path) -> None:
+    assert rosrun_("my", "talker.py", "-h", "--prefix", "x") == (7, "talks -h --prefix x\n", "")
+
+
+@posix
+def test_a_program_in_a_folder_of_a_folder(package: Path) -> None:
+    assert rosrun_("my", "down", "a")[:2] == (0, "deep down a\n")
+    assert rosrun_("my", "scripts/deep/down", "b")[:2] == (0, "deep down b\n")
+
+
+@posix
+def test_of_several_of_one_name_one_is_chosen(package: Path) -> None:
+    status, out, err = rosrun_("my", "twin", stdin="9\nx\n2\n")
+    assert (status, out.splitlines()[1:]) == (0, ["twin of scripts"])
+    assert out.startswith(
+        "[rosrun] You have chosen a non-unique executable, please pick one of the following:\n"
+    )
+    assert err == f"1) {package}/nodes/twin\n2) {package}/scripts/twin\n#? #? #? "
+    assert rosrun_("my", "nodes/twin")[1] == "twin of nodes\n"
+
+
+@posix
+def test_where_nobody_can_choose_it_ends(package: Path) -> None:
+    status, _, err = rosrun_("my", "twin")
+    assert status == 2
+    assert err.splitlines()[-1] == "#? rosrun: ERROR: nobody chose: name the path, as `rosrun my nodes/twin`"
+
+
+@posix
+def test_what_a_build_has_put_in_devel_is_no_second_program(package: Path, tmp_path: Path) -> None:
+    built = tmp_path / "devel" / "lib" / "my"
+    built.mkdir(parents=True)
+    for name in ("down", "compiled"):
+        (built / name).write_text("#!/bin/sh\necho built\n")
+        (built / name).chmod(0o755)
+    prefix = str(tmp_path / "devel")
+    assert rosrun_("my", "down", CMAKE_PREFIX_PATH=prefix)[1] == "deep down\n"
+    assert rosrun_("my", "compiled", CMAKE_PREFIX_PATH=prefix)[1] == "built\n"
+    (package / "scripts" / "deep" / "down").chmod(0o644)
+    assert rosrun_("my", "down", CMAKE_PREFIX_PATH=prefix)[1] == "built\n"
+
+
+@posix
+def test_prefix_and_debug(package: Path) -> None:
+    assert rosrun_("--prefix", "echo 'a b'", "my", "down", "c")[1] == f"a b {package}/scripts/deep/down c\n"
+    assert rosrun_("--prefix=echo", "my", "down")[1] == f"{package}/scripts/deep/down\n"
+    _, out, err = rosrun_("-d", "my", "down", "c d")
+    assert out == "deep down c d\n"
+    assert err.splitlines() == [
+        f"[rosrun] Looking in rospack dir: {package}",
+        f"[rosrun] Running {package}/scripts/deep/down 'c d'",
+    ]
+
+
+@posix
+def test_the_signal_that_ends_the_program_is_the_commands(package: Path) -> None:
+    assert rosrun_("my", "dies")[0] == -signal.SIGTERM
+
+
+@posix
+def test_a_script_without_a_first_line_is_the_shells(package: Path) -> None:
+    assert rosrun_("my", "bare", "x")[:2] == (0, "no first line x\n")
+
+
+def fails(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+    status = rosrun.main(words)
+    out, err = capsys.readouterr()
+    assert not out
+    assert err.count("\n") == 1
+    return status, err.removeprefix("rosrun: ERROR: ").rstrip()
+
+
+@posix
+@pytest.mark.parametrize(
+    ("program", "why"),
+    [
+        ("elsewhere", "its first line asks for [/no/such/shell -x], which is not there"),
+        ("windows", "its lines end as those of Windows"),
+    ],
+)
+def test_a_program_that_cannot_be_run(
+    package: Path, program: str, why: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, said = fails(capsys, "my", program)
+    assert status == 2
+    assert said.startswith(f"cannot run {package}/scripts/{program}: {why}")
+
+
+def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert fails(capsys, "my")[1].startswith("type rosrun PACKAGE PROGRAM: [my] has ")
+    assert "talker.py" in fails(capsys, "my")[1]
+    assert fails(capsys, "mi", "x") == (
+        1,
+        "package [mi] not found; did you mean my? (ROS_PACKAGE_PATH names the folders that are searched)",
+    )
+    assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
+    assert fails(capsys, "--prefix") == (
+        2,
+        "option --prefix is unknown, or lacks its value (`rosrun -h` shows what there is)",
+    )
+    assert fails(capsys, "--prefix", "'a", "my", "talker.py") == (2, "--prefix ['a]: No closing quotation")
+
+
+@posix
+def test_what_is_not_executable_is_told_how_to_become_so(
+    package: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (package / "scripts" / "twin").chmod(0o644)
+    (package / "nodes" / "twin").chmod(0o644)
+    path = package / "nodes" / "twin"
+    assert fails(capsys, "my", "twin") == (1, f"{path} is not executable: chmod +x {path}")
+
+
+def test_a_bad_master_uri_is_no_hindrance(package: Path) -> None:
+    assert rosrun_("my", "talker.py", ROS_MASTER_URI="nonsense")[0] == 7

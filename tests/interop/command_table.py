@@ -1,0 +1,531 @@
+"""Every command and option of rostopic, rosnode, rosservice, rosparam, rosmsg and rossrv, typed in real ROS and in ours.
+
+`WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes what both print to docs/command_compatibility.md.
+Compared are standard output and the exit status; what stands on stderr is for people, and only shown.
+
+A line below is what is typed, then perhaps ` <<< text` for standard input and ` ## why` ours differs on purpose.
+"""
+
+from __future__ import annotations
+
+import html
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+PAGE = Path(__file__).parents[2] / "docs" / "command_compatibility.md"
+REAL = Path("/usr/bin")
+OURS = Path(sys.executable).parent
+
+_BAG = "bags come later: said in one line, exit 1 as of a bag that is not there"
+_NEAREST = "one line with the nearest names in place of the whole help; exit 2 as of everything typed wrong"
+_HELP = "help that was asked for is no error: exit 0"
+_UNKNOWN = "what does not exist is an error: exit 1 and one line"
+_TRACEBACK = "real ROS ends with a traceback"
+_ONE_STATUS = "exit 1 as of everything that could not be done"
+_PIPE = "real ROS waits for a name in the terminal or from a pipe that brings none"
+
+ASKING = f"""
+rostopic ## {_NEAREST}
+rostopic -h ## {_HELP}
+rostopic lsit ## {_NEAREST}
+rostopic list
+rostopic list -v
+rostopic list -p
+rostopic list -s
+rostopic list -vp
+rostopic list -v -s
+rostopic list -p -s
+rostopic list /ns
+rostopic list ns
+rostopic list /nope
+rostopic list -v /ns
+rostopic list --host
+rostopic list -v --host -p
+rostopic list -b nope.bag
+rostopic list a b
+rostopic list --verbos
+rostopic list --hots
+rostopic info /button_state
+rostopic info listen
+rostopic info /any
+rostopic info /button_stat
+rostopic info
+rostopic type /button_state
+rostopic type /poly/polygon/points
+rostopic type /poly/header/stamp
+rostopic type /poly/polygon/points[0]/x ## {_TRACEBACK}
+rostopic type /poly/heder
+rostopic type /nope
+rostopic find std_msgs/Bool
+rostopic find std_msgs/Nope
+rostopic find
+rosnode ## {_NEAREST}
+rosnode lits ## {_NEAREST}
+rosnode list
+rosnode list -u
+rosnode list -a
+rosnode list -a -u
+rosnode list /scene
+rosnode list a b
+rosnode info /scene
+rosnode info -q scene
+rosnode info scene /scene -q
+rosnode info nope -q scene ## {_UNKNOWN}
+rosnode info
+rosnode machine
+rosnode machine localhost
+rosnode machine nope
+rosnode ping -c 1 scene
+rosnode ping -c 2 scene
+rosnode ping -a
+rosnode ping -a -c 2
+rosnode ping nope ## {_UNKNOWN}
+rosnode ping -c x scene
+rosnode kill nope nope2
+rosnode kill <<< x\\n9\\n ## {_TRACEBACK}
+rosnode cleanup
+rosservice ## {_NEAREST}
+rosservice lits ## {_NEAREST}
+rosservice list
+rosservice list -n
+rosservice list /ns
+rosservice list -n /nope
+rosservice info /set_led_state
+rosservice info /nope
+rosservice type ns/empty
+rosservice type /set_led_stat
+rosservice args /set_led_state
+rosservice args /ns/empty
+rosservice args /nope ## {_ONE_STATUS}
+rosservice uri /set_led_state
+rosservice uri /nope
+rosservice find std_srvs/SetBool
+rosservice find nope
+rosservice call /set_led_state True
+rosservice call /set_led_state 1 --wait
+rosservice call -v /set_led_state 'data: False'
+rosservice call /set_led_state {{}}
+rosservice call /ns/empty
+rosservice call /set_led_state -v <<< data: true\\n---\\ndata: false\\n---\\n
+rosservice call /set_led_state <<< data: true\\n ## real ROS forgets a document that has no --- behind it
+rosservice call /set_led_state ## a call without values is an error: exit 2
+rosservice call /set_led_state 1 2 ## {_ONE_STATUS}
+rosservice call /set_led_state 'dta: 1' ## {_ONE_STATUS}
+rosservice call /set_led_state nope ## {_ONE_STATUS}
+rosservice call /set_led_state '[1'
+rosservice call /fail ## {_ONE_STATUS}
+rosservice call /nope ## {_ONE_STATUS}
+rosservice call
+rosparam ## {_NEAREST}
+rosparam gt ## {_NEAREST}
+rosparam list
+rosparam list /p/d
+rosparam list /nope
+rosparam list a b
+rosparam get /p
+rosparam get -p /p
+rosparam get /p/i
+rosparam get /p/f
+rosparam get /p/b
+rosparam get /p/s
+rosparam get -p /p/s
+rosparam get /p/n
+rosparam get -p /p/n
+rosparam get /p/e
+rosparam get /p/u
+rosparam get -p /p/u
+rosparam get /p/ml
+rosparam get -p /p/ml
+rosparam get /p/l
+rosparam get -p /p/l
+rosparam get -v /p/big
+rosparam get /p/nope
+rosparam get
+rosparam dump
+rosparam dump -v dumped.yaml /p/d
+rosparam dump dumped.yaml /nope
+rosparam dump - /p/d ## to standard output; real ROS writes a file called -
+rosparam load nope.yaml
+rosparam load /etc/os-release
+rosmsg ## {_NEAREST}
+rosmsg shwo ## {_NEAREST}
+rosmsg show std_msgs/Bool
+rosmsg show Bool
+rosmsg show PoseStamped
+rosmsg show Log
+rosmsg show actionlib/TestAction
+rosmsg show <<< std_msgs/Header\\n
+rosmsg show std_msgs/Bol
+rosmsg show -b nope.bag std_msgs/Bool
+rosmsg show -r std_msgs/Header ## the comments of the definitions are our own
+rosmsg info std_msgs/Header
+rosmsg md5 Bool
+rosmsg md5 <<< std_msgs/Header\\n
+rosmsg md5 std_msgs/Nope ## {_UNKNOWN}
+rosmsg package std_msgs
+rosmsg package -s std_msgs
+rosmsg package nope ## {_ONE_STATUS}
+rossrv ## {_NEAREST}
+rossrv show SetBool
+rossrv show Empty
+rossrv show <<< std_srvs/SetBool\\n
+rossrv show nope
+rossrv show -b nope.bag std_srvs/Empty
+rossrv info std_srvs/Trigger
+rossrv md5 std_srvs/SetBool
+rossrv package std_srvs
+rossrv package -s std_srvs
+rosmsg-proto msg std_msgs/Header
+rosmsg-proto msg geometry_msgs/PoseStamped
+rosmsg-proto msg geometry_msgs/PoseStamped -f 0
+rosmsg-proto msg geometry_msgs/PoseStamped -f 1
+rosmsg-proto msg geometry_msgs/PoseStamped -H -p ab
+rosmsg-proto msg geometry_msgs/PolygonStamped -e
+rosmsg-proto msg geometry_msgs/PoseStamped -x header,orientation
+rosmsg-proto srv std_srvs/SetBool
+rosmsg-proto msg nope
+rosmsg-proto
+"""
+
+_TOPICS = """
+button_state ns/chatter poly scan joints image duration time bytes int8s signed_bytes char tiny empty
+poly/polygon poly/polygon/points poly/polygon/points[0] poly/polygon/points[0]/x poly/polygon/points[:]/x
+poly/polygon/points[1:] poly/polygon/points[::-1] poly/header/stamp ns/chatter/data scan/ranges scan/ranges[1:3]
+joints/name joints/name[1] joints/name[-1] duration/data duration/data/secs
+"""
+
+ECHOING = (
+    "\n".join(f"rostopic echo -n1 /{topic}" for topic in _TOPICS.split())
+    + "\n"
+    + "\n".join(
+        f"rostopic echo -n1 {option} /{topic}"
+        for option in ("-p", "--nostr", "--noarr", "-w 6")
+        for topic in ("poly", "scan", "joints", "image", "ns/chatter")
+    )
+    + """
+rostopic echo -n1 -c /button_state
+rostopic echo -n1 -c -p /button_state
+rostopic echo -n1 --nostr /joints/name
+rostopic echo -n1 --noarr /poly/polygon/points
+rostopic echo -n1 --filter 'm.data==True' /button_state
+rostopic echo -n1 --offset /duration
+rostopic echo -n 0 /button_state
+rostopic echo -w 1 /tiny
+rostopic echo -a /tiny
+rostopic echo -b nope.bag /tiny
+rostopic echo --fliter m.data /tiny
+rostopic echo
+rostopic echo -n1 /button_state/nope ## a field that is not there is an error: exit 1; real ROS waits for ever
+rostopic echo -n1 /poly/polygon/points/x ## an array is no message: exit 1; real ROS waits for ever
+rostopic echo -n1 --filter 'm.(' /button_state ## what is not Python is an error: exit 2; real ROS prints tracebacks
+rostopic echo -n1 /image/data ## real ROS ends with a traceback
+rostopic hz
+rostopic hz -w x /t
+rostopic bw -w x /t
+rostopic delay
+rostopic pub -1 /out std_msgs/String hello
+rostopic pub -1 -v /out std_msgs/String 'data: hello'
+rostopic pub -1 -v /out geometry_msgs/Point 1 2 3
+rostopic pub -1 -v /out geometry_msgs/Point -- -1 -2 -3
+rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3 ## negative numbers are values: real ROS takes -2 for an option
+rostopic pub -1 -v /out geometry_msgs/Point '{x: 1}'
+rostopic pub -1 -v /out geometry_msgs/Point 1 2
+rostopic pub -1 -v /out geometry_msgs/PointStamped '{header: auto, point: {x: 1}}'
+rostopic pub -1 -v /out std_msgs/Time now
+rostopic pub -1 -l /out std_msgs/Empty
+rostopic pub -1 -v /out std_msgs/String <<< data: one\\n---\\ndata: two\\n---\\n
+rostopic pub -1 --use-rostime /out std_msgs/String x
+rostopic pub -1 /out std_msgs/Bool nope ## a value that does not fit is refused: exit 1; real ROS sends nothing, exit 0
+rostopic pub -1 -r 5 /out std_msgs/Bool 1
+rostopic pub -r 0 /out std_msgs/Bool 1
+rostopic pub -f nope.yaml /out std_msgs/Bool
+rostopic pub -f nope.yaml /out std_msgs/Bool 1
+rostopic pub -1 /out std_msgs/Bool 'data: [1' ## a value that is not YAML: exit 1
+rostopic pub -1 /out std_msgs/Bol 1
+rostopic pub /out
+"""
+)
+
+STREAMING = """
+4 rostopic echo -p /fast
+3 rostopic hz /fast
+5 rostopic hz /fast /slow
+3 rostopic hz -w 5 --wall-time --tcpnodelay /fast
+3 rostopic hz --filter "m.data=='hello'" /slow
+3 rostopic hz /fast/header
+3 rostopic bw /fast
+3 rostopic bw -w 5 /slow
+3 rostopic delay /fast
+3 rostopic delay -w 5 --tcpnodelay /fast
+1 rostopic pub /out std_msgs/String hello
+1 rostopic pub -v -l /out std_msgs/String hello
+3 rostopic pub -v -r 5 /out std_msgs/String hello
+3 rostopic pub -v -r 5 -s /out geometry_msgs/PointStamped '{header: auto}'
+4 rosnode ping scene
+"""
+"""Each with the number of lines after which Ctrl-C ends it; numbers in them are not compared."""
+
+CHANGING = f"""
+rosparam set -v /q 5
+rosparam set -v /q/x -1.5
+rosparam set -v /q/x deg(90)
+rosparam set -v /q/y '{{a: 1, b: [2, 3]}}'
+rosparam get /q
+rosparam set /q/s ''
+rosparam set /q/s -t text.txt
+rosparam get /q/s
+rosparam set /q/s -b text.txt
+rosparam set -t nope.txt /q/s ## {_ONE_STATUS}
+rosparam set -t text.txt -b text.txt /q/s
+rosparam set /q/s '[1'
+rosparam set /q/s null
+rosparam set /q/s 99999999999
+rosparam set /q/s
+rosparam set / 5
+rosparam load -v values.yaml /q/l
+rosparam load values.yaml
+rosparam load -v - /q/l <<< d: 4\\n
+rosparam load - /q/l <<< [1
+rosparam get /q/l
+rosparam dump -v dumped.yaml /q/l
+rosparam delete -v /q
+rosparam delete /q
+rosparam delete -v /a
+rosparam delete /inner
+rosparam delete
+"""
+
+UNREACHABLE = f"""
+rosnode info dead
+rosnode info unresolved
+rosnode ping -c 1 dead ## a node that does not answer: exit 1
+rosnode ping -c 1 unresolved ## a node that does not answer: exit 1
+rosnode cleanup <<< n\\n
+rosservice type /dead/srv ## {_ONE_STATUS}
+rosservice call /dead/srv ## {_ONE_STATUS}
+rosservice call /unresolved/srv 1 ## {_ONE_STATUS}
+rosservice uri /dead/srv
+rostopic info /t/dead
+rosnode kill dead
+rosnode cleanup <<< y\\n
+rosnode list
+"""
+
+WITHOUT_MASTER = f"""
+rostopic list
+rostopic info /a
+rostopic type /a
+rostopic find std_msgs/Bool
+rostopic echo /a
+rostopic hz /a
+rostopic pub -1 /a std_msgs/Bool 1
+rosnode list
+rosnode info /a ## nothing is printed before it is known
+rosnode ping /a ## nothing is printed before it is known
+rosnode cleanup
+rosservice list ## {_ONE_STATUS}
+rosservice call /a ## {_ONE_STATUS}
+rosparam list
+rosparam get /a
+rosparam set /a 1
+rosparam load values.yaml
+"""
+
+_STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
+_CHANGING = [
+    # Numbers of messages, times, processes and ports: they differ from run to run.
+    (re.compile(r"(?<=seq:)\s+\d+"), " 0"),
+    (re.compile(r"(?<=time=)[\d.]+(?=ms)|(?<=ping average: )[\d.]+(?=ms)"), "0.0"),
+    (re.compile(r"^\d{18,},|^(?:0|1000000002),\d+,", re.MULTILINE), "0,"),
+    (re.compile(r"(?<=secs: )1[789]\d{8}\n\s+nsecs:\s+\d+"), "1700000000\n nsecs: 0"),
+    (re.compile(r"(?<=://localhost:)\d+|(?<=://127.0.0.1:)\d+"), "40000"),
+    (re.compile(r"\(\d+ - (\S+?):\d+\) \[\d+\]"), r"(40000 - \1:50000) [9]"),
+    (re.compile(r"(?<=Pid: )\d+"), "4711"),
+]
+
+
+class Ended(NamedTuple):
+    """How a command ended and what it printed."""
+
+    status: int | str
+    out: str
+    err: str
+
+
+class Row(NamedTuple):
+    """A line of the table."""
+
+    typed: str
+    real: Ended
+    ours: Ended
+    why: str
+
+    @property
+    def equal(self) -> bool:
+        """Whether standard output and exit status are the same."""
+        return self.real[:2] == self.ours[:2]
+
+
+def compare(
+    text: str,
+    uri: str,
+    folder: Path,
+    *,
+    streaming: bool = False,
+    prepare: Callable[[], object] | None = None,
+) -> list[Row]:
+    """Both tools on each line of ``text``, side by side; with ``prepare`` all lines in one, then in the other.
+
+    ``prepare()`` is called before each of them.
+    """
+    lines = [line for line in text.strip().splitlines() if line]
+    if prepare:
+        sides: list[list[Ended]] = [[], []]
+        for side, tools in zip(sides, (REAL, OURS), strict=True):
+            for line in lines:
+                prepare()
+                side.append(_run(line, tools, uri, folder, streaming))
+        real, ours = sides
+    else:
+        with ThreadPoolExecutor(6) as pool:
+            jobs = [
+                [pool.submit(_run, line, tools, uri, folder, streaming) for tools in (REAL, OURS)]
+                for line in lines
+            ]
+            real, ours = ([job[side].result() for job in jobs] for side in (0, 1))
+    return [
+        Row(_typed(line, streaming), *both, line.partition(" ## ")[2])
+        for line, both in zip(lines, zip(real, ours, strict=True), strict=True)
+    ]
+
+
+def unexpected(rows: Iterable[Row]) -> str:
+    """The rows that differ without a reason, or have a reason and do not differ."""
+    return "\n".join(
+        f"$ {row.typed}   ({row.why or 'no reason known'})\n--- real {row.real}\n--- ours {row.ours}"
+        for row in rows
+        if row.equal == bool(row.why)
+    )
+
+
+def page(sections: dict[str, list[Row]]) -> str:
+    """The table as Markdown."""
+    rows = [row for section in sections.values() for row in section]
+    equal = sum(row.equal for row in rows)
+    lines = [
+        "# The commands beside those of real ROS",
+        "",
+        "Written by `tests/interop/command_table.py` (`WRITE=1 make interop`) from what Debian's ROS 1 and minirospy print on",
+        "the same graph; do not edit. Compared are standard output, byte for byte, and the exit status: of "
+        f"{len(rows)} lines {equal} are equal,",
+        f"{len(rows) - equal} differ on purpose. What stands on stderr is for people: ours says it in one line. Long output",
+        "is cut here, not in the comparison; numbers that change from run to run are replaced.",
+    ]
+    for title, section in sections.items():
+        lines += ["", f"## {title}", "", "| typed | real ROS | minirospy |", "|---|---|---|"]
+        for row in section:
+            ours = f"**{_cell(row.why)}**<br>{_shown(row.ours)}" if row.why else _same(row)
+            lines.append(f"| `{_cell(row.typed)}` | {_shown(row.real)} | {ours} |")
+    return "\n".join(lines) + "\n"
+
+
+def verdicts(text: str) -> set[tuple[str, bool]]:
+    """What a page says of each line that was typed: whether it is equal."""
+    rows = re.findall(r"^\| `(.*)` \| .*? \| (equal|\*\*)", text, re.MULTILINE)
+    return {(typed, verdict == "equal") for typed, verdict in rows}
+
+
+def _same(row: Row) -> str:
+    return "equal" + (f"<br>{_error(row.ours)}" if row.ours.err.strip() else "")
+
+
+def _shown(ended: Ended) -> str:
+    parts = [f"exit {ended.status}"] if ended.status != 0 else []
+    lines = ended.out.splitlines()
+    if any(lines):
+        shown = [line[:70] + ("…" if len(line) > 70 else "") for line in lines[:5]]
+        rest = [f"… ({len(lines)} lines)"] if len(lines) > 5 else []
+        parts.append("<pre>" + "<br>".join(_cell(line) for line in shown + rest) + "</pre>")
+    if ended.err.strip():
+        parts.append(_error(ended))
+    return "<br>".join(parts) or "nothing"
+
+
+def _error(ended: Ended) -> str:
+    return "<i>" + _cell(ended.err.strip().splitlines()[-1][:200]) + "</i>"
+
+
+def _cell(text: str) -> str:
+    return html.escape(text, quote=False).replace("|", "&#124;").replace("\033", "ESC")
+
+
+def _typed(line: str, streaming: bool) -> str:
+    typed = line.partition(" ## ")[0]
+    return typed.partition(" ")[2] + " (then Ctrl-C)" if streaming else typed
+
+
+def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> Ended:
+    typed = line.partition(" ## ")[0]
+    count = 0
+    if streaming:
+        number, _, typed = typed.partition(" ")
+        count = int(number)
+    typed, _, text = typed.partition(" <<< ")
+    words = shlex.split(typed)
+    program = subprocess.Popen(
+        [str(tools / words[0]), *words[1:]],
+        env={**os.environ, "ROS_MASTER_URI": uri, "PYTHONUNBUFFERED": "1"},
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    if streaming:
+        return _interrupted(program, count)
+    try:
+        out, err = program.communicate(text.replace("\\n", "\n"), timeout=25)
+        status: int | str = program.returncode
+    except subprocess.TimeoutExpired:
+        program.send_signal(signal.SIGINT)
+        out, err = program.communicate(timeout=10)
+        status = "never"
+    if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
+        # Nodes come in the order of a set there, which no two runs share.
+        out = "".join(sorted(out.splitlines(keepends=True)))
+    return Ended(status, *(_steady(part, folder) for part in (out, err)))
+
+
+def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
+    assert program.stdout
+    lines = "".join(_until_filled(program.stdout, count))
+    program.send_signal(signal.SIGINT)
+    _, err = program.communicate(timeout=25)
+    # The numbers, and the width of columns that hold them, are those of the moment.
+    text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", _STREAM_NUMBERS.sub("0", lines)))
+    return Ended(program.returncode, text, err)
+
+
+def _until_filled(stream: Iterable[str], count: int) -> Iterator[str]:
+    """``count`` lines; that nothing has come yet is no line."""
+    for line in stream:
+        if line != "no new messages\n":
+            yield line
+            count -= 1
+        if not count:
+            return
+
+
+def _steady(text: str, folder: Path) -> str:
+    text = text.replace(str(folder), "FOLDER")
+    for pattern, by in _CHANGING:
+        text = pattern.sub(by, text)
+    return text

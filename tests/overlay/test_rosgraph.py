@@ -1,0 +1,132 @@
+"""rosgraph's servers, graph and sockets, as tools of others use them; what the referee's cases do not show."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from io import BytesIO
+from pathlib import Path
+from xmlrpc.client import ServerProxy
+
+import pytest
+import rosclean
+import rosgraph
+import rosgraph.impl.graph
+import rosgraph.network
+import rosgraph.xmlrpc
+import rostopic
+
+
+def test_myargv_has_the_rule_of_rospy() -> None:
+    words = ["prog", "a:=b", "--flag:=x", "http://h:=1", "_p:=1", "__name:=n", "-v"]
+    assert rosgraph.myargv(words) == ["prog", "--flag:=x", "http://h:=1", "-v"]
+
+
+def test_the_graph_as_edges(master: str) -> None:
+    asked = rosgraph.Master("/talker")
+    asked.registerPublisher("/chat", "std_msgs/Bool", "http://localhost:1")
+    asked.registerPublisher("/alone", "std_msgs/Bool", "http://localhost:1")
+    rosgraph.Master("/listener").registerSubscriber("/chat", "std_msgs/Bool", "http://localhost:2")
+    asked.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
+    graph = rosgraph.impl.graph.Graph()
+    assert graph.update()
+    assert not graph.update()
+    assert [str(edge) for edge in graph.nn_edges] == ["/talker->/listener"]
+    assert {str(edge) for edge in graph.nt_edges} == {"/talker-> /chat", " /chat->/listener"}
+    assert {str(edge) for edge in graph.nt_all_edges} == {
+        *map(str, graph.nt_edges), "/talker-> /alone"
+    }  # fmt: skip
+    assert (graph.nn_nodes, graph.srvs) == ({"/talker", "/listener"}, {"/serve"})
+    assert {rosgraph.impl.graph.node_topic(each) for each in graph.nt_nodes} == {"/chat", "/alone"}
+    graph.set_master_stale(0)
+    assert not graph.update()
+    rosgraph.Master("/listener").unregisterSubscriber("/chat", "http://localhost:2")
+    assert graph.update()
+    assert list(graph.nn_edges) == []
+    below = rosgraph.impl.graph.Graph(topic_ns="/alone")
+    assert below.update()
+    assert below.nt_nodes == {" /alone"}
+
+
+def test_edges() -> None:
+    edges = rosgraph.impl.graph.EdgeList()
+    assert edges.add_edges("/a", "/b", "b", "/t")
+    assert not edges.add_edges("/a", "/b", "i", "/t")
+    assert [(edge.start, edge.end, edge.key) for edge in edges] == [
+        ("/a", "/b", "/a|/t"),
+        ("/b", "/a", "/b|/t"),
+    ]
+    edges.delete(rosgraph.impl.graph.Edge("/a", "/b", "/t"))
+    assert len(edges) == 1
+    edges.delete_all("/a")
+    assert list(edges) == []
+
+
+def test_a_server_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    ready = threading.Event()
+    ended: list[str] = []
+
+    class Handler(rosgraph.xmlrpc.XmlRpcHandler):
+        def _ready(self, uri: str) -> None:
+            self.uri = uri
+            ready.set()
+
+        def _shutdown(self, reason: str) -> None:
+            ended.append(reason)
+
+        def double(self, value: int) -> int:
+            return 2 * value
+
+    handler = Handler()
+    node = rosgraph.xmlrpc.XmlRpcNode(0, handler)
+    node.start()
+    assert ready.wait(10)
+    assert handler.uri == node.uri == f"http://localhost:{node.port}/"
+    with ServerProxy(str(node.uri)) as proxy:
+        assert proxy.double(21) == 42
+    node.shutdown("enough")
+    node.shutdown("again")
+    assert ended == ["enough"]
+
+
+def test_a_port_that_is_taken_is_told_to_who_asked() -> None:
+    told = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        rosgraph.xmlrpc.XmlRpcNode(port, None, on_run_error=lambda error: told.set()).start()
+        assert told.wait(10)
+
+
+def test_connection_headers_over_a_socket() -> None:
+    one, other = socket.socketpair()
+    with one, other:
+        other.settimeout(5.0)
+        sent = rosgraph.network.write_ros_handshake_header(one, {"topic": "/t", "tcp_nodelay": 1})
+        one.sendall(b"rest")
+        buffer = BytesIO()
+        assert rosgraph.network.read_ros_handshake_header(other, buffer, 7) == {
+            "topic": "/t",
+            "tcp_nodelay": "1",
+        }
+        assert sent == 33
+        rest = buffer.getvalue()
+        while rest != b"rest":
+            rest += other.recv(10)
+        other.sendall(b"\x09\x00\x00\x00abc")
+        other.close()
+        with pytest.raises(rosgraph.network.ROSHandshakeException, match="terminated"):
+            rosgraph.network.read_ros_handshake_header(one, BytesIO(), 100)
+
+
+def test_no_master_is_also_an_error_of_sockets() -> None:
+    with pytest.raises(ConnectionRefusedError):
+        rostopic.get_topic_list()
+
+
+def test_rosclean(tmp_path: Path) -> None:
+    (tmp_path / "log").write_bytes(b"x" * 5000)
+    assert rosclean.get_disk_usage(str(tmp_path)) >= 5000
+    assert rosclean.get_human_readable_disk_usage(str(tmp_path)).endswith("K")
+    with pytest.raises(rosclean.CleanupException):
+        rosclean.get_disk_usage(str(tmp_path / "none"))
+    assert rosclean.rosclean_main(["rosclean", "check"]) == 0
