@@ -50,7 +50,7 @@ _RECEIVE = 16384
 
 _END_OF_HEAD = b"\r\n\r\n"
 _ACCEPTS_AT_ONCE = 32
-_ANSWERS_AT_ONCE = 400
+_ANSWERS_AT_ONCE = 4
 """Of requests that came together, before others have their turn."""
 
 
@@ -137,6 +137,8 @@ class RpcServer:
             connection.end()
         if self._sweep:
             self._sweep.cancel()
+        self._complaints.close()
+        self._strangers.close()
 
     def limit(self, connection: _Connection, seconds: float) -> None:
         """Hang up on ``connection`` after so long."""
@@ -469,7 +471,7 @@ class _Connection:
     def _set_deadline(self) -> None:
         """A request that has begun, or an answer that waits, has a time limit; an idle connection has none."""
         if self._out or not self._reader.is_idle:
-            is_due = not self._has_deadline
+            is_due = not self._has_deadline or self._moved > _PROGRESS
             if is_due and self._state is not _ENDED and self._state is not _REFUSED:
                 self._limit(_REQUEST_SECONDS)
         elif self._has_deadline and self._state is not _REFUSED:

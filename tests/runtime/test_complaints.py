@@ -29,3 +29,19 @@ def test_a_flood_is_told_by_its_first_line_and_its_number(
     ]
     assert [record.levelname for record in caplog.records] == ["WARNING", "ERROR", "ERROR"]
     assert all(record.filename == "test_complaints.py" for record in caplog.records)
+
+
+def test_so_many_lines_as_were_asked_for_and_the_number_of_the_others_at_the_end(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    told = Complaints(complaints.logging.getLogger("test-complaints"), 3)
+    for number in range(8):
+        told.warning("%s", f"100 % {number}")
+    told.close()
+    told.close()
+    assert [record.getMessage() for record in caplog.records] == [
+        "100 % 0",
+        "100 % 1",
+        "100 % 2",
+        "5 more like the last ones",
+    ]
