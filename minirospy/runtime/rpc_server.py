@@ -333,11 +333,12 @@ class _Connection:
 
     def _answer_waiting(self) -> None:
         left = _ANSWERS_AT_ONCE
-        while self._waiting and self._task is None and self._state is _OPEN:
-            if not left:
+        while self._waiting and self._state is _OPEN:
+            if self._task or not left:
                 self._state = _BUSY
                 self._loop.remove_reader(self._fd)
-                self._loop.call_soon(self._go_on)
+                if not self._task:
+                    self._loop.call_soon(self._go_on)
                 return
             left -= 1
             self._answer(self._waiting.pop(0))
@@ -382,7 +383,7 @@ class _Connection:
             body = serialize_fault(1, f"{type(error).__name__}: {error}")
         self._task = None
         self._send(body, keep_alive)
-        self._answer_waiting()
+        self._go_on()
 
     def _send(self, body: bytes, keep_alive: bool) -> None:
         self._write(serialize_response(body, keep_alive=keep_alive))
@@ -408,7 +409,7 @@ class _Connection:
         self._waiting.clear()
         if not self._out:
             self.end()
-        elif self._state in (_OPEN, _FULL):
+        elif self._state in (_OPEN, _BUSY, _FULL):
             if self._state is _OPEN:
                 self._loop.remove_reader(self._fd)
             self._state = _CLOSING

@@ -1,6 +1,7 @@
 """Services at run time: a server's handler runs in a worker, or on the loop; a client on the loop.
 
-All work on bytes; the client that blocks is in ``runtime/service_client.py``. Source: http://wiki.ros.org/ROS/TCPROS ("Services").
+All work on bytes; the client that blocks is in ``runtime/service_client.py``.
+Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
 from __future__ import annotations
@@ -200,7 +201,7 @@ class _Connection:
 
 
 class AsyncServiceClient:
-    """As :class:`~minirospy.runtime.service_client.ServiceClient`, on the loop; made by :meth:`connect`, used by one task at a time."""
+    """A client on the loop, as that of ``runtime/service_client.py``; made by :meth:`connect`, used by one task at a time."""
 
     def __init__(self, sock: socket.socket, header: Header) -> None:
         self.header = header

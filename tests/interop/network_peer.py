@@ -19,9 +19,9 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 if os.environ.get("TEST_KEEPALIVE"):
     # A cable that was pulled is noticed after seconds, not after a minute.
-    from minirospy.runtime import tcp
+    from minirospy.runtime import sockets
 
-    tcp._KEEPALIVE.update(dict.fromkeys(tcp._KEEPALIVE, 1))
+    sockets._KEEPALIVE.update(dict.fromkeys(sockets._KEEPALIVE, 1))
 
 
 def say(*words):

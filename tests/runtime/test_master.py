@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import importlib.util
 import json
 import queue
+import random
 import socket
 import threading
 from collections.abc import Iterator
@@ -15,6 +17,9 @@ from xmlrpc.client import Binary, DateTime, Fault, ServerProxy
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
+
+from minirospy.runtime.master import Master
+from minirospy.wire.xmlrpc import serialize_response
 
 HERE = Path(__file__).parent
 
@@ -240,3 +245,41 @@ def test_bad_requests_are_refused_and_harm_nobody(master: str, request_bytes: by
     assert answer.split(b" ", 2)[1] == status
     with ServerProxy(master) as proxy:
         assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
+
+
+def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
+    """Whatever happens; and what the journal would hold leads to the same graph, and the same names."""
+    rng = random.Random(1)
+    nodes, uris, topics = ("/a", "/b", "/c"), ("http://h:1/", "http://h:2/"), ("/t", "/u", "/v")
+
+    async def scene() -> None:
+        master = Master()
+        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        for number in range(2000):
+            node, uri, topic = rng.choice(nodes), rng.choice(uris), rng.choice(topics)
+            calls: tuple[tuple[str, ...], ...] = (
+                ("registerPublisher", node, topic, "a/B", uri),
+                ("registerSubscriber", node, topic, "*", uri),
+                ("registerService", node, topic, f"rosrpc:{uri[5:]}", uri),
+                ("subscribeParam", node, uri, topic),
+                ("unregisterPublisher", node, topic, uri),
+                ("unregisterSubscriber", node, topic, uri),
+                ("unregisterService", node, topic, f"rosrpc:{uri[5:]}"),
+                ("unsubscribeParam", node, uri, topic),
+                ("",),
+            )
+            method, *args = rng.choice(calls)
+            if method:
+                assert master.serve(method, args)[0] == 1
+            else:
+                master._forget(node, uri)
+            state = master.get_system_state("/x")
+            assert master.serve("getSystemState", ["/x"]) == serialize_response(state)
+            if number % 100 == 0:
+                successor = Master()
+                for record in master._snapshot():
+                    successor._replay(*record)
+                assert successor.get_system_state("/x") == state
+                assert successor.registry.nodes() == master.registry.nodes()
+
+    asyncio.run(scene())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -111,3 +112,43 @@ def test_the_time_limit_starts_anew_for_who_gets_on(monkeypatch: pytest.MonkeyPa
         await server.close()
 
     asyncio.run(scene())
+
+
+@pytest.mark.parametrize("last_closes", [False, True])
+def test_who_asks_on_while_a_method_waits_is_not_read_from_meanwhile(last_closes: bool) -> None:
+    told: list[str] = []
+
+    async def scene() -> bytes:
+        go_on = asyncio.Event()
+
+        async def dispatch(method: str) -> str:
+            await go_on.wait()
+            told.append(method)
+            return method
+
+        server = RpcServer(lambda method, _: dispatch(method))
+        await server.start()
+        with connect(server) as greedy:
+            requests = [call(f"greedy{number}") for number in range(1000)]
+            if last_closes:
+                requests[500] = requests[500].replace(b"\r\n", b"\r\nConnection: close\r\n", 1)
+            greedy.sendall(b"".join(requests))
+            await until(lambda: server.connections)
+            (connection,) = server.connections
+            await until(lambda: connection._waiting)
+            for _ in range(100):
+                await asyncio.sleep(0)
+            assert len(connection._waiting) < 500
+            go_on.set()
+            greedy.setblocking(False)
+            answers = b""
+            # A reset, where it has said that it goes and has said more behind that.
+            with contextlib.suppress(ConnectionResetError):
+                while b"greedy999<" not in answers:
+                    answers += await asyncio.get_running_loop().sock_recv(greedy, 65536) or b"greedy999<"
+        await server.close()
+        return answers
+
+    answers = asyncio.run(scene())
+    assert told == [f"greedy{number}" for number in range(501 if last_closes else 1000)]
+    assert last_closes or answers.count(b"HTTP/1.1 200") == 1000
