@@ -13,11 +13,23 @@ from typing import Protocol
 
 from minirospy.errors import ROSTimeMovedBackwardsException
 
-__all__ = ["Clock", "SimulatedClock", "WallClock", "wait_for_event"]
+__all__ = ["Clock", "SignalSafeEvent", "SimulatedClock", "WallClock", "wait_for_event"]
 
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not end a wait, and elsewhere
 one that comes just before the wait begins is seen only after it."""
+
+
+class SignalSafeEvent(threading.Event):
+    """An event that a signal's handler may set, whatever the thread is about that it interrupts.
+
+    That thread may be on its way into wait() or set() of the same event, with the event's lock taken; where that is
+    not reentrant, as threading has it, the handler waits for itself, and the process never ends.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._cond = threading.Condition(threading.RLock())
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:

@@ -269,7 +269,7 @@ class ROSSerializationException(ROSException):
 
 
 class ROSInterruptException(ROSException):
-    """A blocking call was ended by the node's shutdown."""
+    """A blocking call was ended by the node's shutdown. That of rospy is a subclass: `minirospy.client.life`."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):

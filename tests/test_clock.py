@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
+from types import FrameType
+from typing import Any
 
 import pytest
 
-from minirospy.clock import SimulatedClock, WallClock, wait_for_event
+from minirospy.clock import SignalSafeEvent, SimulatedClock, WallClock, wait_for_event
 from minirospy.errors import ROSTimeMovedBackwardsException
 
 SECOND = 10**9
@@ -48,6 +51,41 @@ class Sleeping(threading.Thread):
         self.join(5)
         assert not self.is_alive()
         return self.outcome
+
+
+def lines_until_set(step: int, is_set: bool) -> int:
+    """Set or wait for an event, which is set from within, too, before that thread's line number ``step``."""
+    event = SignalSafeEvent()
+    lines = 0
+
+    def trace(frame: FrameType, kind: str, _: Any) -> Any:
+        nonlocal lines
+        if kind == "line" and frame.f_code.co_filename == threading.__file__:
+            lines += 1
+            if lines == step:
+                event.set()
+        return trace
+
+    def work() -> None:
+        sys.settrace(trace)
+        event.set() if is_set else event.wait(0.001)
+        sys.settrace(None)
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(5)
+    assert not thread.is_alive(), f"the handler waits for itself, line {step} of what runs"
+    assert event.is_set() or lines < step
+    return lines
+
+
+@pytest.mark.parametrize("is_set", [False, True], ids=["wait", "set"])
+def test_a_signal_may_set_an_event_at_any_moment(is_set: bool) -> None:
+    """Its handler runs in the thread that it interrupts, between any two lines of what that calls."""
+    step = 1
+    while lines_until_set(step, is_set) >= step:
+        step += 1
+    assert step > 5
 
 
 def test_wall_clock_tells_the_time() -> None:

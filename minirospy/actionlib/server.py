@@ -19,6 +19,7 @@ from minirospy.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, S
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS, ActionException, action_types
 from minirospy.actionlib.statuses import StatusList
 from minirospy.client.process import process
+from minirospy.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
 
 __all__ = ["ActionServer", "nop_cb"]
@@ -293,7 +294,7 @@ class _Teller:
         self._period = period
         self._due = time.monotonic() + period
         self._stopped = False
-        self._wake = threading.Event()
+        self._wake = SignalSafeEvent()
         threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from minirospy import client as rospy
 from minirospy import times
 from minirospy.client.process import process
-from minirospy.clock import SimulatedClock, wait_for_event
+from minirospy.clock import SignalSafeEvent, SimulatedClock, wait_for_event
 
 __all__ = ["Waiting"]
 
@@ -33,7 +33,7 @@ class Waiting:
         deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
         if condition():
             return True
-        event = threading.Event()
+        event = SignalSafeEvent()
         self._events.append(event)
         try:
             with process.interrupting(event.set):

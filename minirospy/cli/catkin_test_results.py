@@ -58,7 +58,7 @@ def read_counts(file: Path) -> Counts:
             tests, errors, failures = (int(suite.attrib[key]) for key in ("tests", "errors", "failures"))
             skipped = next((int(suite.attrib[key]) for key in _SKIPPED if key in suite.attrib), 0)
             counts = counts.plus(Counts(tests, errors, failures, skipped))
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, OSError) as error:
         raise ValueError(str(error)) from error
     except KeyError as error:
         raise ValueError(f"its <testsuite> has no attribute {error}") from error
@@ -97,7 +97,7 @@ def _results(argv: Sequence[str]) -> int:
         if isinstance(counts, Counts):
             total = total.plus(counts)
             if options.verbose and counts.is_bad:
-                text = file.read_text(encoding="utf-8")
+                text = file.read_text(encoding="utf-8", errors="replace")
                 print(f"Full test results for '{name}'\n{_LINE}\n{text}\n{_LINE}")
         elif options.all:
             print(f'Skipping "{name}": {counts}')

@@ -14,15 +14,20 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from minirospy.cli.catkin_test_results import Counts, results_below
-from minirospy.errors import BuildError, NotFoundError
+from minirospy.errors import BuildError, MinirospyError, NotFoundError
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
 
+_END_SECONDS = 20.0
+"""As long as roslaunch gives its nodes, and a little."""
+
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; 1 where one failed. Raises BuildError, NotFoundError.
+    """Run the tests of the chosen packages, or of all; 1 where one failed.
+
+    Raises BuildError, NotFoundError; MinirospyError at Ctrl-C.
 
     One test is chosen by catkin's name for it: ``PACKAGE_rostest_test_x.test``. The results are JUnit XML files in
     ``build/test_results/PACKAGE``.
@@ -50,11 +55,9 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             results.mkdir(parents=True, exist_ok=True)
             command = _COMMANDS[test.kind](plan, test, results)
             print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)
-            done = subprocess.run(
-                command, env=_environment(workspace), cwd=test.folder or plan.folder, check=False
-            )
+            status = _run(command, _environment(workspace), test.folder or plan.folder)
             # 5: pytest found no tests in there.
-            worst |= done.returncode not in ((0, 5) if test.kind == "pytest" else (0,))
+            worst |= status not in ((0, 5) if test.kind == "pytest" else (0,))
         for _, counts in results_below(results):
             if isinstance(counts, Counts):
                 total = total.plus(counts)
@@ -62,6 +65,20 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             print(f"{plan.name}: results are in {results}")
     print(f"Summary: {total}" + (" (a test could not be run)" if worst and not total.is_bad else ""))
     return int(worst)
+
+
+def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
+    """The exit status. Raises MinirospyError at Ctrl-C, when the test has ended its nodes."""
+    with subprocess.Popen(command, env=environment, cwd=folder) as popen:
+        try:
+            return popen.wait()
+        except KeyboardInterrupt:
+            # The terminal's Ctrl-C reached it, too.
+            try:
+                popen.wait(_END_SECONDS)
+            except subprocess.TimeoutExpired:
+                popen.terminate()
+            raise MinirospyError("interrupted: the tests that were left have not run") from None
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:

@@ -74,6 +74,10 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         # The reader (`| head`) has gone: quiet, also for the interpreter's own flush at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        # A disk that is full, a folder that may not be written: the file's name, and the system's words.
+        why = error.strerror or str(error)
+        return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
         return 0
 

@@ -103,7 +103,7 @@ def _remove_oldest(folder: Path, excess: int) -> None:
 
 def _remove(path: Path) -> None:
     try:
-        if path.is_dir():
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink()

@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any, TypeAlias
 
 from minirospy import errors
-from minirospy.clock import wait_for_event
+from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Life", "Listener", "ROSInterruptException", "where"]
 
@@ -70,9 +70,9 @@ class Life:
 
     def _begin(self) -> None:
         """Nothing has happened yet, and nobody has heard of anything."""
-        self.shutting_down = threading.Event()
+        self.shutting_down = SignalSafeEvent()
         """Set once the shutdown hooks have run: every blocking call ends."""
-        self.gone = threading.Event()
+        self.gone = SignalSafeEvent()
         """Set once the node has left the graph."""
         self.is_leaving = False
         """Whether a shutdown is under way where no signal may interrupt it: not in a hook."""
@@ -130,7 +130,10 @@ class Life:
         """Leave the graph."""
 
     def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
-        """``with process.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it."""
+        """``with process.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it.
+
+        A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
+        """
         return _Interrupting(self._interrupts, interrupt, self.shutting_down)
 
     def spin(self) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-import threading
 import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -21,7 +20,7 @@ from minirospy.client.topic import (
     register_with_master,
     unregister_from_master,
 )
-from minirospy.clock import wait_for_event
+from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import ROSException, ROSSerializationException, SerializationError
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.runtime.workers import InOrder
@@ -202,7 +201,7 @@ class Published(Shared):
     def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
         """See :meth:`Publisher.wait_for_subscribers`."""
         self.check_initialized()
-        enough = threading.Event()
+        enough = SignalSafeEvent()
 
         def look() -> None:
             if len(self.publication.links) >= count or process.is_shutdown():

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.process import process
-from minirospy.clock import wait_for_event
+from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import (
     CallFailed,
     DeserializationError,
@@ -78,7 +78,7 @@ class Service(Generic[_S]):
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
         self._server: ServiceServer | None = None
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
         with process.lock:
             if process.offered.setdefault(self.resolved_name, self) is not self:
                 raise ServiceException(f"service [{self.resolved_name}] already registered")

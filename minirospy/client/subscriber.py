@@ -6,14 +6,13 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
-import threading
 import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from minirospy.client.process import process
 from minirospy.client.topic import Shared, Topic, interface_type, register_with_master, unregister_from_master
-from minirospy.clock import wait_for_event
+from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.runtime.complaints import Complaints
 from minirospy.wire.framing import Frame
@@ -92,7 +91,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
     if timeout is not None and hasattr(timeout, "to_sec"):
         timeout = timeout.to_sec()
     got: list[_M] = []
-    arrived = threading.Event()
+    arrived = SignalSafeEvent()
 
     def on_message(message: _M) -> None:
         got.append(message)

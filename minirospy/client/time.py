@@ -13,7 +13,7 @@ from typing import Any
 from minirospy import errors, times
 from minirospy.client.life import ROSInterruptException
 from minirospy.client.process import process
-from minirospy.clock import SimulatedClock
+from minirospy.clock import SignalSafeEvent, SimulatedClock
 from minirospy.errors import ROSInitException
 
 __all__ = [
@@ -179,7 +179,7 @@ class Timer(threading.Thread):
         self._callback = callback
         self._oneshot = oneshot
         self._reset = reset
-        self._shutdown = threading.Event()
+        self._shutdown = SignalSafeEvent()
         self.start()
 
     def shutdown(self) -> None:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy.errors import MinirospyError
 from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
 from minirospy.testing.unit import XML_OUTPUT_FLAG
 
@@ -61,7 +62,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """The exit status; None where the time was over."""
+    """The exit status; None where the time was over. Raises MinirospyError at Ctrl-C."""
     with subprocess.Popen(command) as popen:
         try:
             return popen.wait(seconds)
@@ -71,7 +72,7 @@ def _run(command: list[str], seconds: float) -> int | None:
         except KeyboardInterrupt:
             # The terminal's Ctrl-C reached it, too.
             _end(popen)
-            raise
+            raise MinirospyError("interrupted: how the test went is not known") from None
 
 
 def _end(popen: subprocess.Popen[bytes]) -> None:

@@ -96,12 +96,23 @@ def test_what_execute_raises_aborts_the_goal(caplog: pytest.LogCaptureFixture) -
     assert caplog.text.count("Exception in your execute callback") == 1
 
 
-def test_a_result_that_does_not_fit_aborts_the_goal() -> None:
+@pytest.mark.parametrize(
+    ("bad_result", "why"),
+    [
+        ((1, 2, 3), "wrong number of values"),
+        (msg.TestResult("one"), "result"),
+        (GoalError("half way", {"results": 1}), "results"),
+    ],
+    ids=str,
+)
+def test_a_result_that_does_not_fit_aborts_the_goal(bad_result: Any, why: str) -> None:
     async def bad(goal: Goal) -> Any:
-        return (1, 2, 3)
+        if isinstance(bad_result, Exception):
+            raise bad_result
+        return bad_result
 
     async def main(client: Client, _: Server) -> None:
-        with pytest.raises(GoalError, match="wrong number of values"):
+        with pytest.raises(GoalError, match=f"the goal was aborted: the result does not fit: .*{why}"):
             await client.send(msg.TestGoal(1))
 
     run(main, bad)
@@ -178,6 +189,51 @@ def test_goals_that_the_server_refuses() -> None:
         assert (await client.send(msg.TestGoal(1))).result == 1
 
     run(main, accepts=lambda goal: goal.goal != 7)
+
+
+def test_a_goal_is_aborted_with_a_result_in_any_form() -> None:
+    async def half_way(goal: Goal) -> Any:
+        raise GoalError("half way", {"result": 4})
+
+    async def main(client: Client, _: Server) -> None:
+        with pytest.raises(GoalError, match="half way") as caught:
+            await client.send(msg.TestGoal(1))
+        assert caught.value.result.result == 4
+
+    run(main, half_way)
+
+
+def test_a_server_whose_accepts_raises_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    def accepts(goal: msg.TestGoal) -> bool:
+        if goal.goal == 7:
+            raise ValueError("no sevens")
+        return True
+
+    async def main(client: Client, _: Server) -> None:
+        with pytest.raises(GoalError, match=r"the goal was rejected: .*no sevens"):
+            await client.send(msg.TestGoal(7))
+        assert (await client.send(msg.TestGoal(1))).result == 1
+
+    run(main, accepts=accepts)
+    assert caplog.text.count("Exception in your accepts callback") == 1
+
+
+def test_a_cancel_where_somebody_only_looks_on() -> None:
+    async def main() -> None:
+        async with (
+            Node("onlooker", rosout=False) as one,
+            Node("client", rosout=False) as two,
+            ActionClient(two, "act", msg.TestAction) as client,
+        ):
+            looks_on = one.subscribe("act/goal", msg.TestActionGoal)
+            await looks_on.wait_for_publishers(timeout=SECONDS)
+            await client._goal.wait_for_subscribers(timeout=SECONDS)
+            goal = client.send(msg.TestGoal(1))
+            goal.cancel()
+            with pytest.raises(GoalError, match="the goal was recalled"):
+                await asyncio.wait_for(goal, SECONDS)
+
+    asyncio.run(main(), debug=True)
 
 
 def test_a_cancel_that_comes_before_its_goal() -> None:

@@ -41,6 +41,18 @@ def test_what_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert f"Full test results for 'p/bad.xml'\n{'-' * 49}\n{BAD}\n" in capsys.readouterr().out
 
 
+def test_what_cannot_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = write(tmp_path)
+    (folder / "p" / "bad.xml").write_text(
+        f'<?xml version="1.0" encoding="latin-1"?><!-- \xe4 -->{BAD}', encoding="latin-1"
+    )
+    (folder / "p" / "folder.xml").mkdir()
+    assert main(["--all", "--verbose", str(folder)]) == 1
+    out = capsys.readouterr().out
+    assert "<!-- \ufffd -->" in out
+    assert f'Skipping "{Path("p", "folder.xml")}": ' in out
+
+
 def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(write(tmp_path, good=GOOD, skipped=SKIPPED))]) == 0
     assert main([str(tmp_path / "no")]) == 1

@@ -62,6 +62,13 @@ def test_purge_without_a_question(command: Command, logs: Path) -> None:
     assert not logs.exists()
 
 
+def test_purge_of_a_folder_behind_a_link(command: Command, logs: Path) -> None:
+    logs.rename(logs.parent / "elsewhere")
+    logs.symlink_to("elsewhere")
+    assert command("rosclean", "purge", "-y") == (0, "Purging ROS node logs.\n", "")
+    assert [path.name for path in logs.parent.iterdir()] == ["elsewhere"]
+
+
 def test_purge_down_to_a_size(command: Command, logs: Path) -> None:
     assert command("rosclean", "purge", "-y", "--size", "9").out == (
         "Directory size of ROS node logs is 3 MB which is already below the requested threshold of 9 MB.\n"

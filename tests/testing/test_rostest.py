@@ -144,6 +144,20 @@ def test_ctrl_c_ends_all_tests(tmp_path: Path) -> None:
     assert not err
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal")
+def test_ctrl_c_is_no_success_of_rosunit(tmp_path: Path) -> None:
+    begun, file = tmp_path / "begun", tmp_path / "slow.py"
+    file.write_text(f"import time\nopen({str(begun)!r}, 'w')\ntime.sleep(60)\n")
+    popen = start("rosunit", "--package=p", file)
+    end = time.monotonic() + 20
+    while not begun.exists() and popen.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    os.kill(popen.pid, signal.SIGINT)
+    _, err = popen.communicate(timeout=20)
+    assert popen.returncode == 1
+    assert "rosunit: ERROR: interrupted: how the test went is not known\n" in err
+
+
 def test_rosunit() -> None:
     status, out, err = ran("rosunit", "--name=shown", TEST / "good.py")
     assert (status, err) == (0, "")

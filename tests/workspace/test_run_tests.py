@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -123,3 +128,42 @@ def test_what_cannot_be_run(
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert catkin_make(["-C", str(scene.root), "run_tests_q"]) == 1
     assert "tests need pytest: pip install pytest" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal")
+def test_ctrl_c_lets_a_test_end_its_nodes(scene: Scene, tmp_path: Path) -> None:
+    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    text = f"""import pathlib, time
+def test_slow():
+    pathlib.Path({str(begun)!r}).touch()
+    try:
+        time.sleep(60)
+    finally:
+        time.sleep(0.5)
+        pathlib.Path({str(ended)!r}).touch()
+"""
+    scene.package("p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": text})
+    code = "import sys; from minirospy.cli.catkin import catkin_make; sys.exit(catkin_make(['run_tests']))"
+    popen = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=scene.root,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    end = time.monotonic() + 20
+    while not begun.exists() and popen.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    os.killpg(popen.pid, signal.SIGINT)
+    _, err = popen.communicate(timeout=20)
+    assert popen.returncode == 1
+    assert err.endswith("catkin_make: ERROR: interrupted: the tests that were left have not run\n")
+    assert ended.exists()
+
+
+def test_a_file_where_a_folder_belongs(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.package("p", "", "", {})
+    (scene.root / "devel").touch()
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    assert capsys.readouterr().err == f"catkin_make: ERROR: {scene.root / 'devel'}: File exists\n"

@@ -42,6 +42,7 @@ class ClientGoal(Generic[_R, _F]):
         self._cancel = cancel
         self._feedback: deque[_F] = deque(maxlen=WAITING)
         self._news = asyncio.Event()
+        self._is_sent = False
         self._is_known = False
         self._ended: asyncio.Future[_R | None] = asyncio.get_running_loop().create_future()
 
@@ -186,6 +187,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
     async def _send(self, message: Any, goal: ClientGoal[_R, _F]) -> None:
         await self._wait_for_server()
         if not goal.done:
+            goal._is_sent = True
             await self._goal.publish(message)
 
     def _cancel_goal(self, goal: ClientGoal[Any, Any]) -> None:
@@ -193,7 +195,8 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
             self._start(self._send_cancel(goal))
 
     async def _send_cancel(self, goal: ClientGoal[Any, Any]) -> None:
-        if self._goal.num_connections:
+        # Who only looks at the goals, as `rostopic echo`, is connected, too.
+        if goal._is_sent and self._goal.num_connections:
             await self._cancel.publish(GoalID(id=goal.id))
         else:
             self._end_goal(goal, GoalState.RECALLED, "cancelled before a server was there", None)

@@ -53,7 +53,7 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 class GoalError(MinirospyError):
     """A goal that was not reached: the server's ``text``, the ``result`` that came all the same, how it ended.
 
-    A server's ``execute`` raises it to abort the goal with a text and a result.
+    A server's ``execute`` raises it to abort the goal with a text and a result, in any form that it may return.
     """
 
     def __init__(self, text: str = "", result: Any = None, state: GoalState = GoalState.ABORTED) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
+from io import BytesIO
 from typing import Any, Generic, TypeVar
 
 from actionlib_msgs.msg import GoalID, GoalStatus
@@ -180,8 +181,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         if self._canceled_early.pop(goal.id, 0) or stamp <= self._last_cancel:
             goal.text = "it was cancelled before it came"
             await self._finish(goal, GoalEvent.CANCEL)
-        elif self._accepts and not self._accepts(goal.request):
-            goal.text = "the server does not accept this goal"
+        elif not self._is_accepted(goal):
             await self._finish(goal, GoalEvent.REJECT)
         elif any(stamp < other._status.goal_id.stamp.to_nsec() for other in others):
             goal.text = "a newer goal is there"
@@ -192,6 +192,16 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             before = [other._task for other in others if other._task]
             goal._task = self._start(self._run(goal, before))
             self._changed.set()
+
+    def _is_accepted(self, goal: ServerGoal[_G, _F]) -> bool:
+        try:
+            if self._accepts is None or self._accepts(goal.request):
+                return True
+            goal.text = "the server does not accept this goal"
+        except Exception as error:
+            goal.text = f"Exception in accepts callback: {error}"
+            self._node.log.exception("Exception in your accepts callback: %s", error)
+        return False
 
     async def _take_cancel(self, cancel: GoalID) -> None:
         stamp = cancel.stamp.to_nsec()
@@ -207,23 +217,28 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
 
     async def _run(self, goal: ServerGoal[_G, _F], before: list[asyncio.Task[None]]) -> None:
         """Work on a goal, when those before it have made way."""
-        event, result = GoalEvent.SUCCEED, None
+        event, result, returned = GoalEvent.SUCCEED, None, None
         try:
             if before:
                 await asyncio.wait(before)
             goal._step(GoalEvent.ACCEPT)
             self._changed.set()
             returned = await self._execute(goal)
-            if returned is not None:
-                result = to_response(self._types.result, returned)
         except asyncio.CancelledError:
             if not goal.is_cancel_requested:
                 event, goal.text = GoalEvent.ABORT, goal.text or "the server ends"
         except GoalError as error:
-            event, result, goal.text = _EVENTS.get(error.state, GoalEvent.ABORT), error.result, error.text
+            event, returned, goal.text = _EVENTS.get(error.state, GoalEvent.ABORT), error.result, error.text
         except Exception as error:
             event, goal.text = GoalEvent.ABORT, f"Exception in execute callback: {error}"
             self._node.log.exception("Exception in your execute callback: %s", error)
+        try:
+            if returned is not None:
+                result = to_response(self._types.result, returned)
+                result.serialize(BytesIO())
+        except Exception as error:  # noqa: BLE001 - the edge to user code: whatever it has put there
+            event, result, goal.text = GoalEvent.ABORT, None, f"the result does not fit: {error}"
+            self._node.log.error("the result of your execute callback does not fit: %s", error)
         if goal.is_cancel_requested and event is GoalEvent.SUCCEED:
             event = GoalEvent.CANCEL
         await self._finish(goal, event, result)

@@ -32,7 +32,11 @@ outcome("xmlrpcapi", lambda: rospy.core.xmlrpcapi(None))
 outcome("xmlrpcapi", lambda: rospy.core.xmlrpcapi(os.environ["ROS_MASTER_URI"]).getPid("/x")[0])
 for kind in (rospy.ROSInterruptException, rospy.ROSTimeMovedBackwardsException):
     bases = KeyboardInterrupt, rospy.ROSException, rospy.exceptions.ROSInterruptException
-    show(kind.__name__, [issubclass(kind, base) for base in bases], kind is getattr(rospy.exceptions, kind.__name__))
+    show(
+        kind.__name__,
+        [issubclass(kind, base) for base in bases],
+        kind is getattr(rospy.exceptions, kind.__name__),
+    )
 show(issubclass(rospy.core.ParameterInvalid, Exception), issubclass(rospy.core.NullHandler, logging.Handler))
 rospy.core.NullHandler().emit(None)
 rospy.init_node("n", argv=[])
