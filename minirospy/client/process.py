@@ -154,11 +154,18 @@ class NodeProcess(Identity, Life):
         self.take_name(name, argv, anonymous)
         parameters = private_parameters(self.arguments)
 
+        self.signals.end_quietly()
+        if not disable_signals:
+            self.signals.take()
         # Imported here: a program that has no node need not pay for them.
         from minirospy.client import log
+        from minirospy.runtime.links import is_sending
         from minirospy.runtime.loop import LoopThread
         from minirospy.runtime.node import Node
 
+        if self.is_shutdown():
+            raise self.interrupted("rospy shutdown")
+        self.signals.mind(is_sending)
         log.configure(self, log_level, self.arguments.special.get("__log"))
         self._loop = LoopThread()
         self._made = node = Node(
@@ -169,9 +176,6 @@ class NodeProcess(Identity, Life):
         )
         node.when_registered_again.append(self._forget_parameters)
         atexit.register(self._at_exit)
-        self.signals.end_quietly()
-        if not disable_signals:
-            self.signals.take()
         try:
             self.run(node.start(xmlrpc_port, tcpros_port))
         except OSError as error:

@@ -45,9 +45,6 @@ class Signals:
         """Let the signals shut the node down. Only the main thread may take signals; without effect in another."""
         if threading.current_thread() is not threading.main_thread():
             return
-        from minirospy.runtime.links import is_sending
-
-        self._is_sending = is_sending
         self._is_inherited = False
         for name in _ENDING:
             number = getattr(signal, name, None)
@@ -59,6 +56,10 @@ class Signals:
             self._before[number] = handler
             signal.signal(number, self._on_signal)
         self._watching().listen(frozenset(self._before), self._on_signal)
+
+    def mind(self, is_sending: Callable[[FrameType | None], bool]) -> None:
+        """A signal that comes while the main thread ``is_sending`` waits until it has sent."""
+        self._is_sending = is_sending
 
     def take_late(self) -> None:
         """Act on a signal that came while the main thread was sending."""

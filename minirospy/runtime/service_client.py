@@ -168,7 +168,7 @@ class Reader:
         """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
         data = self._rest
         while len(data) < count:
-            more = self._receive(min(max(count - len(data), _RECEIVE), _MOST))
+            more = self._some(max(count - len(data), _RECEIVE))
             if not more:
                 if at_end_ok and not data:
                     return b""
@@ -179,11 +179,19 @@ class Reader:
         self._rest = data[count:]
         return data[:count]
 
+    def _some(self, count: int) -> bytes:
+        """Up to so many bytes; none where the peer has ended."""
+        try:
+            return self._receive(min(count, _MOST))
+        except ConnectionResetError:
+            # It ended with something unread: the end all the same.
+            return b""
+
     def _take_large(self, data: bytes, count: int) -> bytes:
         parts = [data]
         missing = count - len(data)
         while missing > 0:
-            more = self._receive(min(missing, _MOST))
+            more = self._some(missing)
             if not more:
                 raise PeerEndedError(count - missing)
             parts.append(more)

@@ -29,7 +29,7 @@ def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: 
     children = launch.children()
     assert len(children) == 4
     launch.process.kill()
-    _, left = psutil.wait_procs(children, timeout=10)
+    _, left = psutil.wait_procs(children, timeout=30)
     assert not left
     # In the end the pipe is closed; the node was asked kindly.
     assert "ended by SIGINT" in launch.read_until("ended by")

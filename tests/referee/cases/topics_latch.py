@@ -13,8 +13,8 @@ rospy.init_node("listener", anonymous=True, argv=[])
 def heard(message):
     header = message._connection_header
     print(message.data, header["latching"], header["topic"], header["type"], header["callerid"], flush=True)
-rospy.Subscriber(sys.argv[1], String, heard)
 print("ready", flush=True)
+rospy.Subscriber(sys.argv[1], String, heard)
 sys.stdin.read()
 """
 
