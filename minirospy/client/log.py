@@ -435,6 +435,8 @@ def _write(
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, exc_info, function, extra, stack)
     logger.handle(record)
+    if process.signals.late:
+        process.signals.take_late()
 
 
 def _log_function(level: int, name: str) -> LogFunction:

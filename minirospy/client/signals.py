@@ -7,6 +7,7 @@ signal also where the main thread is in C code and runs no handler.
 from __future__ import annotations
 
 import contextlib
+import logging
 import signal
 import sys
 import threading
@@ -34,7 +35,7 @@ class Signals:
         self._watch: EndWatch | None = None
         self._is_sending: Callable[[FrameType | None], bool] = lambda _: False
         self.late = 0
-        """A signal that came while the main thread was sending; who has sent takes it."""
+        """A signal that came while the main thread was sending or logging; who has sent or logged takes it."""
 
     @property
     def is_ended(self) -> bool:
@@ -62,7 +63,7 @@ class Signals:
         self._is_sending = is_sending
 
     def take_late(self) -> None:
-        """Act on a signal that came while the main thread was sending."""
+        """Act on a signal that came while the main thread was sending or logging."""
         if threading.current_thread() is threading.main_thread() and self.late:
             self._on_signal(self.late, None)
 
@@ -116,10 +117,10 @@ class Signals:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         watch = self._watching()
-        if self._is_sending(frame):
-            # A hook that publishes would wait for the lock that this very thread holds. publish() takes the signal
-            # when it has sent; for the other senders the watch sends it again. A loop that only publishes is nearly
-            # always caught in the sending: the watch alone would try for seconds.
+        if self._is_sending(frame) or _is_logging(frame):
+            # A hook that publishes, or logs, would need what this very thread holds. publish() takes the signal when it
+            # has sent, loginfo() when it has written; for all others the watch sends it again. A loop that only
+            # publishes is nearly always caught in the sending: the watch alone would try for seconds.
             self.late = number
             watch.handled(0)
             return
@@ -148,3 +149,12 @@ class Signals:
             # The program did not end at the first: now it is interrupted as any Python program. Once: another
             # would come into the clean-up of the library's own functions. If it does not help, the watch ends it.
             raise KeyboardInterrupt
+
+
+def _is_logging(frame: FrameType | None) -> bool:
+    """Whether the stack at ``frame`` is inside a handler of Python's logging, which writes to what is not re-entrant."""
+    while frame is not None:
+        if frame.f_code is logging.Handler.handle.__code__:
+            return True
+        frame = frame.f_back
+    return False

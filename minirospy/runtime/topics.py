@@ -252,7 +252,9 @@ class Subscription:
             self._settling.cancel()
         for task in self._connecting.values():
             task.cancel()
-        for link in self.links:
+        # At once: a link itself ends when its reader has noticed.
+        ended, self.links = self.links, ()
+        for link in ended:
             link.close()
 
     def _settle(self) -> None:

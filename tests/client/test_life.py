@@ -599,3 +599,34 @@ except rospy.ROSInitException as error:
     )
     told = f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311\n"
     assert (done.returncode, done.stdout, done.stderr) == (0, told, "")
+
+
+@POSIX_ONLY
+def test_a_hook_does_not_log_into_a_line_that_is_being_written(master: str) -> None:
+    """Files and streams are not re-entrant: a signal in the middle of a line waits for its end."""
+    process = start("""
+import logging, os, signal
+import rospy
+
+depth, most, lines = 0, 0, []
+
+class Interrupted(logging.Handler):
+    def emit(self, record):
+        global depth, most
+        depth += 1
+        most = max(most, depth)
+        lines.append(record.getMessage())
+        if record.getMessage() == "line":
+            os.kill(os.getpid(), signal.SIGINT)
+        depth -= 1
+
+rospy.init_node("writes", argv=[], disable_rosout=True)
+logging.getLogger("rosout").addHandler(Interrupted())
+rospy.on_shutdown(lambda: rospy.loginfo("hook"))
+print("ready", flush=True)
+rospy.loginfo("line")
+print(rospy.is_shutdown(), most, lines)
+""")
+    out, err = process.communicate(timeout=8)
+    assert process.returncode == 0
+    assert out.splitlines()[-1] == "True 1 ['line', 'hook']", out + err
