@@ -24,7 +24,7 @@ demo: $(STAMP)
 	@$(BIN)/minirospy demo
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest -n 4 --dist worksteal --ignore=tests/interop
+	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh

@@ -104,6 +104,12 @@ class NodeProcess(Identity, Life):
         if self._loop:
             self._loop.post(function, *args)
 
+    def tell_shutdown(self) -> bool:
+        """Whether the node has shut down, for user code: the calling thread counts as one that asks."""
+        if self._is_forked:
+            self.signals.take_in_fork()
+        return super().tell_shutdown()
+
     def when_ready(self, function: Callable[[], object]) -> None:
         """Call ``function`` now, or in init_node where that has not been called yet."""
         with self.lock:

@@ -31,6 +31,7 @@ class Signals:
         self._life = life
         self._before: dict[int, Any] = {}
         self._is_inherited = False
+        self._left_to_system: list[int] = []
         self._count = 0
         self._watch: EndWatch | None = None
         self._is_sending: Callable[[FrameType | None], bool] = lambda _: False
@@ -93,12 +94,28 @@ class Signals:
             sys.stdout.flush()
 
     def begin_in_fork(self) -> None:
-        """This process is a copy: its signals are its own."""
+        """This process is a copy: its signals are its own.
+
+        Until it asks is_shutdown() the system ends it, as any child process: a handler of Python's would wait for the C
+        code that a worker is in, such as a lock that another worker holds.
+        """
         self._is_inherited = True
+        for number, before in self._before.items():
+            if before == signal.SIG_DFL and signal.getsignal(number) == self._on_signal:
+                signal.signal(number, signal.SIG_DFL)
+                self._left_to_system.append(number)
         self._count = self.late = 0
         if self._watch:
             self._watch.let_go()
             self._watch = None
+
+    def take_in_fork(self) -> None:
+        """The copy asks is_shutdown(): it is to hear of its end."""
+        if threading.current_thread() is threading.main_thread():
+            while self._left_to_system:
+                number = self._left_to_system.pop()
+                if signal.getsignal(number) == signal.SIG_DFL:
+                    signal.signal(number, self._on_signal)
 
     def _is_end(self, error: BaseException | None) -> bool:
         """Whether it told of the end, or came of that: an interrupted wait may find its lock not taken."""

@@ -630,3 +630,29 @@ print(rospy.is_shutdown(), most, lines)
     out, err = process.communicate(timeout=8)
     assert process.returncode == 0
     assert out.splitlines()[-1] == "True 1 ['line', 'hook']", out + err
+
+
+@POSIX_ONLY
+def test_a_fork_is_left_to_the_system_until_it_asks(master: str) -> None:
+    """A Python handler would wait for the C code that a worker of a pool is in: now and then for ever."""
+    process = start("""
+import os, signal, sys, time
+import rospy
+rospy.init_node("parent", argv=[])
+child = os.fork()
+if child == 0:
+    rospy.on_shutdown(lambda: print("the child's hook", flush=True))
+    handlers = [signal.getsignal(signal.SIGTERM)]
+    rospy.is_shutdown()
+    handlers.append(signal.getsignal(signal.SIGTERM))
+    print("ready", flush=True)
+    while not rospy.is_shutdown():
+        time.sleep(0.01)
+    print([handler == signal.SIG_DFL for handler in handlers], flush=True)
+    os._exit(7)
+sys.stdin.readline()
+os.kill(child, signal.SIGTERM)
+print("ended with", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), rospy.is_shutdown())
+""")
+    out, _ = process.communicate("now\n", timeout=8)
+    assert out.splitlines() == ["the child's hook", "[True, False]", "ended with 7 False"]
