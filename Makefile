@@ -24,11 +24,11 @@ demo: $(STAMP)
 	@$(BIN)/minirospy demo
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop
+	@$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/interop
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
-	@$(BIN)/python -m pytest -n 4 --dist worksteal tests/interop
+	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
 
 guard: $(STAMP)
 	@$(BIN)/python benchmarks/guard.py
