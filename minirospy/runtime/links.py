@@ -58,6 +58,7 @@ class OutLink:
     outbox, which the loop empties; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit).
     Before that a thread waits for room, a few milliseconds at most, but only for a peer on this machine that has read
     since the last wait.
+    The first that is sent is ``header``, when the link is opened; frames that come before that wait behind it.
     With ``split`` large messages are sent as split frames where they can be.
     """
 
@@ -69,6 +70,7 @@ class OutLink:
         queue_size: int,
         on_closed: Callable[[OutLink], None],
         *,
+        header: bytes = b"",
         split: bool = False,
     ) -> None:
         self.peer = peer
@@ -90,8 +92,8 @@ class OutLink:
         self._loop = loop
         self._on_closed = on_closed
         self._split = split
-        self._outbox: deque[_Waiting] = deque()
-        self._begun = False
+        self._outbox: deque[_Waiting] = deque([[header]] if header else [])
+        self._begun = bool(header)
         self._is_reading = True
         self._drained = threading.Condition(threading.Lock())
         self._closed = False
@@ -108,9 +110,12 @@ class OutLink:
         return len(self._outbox)
 
     def open(self) -> None:
-        """Start to watch for the peer's hanging up (on the loop)."""
+        """Send the header, and watch for the peer's hanging up (on the loop)."""
         self._loop_thread = threading.get_ident()
         self._loop.add_reader(self._sock, self._readable)
+        with self._drained:
+            self._help()
+        self._start_writing()
 
     def send(self, frame: bytes | LargeFrame) -> None:
         """Send ``frame``: at once, or after those that wait."""

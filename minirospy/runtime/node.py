@@ -270,7 +270,7 @@ class Node:
         elif "topic" in fields:
             publication = self.publications.get(fields["topic"])
             if publication:
-                why = await publication.accept(sock, fields, self.name, address)
+                why = publication.accept(sock, fields, self.name, address)
             else:
                 topics = [[each.topic, each.type.name] for each in self.publications.values()]
                 why = f"[{self.name}] is not a publisher of [{fields['topic']}]. Topics are {topics}"

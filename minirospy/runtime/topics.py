@@ -22,7 +22,7 @@ from minirospy.runtime.links import OutLink, read_frames, watch_frames
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
-from minirospy.wire.header import Header
+from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import (
     InterfaceType,
     check_publisher,
@@ -76,7 +76,6 @@ class Publication:
         self.expected = 0
         """How many subscribers the master knew when this was registered."""
         self._on_link = on_link
-        self._closed = False
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
 
@@ -95,42 +94,43 @@ class Publication:
             for link in links:
                 link.wait()
 
-    async def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return why it is refused."""
+    def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
+        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return why it is refused.
+
+        On the loop.
+        """
         why = check_subscriber(fields, self.topic, self.type)
         if why:
             return why
-        answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
-        await tcp.send_header(sock, answer)
-        if self._closed:
-            sock.close()
-            return None
         sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
+        answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         link = OutLink(
             sock,
             asyncio.get_running_loop(),
             fields.get("callerid", peer),
             self.queue_size or 0,
             self._link_closed,
+            header=serialize_header(answer),
             split=fields.get("split_frames") == "1",
         )
-        link.open()
         for other in self.links:
             if other.peer == link.peer and other.waiting:
                 # A node connects but once: it lost the old link, where frames wait for a peer that is not there.
                 other.close()
+        # A subscriber that has the header counts on all that is published from then on: the link takes frames
+        # before the header goes.
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched
             if latched is not None:
                 link.send(latched)
+        link.open()
         if self._on_link:
             self._on_link(link, True)
         return None
 
     def close(self) -> None:
-        """End all links, and take no more (on the loop)."""
-        self._closed = True
+        """End all links (on the loop)."""
         for link in self.links:
             link.close()
 
