@@ -41,7 +41,7 @@ class Environment(NamedTuple):
     ``host`` is the name that peers are told; ``bind_host`` the address that servers listen on
     (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
     that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
-    the networks whose machines may connect ("": all). ``transport`` "tcp" keeps topics off Unix sockets.
+    the networks whose machines may connect ("": all). ``transport`` "tcp" keeps connections off Unix sockets.
     """
 
     master_uri: str
@@ -89,6 +89,11 @@ class Environment(NamedTuple):
         if self.host in {"localhost", "::1"}:
             return "::1" if self.ipv6 else "127.0.0.1"
         return "::" if self.ipv6 else "0.0.0.0"
+
+    @property
+    def nearby(self) -> bool:
+        """Whether processes of this machine may be reached by Unix sockets."""
+        return self.transport != "tcp"
 
     @property
     def uri_host(self) -> str:

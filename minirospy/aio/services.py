@@ -112,6 +112,7 @@ class ServiceProxy(Generic[_Response_co]):
                 node.name,
                 persistent=self._persistent,
                 headers=self._headers,
+                nearby=node._node.environment.nearby,
             )
         except HandshakeRefused as error:
             raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error

@@ -134,6 +134,7 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
         access=access,
         timeout=options.timeout,
         most_clients=_most_clients(),
+        nearby=environment.nearby,
     )
     stop = _stop_event()
     try:

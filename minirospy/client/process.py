@@ -75,7 +75,8 @@ class NodeProcess(Identity, Life):
     def master(self) -> MasterProxy:
         """The master, called from the caller's own thread."""
         if self._master is None or self._master.caller_id != self.name:
-            self._master = MasterProxy(self.environment.master_uri, self.name)
+            environment = self.environment
+            self._master = MasterProxy(environment.master_uri, self.name, nearby=environment.nearby)
         return self._master
 
     @property

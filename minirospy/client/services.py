@@ -98,10 +98,11 @@ class Service(Generic[_S]):
         """Stop offering the service; a call under way gets its answer."""
         self._ended.set()
         with process.lock:
-            if process.offered.get(self.resolved_name) is self:
+            is_offered = process.offered.get(self.resolved_name) is self
+            if is_offered:
                 del process.offered[self.resolved_name]
         server, self._server = self._server, None
-        if server and process.node and not process.is_shutdown():
+        if server and is_offered and process.node and not process.is_shutdown():
             try:
                 process.run(process.node.unserve(server))
             except (MasterUnreachableError, RpcError) as error:
@@ -250,6 +251,7 @@ class ServiceProxy(Generic[_S]):
             persistent=self.persistent,
             headers=self._headers,
             waits=waits,
+            nearby=process.environment.nearby,
         )
 
     def _connect_by_master(self, ahead: ServiceClient | None) -> ServiceClient:

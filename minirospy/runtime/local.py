@@ -1,21 +1,25 @@
-"""UNIXROS: a topic's connection between two processes of one machine, over a Unix socket.
+"""Connections between two processes of one machine, over a Unix socket in place of TCP.
 
-The socket has a name of Linux' abstract kind: no file, so nothing is left behind, however a process ends. It
-is seen by those that share the machine's network, and :func:`this_host` tells whether two processes do.
-Source: docs/transports.md.
+Beside the port of a server stands a socket of Linux' abstract kind, and its name is made of the server's host and
+port: no file, so nothing is left behind, however a process ends. It is seen by those that share the machine's
+network, as the port is. Source: docs/transports.md.
 """
 
 from __future__ import annotations
 
 import os
 import socket
+import struct
 import sys
 from typing import Any, NamedTuple
 
-__all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "this_host"]
+__all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
 _ABSTRACT = "\0"
+_CREDENTIALS = struct.Struct("3i")
+_TRUSTED = frozenset({0})
+"""Users that are believed to be whom they say: root, and oneself."""
 
 
 class UnixAddress(NamedTuple):
@@ -37,22 +41,24 @@ def this_host() -> str:
         return ""
 
 
-def bind() -> socket.socket:
-    """A Unix socket of a name that nobody else has. Raises OSError."""
+def name_of(host: str, port: int) -> str:
+    """The name of the socket beside ``port`` of a server that is known as ``host``."""
+    host = host.strip("[]").lower()
+    return f"minirospy-{'127.0.0.1' if host == 'localhost' else host}:{port}"
+
+
+def bind(host: str, port: int) -> socket.socket | None:
+    """The socket beside ``port`` of a server that is known as ``host``; None where there can be none."""
+    if sys.platform != "linux":
+        return None
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        sock.bind(f"{_ABSTRACT}minirospy-{os.getpid()}-{os.urandom(8).hex()}")
-    except BaseException:
+        sock.bind(_ABSTRACT + name_of(host, port))
+    except OSError:
         sock.close()
-        raise
+        return None
     return sock
-
-
-def name_of(sock: socket.socket) -> str:
-    """The name that peers are told of a bound socket."""
-    name = sock.getsockname()
-    return (name.decode() if isinstance(name, bytes) else str(name)).removeprefix(_ABSTRACT)
 
 
 def connect(name: str) -> socket.socket:
@@ -64,6 +70,25 @@ def connect(name: str) -> socket.socket:
     except BaseException:
         sock.close()
         raise
+    return sock
+
+
+def reach(host: str, port: int) -> socket.socket | None:
+    """A connected, non-blocking socket to what ``host`` serves at ``port``; None where only TCP leads there.
+
+    Others of this machine could take a name before its server does: so the server is this user's or root's.
+    """
+    if sys.platform != "linux":
+        return None
+    try:
+        sock = connect(name_of(host, port))
+    except OSError:
+        return None
+    credentials = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    _, user, _ = _CREDENTIALS.unpack(credentials)
+    if user not in _TRUSTED and user != os.geteuid():
+        sock.close()
+        return None
     return sock
 
 

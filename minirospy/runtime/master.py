@@ -9,6 +9,7 @@ import asyncio
 import logging
 import os
 import re
+import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sized
 from pathlib import Path
@@ -53,10 +54,12 @@ class Master(MasterApi):
         fresh: bool = False,
         timeout: float = 3.0,
         most_clients: int = 4000,
+        nearby: bool = True,
     ) -> None:
         """``journal``: the file that keeps what it knows (None: no file); ``fresh``: what stands there is dropped.
 
-        ``timeout``: seconds that a node has to take a call.
+        ``timeout``: seconds that a node has to take a call. ``nearby``: processes of this machine may come, and are
+        called, by Unix sockets.
         """
         super().__init__()
         self.host = host
@@ -66,10 +69,16 @@ class Master(MasterApi):
         self._journal_path = journal
         self._fresh = fresh
         self._journal: Any = None
+        self._nearby = nearby
         self._server = RpcServer(
-            self.serve, bind_host=bind_host, port=port, most_idle=most_clients, access=access
+            self.serve,
+            bind_host=bind_host,
+            port=port,
+            most_idle=most_clients,
+            access=access,
+            known_as=_names_of(host, bind_host) if nearby else (),
         )
-        self._notifier = Notifier(self._publishers_of, timeout)
+        self._notifier = Notifier(self._publishers_of, timeout, nearby=nearby)
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
         self.stopped = asyncio.Event()
@@ -280,7 +289,7 @@ class Master(MasterApi):
     # --- the nodes of a master that was killed
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
-        rpc = AsyncRpcClient()
+        rpc = AsyncRpcClient(nearby=self._nearby)
         calls = [_lives(rpc, name, uri, _QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
         try:
             return any(await asyncio.gather(*calls))
@@ -289,7 +298,7 @@ class Master(MasterApi):
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
         """Forget the nodes that are gone; tell the others what they may have missed."""
-        rpc, slots = AsyncRpcClient(), asyncio.Semaphore(_CHECKS_AT_ONCE)
+        rpc, slots = AsyncRpcClient(nearby=self._nearby), asyncio.Semaphore(_CHECKS_AT_ONCE)
 
         async def check(name: str, uri: str) -> bool:
             async with slots:
@@ -344,3 +353,13 @@ def _ago(seconds: float) -> str:
         if seconds >= 2 * unit:
             return f"{seconds / unit:.0f} {name}"
     return f"{seconds:.0f} s"
+
+
+def _names_of(host: str, bind_host: str) -> list[str]:
+    """What ROS_MASTER_URI may call a master that listens on ``bind_host``."""
+    names = [host]
+    if bind_host in {"127.0.0.1", "0.0.0.0", "::"}:
+        names.append("localhost")
+    if bind_host in {"0.0.0.0", "::"}:
+        names.append(socket.gethostname())
+    return names

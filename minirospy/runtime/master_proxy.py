@@ -51,11 +51,11 @@ class MasterProxy:
     Each method raises MasterUnreachableError where it does not answer, RpcRefused where it says no.
     """
 
-    def __init__(self, uri: str, caller_id: str, timeout: float = 5.0) -> None:
+    def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, nearby: bool = True) -> None:
         self.uri = uri
         self.caller_id = caller_id
         try:
-            self._client = RpcClient(uri, timeout)
+            self._client = RpcClient(uri, timeout, nearby=nearby)
         except RpcUnreachable as error:
             raise MasterUnreachableError(uri) from error
 
@@ -161,10 +161,10 @@ class MasterProxy:
 class SlaveProxy:
     """A node at ``uri``. Each method raises RpcUnreachable, RpcRefused or another RpcError."""
 
-    def __init__(self, uri: str, caller_id: str, timeout: float = 3.0) -> None:
+    def __init__(self, uri: str, caller_id: str, timeout: float = 3.0, *, nearby: bool = True) -> None:
         self.uri = uri
         self.caller_id = caller_id
-        self._client = RpcClient(uri, timeout)
+        self._client = RpcClient(uri, timeout, nearby=nearby)
 
     def call(self, method: str, *args: Any) -> Any:
         """Any method of the API; the caller's id is put in front."""

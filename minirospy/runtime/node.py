@@ -70,7 +70,7 @@ class Node:
         self._watch_seconds = watch_seconds
         self.when_registered_again: list[Callable[[], object]] = []
         """Called in workers when the master had forgotten this node: for what else it has to be told."""
-        self._rpc = AsyncRpcClient()
+        self._rpc = AsyncRpcClient(nearby=environment.nearby)
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
         self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
@@ -92,7 +92,7 @@ class Node:
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
-        if self.environment.transport != "tcp":
+        if self.environment.nearby:
             self._open_nearby()
         self._server = RpcServer(
             SlaveApi(self).dispatch,
@@ -101,6 +101,7 @@ class Node:
             ports=ports,
             most_idle=_MOST_IDLE,
             access=self._access,
+            known_as=(self.environment.uri_host,) if self.environment.nearby else (),
         )
         await self._server.start()
         self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
@@ -282,11 +283,11 @@ class Node:
             sock.close()
 
     def _open_nearby(self) -> None:
-        """Serve topics by a Unix socket too, where there are such sockets."""
-        self.this_host = local.this_host()
-        if self.this_host:
-            sock = local.bind()
-            self.unix_name = local.name_of(sock)
+        """Serve topics and services by a Unix socket too, where there are such sockets."""
+        sock = local.bind(self.environment.uri_host, self.tcpros_port)
+        if sock:
+            self.this_host = local.this_host()
+            self.unix_name = local.name_of(self.environment.uri_host, self.tcpros_port)
             self._nearby.listen(sock)
 
     def _check_own_address(self) -> None:

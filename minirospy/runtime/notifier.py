@@ -58,11 +58,13 @@ class Notifier:
     follows after a pause.
     """
 
-    def __init__(self, publishers: Callable[[str], list[str]], timeout: float) -> None:
+    def __init__(
+        self, publishers: Callable[[str], list[str]], timeout: float, *, nearby: bool = True
+    ) -> None:
         """``publishers(topic)``: the list as it is now. ``timeout``: seconds that a call may take."""
         self._publishers = publishers
         self._timeout = timeout
-        self._rpc = AsyncRpcClient()
+        self._rpc = AsyncRpcClient(nearby=nearby)
         self._nodes: dict[str, _Node] = {}
         self._line = _Line(_CALLS_AT_ONCE)
         self._suspect_line = _Line(_CALLS_TO_SUSPECTS)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
-from minirospy.runtime import tcp
+from minirospy.runtime import local, tcp
 from minirospy.runtime.rpc_client import parse_http_uri
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
@@ -35,7 +35,9 @@ _Address = tuple[str, int]
 class AsyncRpcClient:
     """Calls methods of any server; a few connections to each are kept for a while and reused."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, nearby: bool = True) -> None:
+        """``nearby``: a Unix socket is tried first."""
+        self.nearby = nearby
         # Of each server, in the order of their last use: sockets, and when that was.
         self._idle: dict[_Address, list[tuple[socket.socket, float]]] = {}
         self._sweep: asyncio.TimerHandle | None = None
@@ -218,6 +220,11 @@ class Call:
     def _connect(self) -> None:
         """A new connection, at once where the host needs no looking up."""
         host, port = self._address
+        near = local.reach(host, port) if self._client.nearby else None
+        if near:
+            self._use(near)
+            self._send()
+            return
         literal = _literal(host)
         if not literal:
             self._look_up()

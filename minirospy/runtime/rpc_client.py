@@ -9,6 +9,7 @@ from typing import Any
 
 from minirospy.environment import split_http_uri
 from minirospy.errors import RpcProtocolError, RpcUnreachable
+from minirospy.runtime import local
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
 
@@ -24,11 +25,15 @@ class RpcClient:
     middle of another call of the same thread gets one of its own.
     """
 
-    def __init__(self, uri: str, timeout: float = 5.0) -> None:
-        """``timeout`` in seconds bounds connecting, and each wait for bytes. Raises RpcUnreachable on a bad URI."""
+    def __init__(self, uri: str, timeout: float = 5.0, *, nearby: bool = True) -> None:
+        """``timeout`` in seconds bounds connecting, and each wait for bytes. ``nearby``: a Unix socket is tried first.
+
+        Raises RpcUnreachable on a bad URI.
+        """
         self.uri = uri
         self._host, self._port, self._path = parse_http_uri(uri)
         self._timeout = timeout
+        self._nearby = nearby
         self._idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: Any) -> Any:
@@ -61,9 +66,14 @@ class RpcClient:
         except TimeoutError as error:
             raise RpcUnreachable(self.uri, f"timed out after {self._timeout:g} s") from error
         except (OSError, EOFError) as error:
-            raise RpcUnreachable(self.uri, str(error) or "the connection was closed") from error
+            why = getattr(error, "strerror", None) or str(error) or "the connection was closed"
+            raise RpcUnreachable(self.uri, why) from error
 
     def _connect(self) -> socket.socket:
+        near = local.reach(self._host, self._port) if self._nearby else None
+        if near:
+            near.settimeout(self._timeout)
+            return near
         try:
             # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
             host: Any = "127.0.0.1" if self._host == "localhost" else self._host

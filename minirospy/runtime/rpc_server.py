@@ -12,13 +12,13 @@ import errno
 import logging
 import socket
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from enum import Enum
 from itertools import islice
 from typing import Any
 
 from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.runtime import tcp
+from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
@@ -49,6 +49,7 @@ _RECEIVE = 16384
 """Bytes at a time: what one client pipelines is taken apart before the next one has its turn."""
 
 _END_OF_HEAD = b"\r\n\r\n"
+_BACKLOG = 1000
 _ACCEPTS_AT_ONCE = 32
 _ANSWERS_AT_ONCE = 4
 """Of requests that came together, before others have their turn."""
@@ -82,8 +83,11 @@ class RpcServer:
         ports: range | None = None,
         most_idle: int | None = None,
         access: Access | None = None,
+        known_as: Iterable[str] = (),
     ) -> None:
         """Port 0 takes a free one, out of ``ports`` where these are given.
+
+        Processes of this machine that know the server by one of the hosts ``known_as`` may come by a Unix socket.
 
         ``most_idle`` clients are kept, those that spoke last (None: all). Clients that ``access`` does not
         allow are hung up on.
@@ -100,7 +104,8 @@ class RpcServer:
         self._ports = ports
         self._most = most_idle
         self._access = access
-        self._sock: socket.socket | None = None
+        self._known_as = dict.fromkeys(known_as)
+        self._listening: list[socket.socket] = []
         # Until when a request has to be whole, or an answer taken; idle connections are not in here.
         self._deadlines: dict[_Connection, float] = {}
         self._sweep: asyncio.TimerHandle | None = None
@@ -118,21 +123,24 @@ class RpcServer:
         try:
             # Those that are accepted take it over.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            sock.listen(1000)
+            sock.listen(_BACKLOG)
         except BaseException:
             sock.close()
             raise
-        self._sock = sock
         self.port = sock.getsockname()[1]
-        self._watch()
+        self._watch(sock)
+        for host in self._known_as:
+            near = local.bind(host, self.port)
+            if near:
+                near.listen(_BACKLOG)
+                self._watch(near)
 
     async def close(self) -> None:
         """Stop listening and end all connections. Idempotent."""
-        if self._sock is None:
-            return
-        asyncio.get_running_loop().remove_reader(self._sock)
-        self._sock.close()
-        self._sock = None
+        while self._listening:
+            sock = self._listening.pop()
+            asyncio.get_running_loop().remove_reader(sock)
+            sock.close()
         for connection in list(self.connections):
             connection.end()
         if self._sweep:
@@ -162,9 +170,13 @@ class RpcServer:
         if self._deadlines:
             self._sweep = loop.call_at(min(self._deadlines.values()), self._end_late)
 
-    def _watch(self) -> None:
-        if self._sock is not None:
-            asyncio.get_running_loop().add_reader(self._sock, self._accept, self._sock)
+    def _watch(self, sock: socket.socket) -> None:
+        self._listening.append(sock)
+        asyncio.get_running_loop().add_reader(sock, self._accept, sock)
+
+    def _watch_again(self, sock: socket.socket) -> None:
+        if sock in self._listening:
+            asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
     def _accept(self, sock: socket.socket) -> None:
         loop = asyncio.get_running_loop()
@@ -178,9 +190,10 @@ class RpcServer:
                 _log.warning("a connection could not be accepted: %s", error)
                 self._end_longest_silent()
                 loop.remove_reader(sock)
-                loop.call_later(0.05, self._watch)
+                loop.call_later(0.05, self._watch_again, sock)
                 return
-            if self._allows(peer, address[0]):
+            # Who comes by a Unix socket has no address.
+            if not address or self._allows(peer, address[0]):
                 self._serve(peer, loop)
             else:
                 peer.close()

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from minirospy.errors import CallFailed, WireError
-from minirospy.runtime import sockets
+from minirospy.runtime import local, sockets
 from minirospy.wire.framing import MAX_FRAME
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 from minirospy.wire.tcpros import check_service, service_client_header
@@ -50,8 +50,9 @@ class ServiceClient:
         headers: Mapping[str, str] | None = None,
         timeout: float = sockets.HANDSHAKE_SECONDS,
         waits: bool = True,
+        nearby: bool = True,
     ) -> None:
-        """Connect to ``uri`` (rosrpc://host:port) and exchange headers.
+        """Connect to ``uri`` (rosrpc://host:port), ``nearby`` by a Unix socket where it can be, and exchange headers.
 
         With ``waits`` false the server's header is left for :meth:`finish`, so that the caller can do something
         else meanwhile. Raises HandshakeRefused where the server says no, OSError or WireError where it cannot be
@@ -64,7 +65,7 @@ class ServiceClient:
         )
         # Made before connecting, so that the server finds it when it looks at the connection for the first time.
         header = serialize_header(fields)
-        self._sock = _connected(parse_service_uri(uri), timeout)
+        self._sock = _connected(parse_service_uri(uri), timeout, nearby=nearby)
         try:
             self._sock.sendall(header)
             self._reader = Reader(self._sock)
@@ -201,8 +202,12 @@ class Reader:
         return whole[:count]
 
 
-def _connected(address: tuple[str, int], timeout: float) -> socket.socket:
+def _connected(address: tuple[str, int], timeout: float, *, nearby: bool) -> socket.socket:
     """A tuned blocking socket. Raises OSError."""
+    near = local.reach(*address) if nearby else None
+    if near:
+        near.settimeout(timeout)
+        return near
     try:
         socket.inet_pton(socket.AF_INET, address[0])
     except OSError:

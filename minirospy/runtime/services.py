@@ -14,7 +14,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from minirospy.errors import CallFailed, ServiceException, WireError
-from minirospy.runtime import sockets, tcp
+from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.service_client import (
     ANSWER,
     LENGTH,
@@ -219,12 +219,14 @@ class AsyncServiceClient:
         probe: bool = False,
         headers: Mapping[str, str] | None = None,
         timeout: float = sockets.HANDSHAKE_SECONDS,
+        nearby: bool = True,
     ) -> AsyncServiceClient:
         """Connect to ``uri`` and exchange headers. Raises as :class:`ServiceClient` does."""
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
-        sock = await tcp.connect(*parse_service_uri(uri), timeout)
+        address = parse_service_uri(uri)
+        sock = (local.reach(*address) if nearby else None) or await tcp.connect(*address, timeout)
         try:
             sockets.tune(sock)
             await tcp.send_header(sock, fields)

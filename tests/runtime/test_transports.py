@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 from typing import Any
@@ -14,9 +15,14 @@ import pytest
 from minirospy.environment import Environment
 from minirospy.errors import UsageError
 from minirospy.runtime import local
+from minirospy.runtime.node import Node
+from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.service_client import ServiceClient
+from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.slave import SlaveApi
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
-from tests.runtime.test_topics import Box, eventually, graph, listen, publish, run
+from minirospy.wire.header import Header
+from tests.runtime.test_topics import STRING, Box, eventually, graph, listen, publish, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="abstract Unix sockets are Linux'")
 
@@ -102,6 +108,76 @@ def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) 
             await eventually(lambda: box.bodies == [b"hello"])
 
     run(scene)
+
+
+@pytest.mark.parametrize(
+    ("of_server", "of_client", "family"),
+    [
+        ("", "", socket.AF_UNIX),
+        ("tcp", "", socket.AF_INET),
+        ("", "tcp", socket.AF_INET),
+    ],
+)
+def test_a_service_and_the_slave_api_are_reached_by_the_socket_beside_their_port(
+    of_server: str, of_client: str, family: socket.AddressFamily, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINIROSPY_TRANSPORT", of_server)
+    families: list[socket.AddressFamily] = []
+
+    async def echo(request: bytes, _: Header) -> bytes:
+        return request
+
+    def call(node: Node) -> None:
+        nearby = not of_client
+        client = ServiceClient(node.service_uri, "/s", "*", "/c", nearby=nearby)
+        families.append(client._sock.family)
+        assert client.call(b"abc") == b"abc"
+        client.close()
+        slave = RpcClient(node.uri, nearby=nearby)
+        assert slave.call("getPid", "/c")[2] == os.getpid()
+        families.append(slave._idle[0].family)
+        slave.close()
+
+    async def scene() -> None:
+        async with graph("/a") as (_, (node,)):
+            types = {"request_type": "std_srvs/EmptyRequest", "response_type": "std_srvs/EmptyResponse"}
+            service = LoopServiceServer("/s", STRING, node.name, echo, workers=node.workers, **types)
+            await node.serve(service)
+            await asyncio.get_running_loop().run_in_executor(None, call, node)
+            client = await AsyncServiceClient.connect(node.service_uri, "/s", "*", "/c", nearby=not of_client)
+            families.append(client._sock.family)
+            assert await client.call(b"abc") == b"abc"
+            client.close()
+
+    run(scene)
+    assert families == [family] * 3
+
+
+@pytest.mark.parametrize("uri", ["http://localhost:{}", "http://127.0.0.1:{}/", "http://LocalHost:{}"])
+def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
+    async def scene() -> None:
+        async with graph() as (master, _):
+            client = RpcClient(uri.format(master.port))
+            answer = await asyncio.get_running_loop().run_in_executor(None, client.call, "getPid", "/c")
+            assert answer[2] == os.getpid()
+            assert client._idle[0].family == socket.AF_UNIX
+            client.close()
+
+    run(scene)
+
+
+def test_a_name_that_somebody_else_took_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    # As if this process, which took the name, were another user's and not root's.
+    monkeypatch.setattr(local, "_TRUSTED", frozenset())
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        taken = local.bind("127.0.0.1", port)
+        assert taken
+        with taken:
+            taken.listen()
+            assert local.reach("127.0.0.1", port) is None
+            assert local.bind("localhost", port) is None
 
 
 @pytest.mark.parametrize("transport", ["auto", "tcp"])

@@ -128,7 +128,7 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
 def _call(uri: str, service: str, caller_id: str) -> str:
     """The text of a listener's answer. Raises OSError, WireError."""
     type_ = service_class("std_srvs/Trigger")
-    client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS)
+    client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, nearby=False)
     try:
         response = type_._response_class()
         response.deserialize(client.call(b""))

@@ -147,7 +147,7 @@ class _Node(Node):
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
     """Whether this machine reaches its own nodes at the address that they tell others."""
     host, ports = own.environment.host, own.environment.ports
-    slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS)
+    slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, nearby=False)
     try:
         slave.get_pid()
     except RpcError as error:

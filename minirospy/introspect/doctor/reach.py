@@ -200,7 +200,7 @@ def read_topic(
     ``timeout`` seconds are for each step. Raises RpcError, WireError, OSError.
     """
     look_up(host_port(uri)[0])
-    with contextlib.closing(SlaveProxy(uri, caller_id, timeout)) as slave:
+    with contextlib.closing(SlaveProxy(uri, caller_id, timeout, nearby=False)) as slave:
         answer = slave.request_topic(topic, [["TCPROS"]])
     match answer:
         case ["TCPROS", str(host), int(port), *_]:
