@@ -23,7 +23,7 @@ __all__ = [
     "Environment",
     "is_own_host",
     "master_and_namespace",
-    "split_http_uri",
+    "split_uri",
 ]
 
 DEFAULT_MASTER_PORT = 11311
@@ -103,7 +103,7 @@ class Environment(NamedTuple):
     @property
     def master_address(self) -> tuple[str, int]:
         """(host, port) of the master."""
-        host, port, _ = split_http_uri(self.master_uri)
+        host, port, _ = split_uri(self.master_uri)
         return host, port
 
     @property
@@ -120,18 +120,18 @@ def master_and_namespace(
     return _checked_uri(uri), "/" + (namespace or environ.get("ROS_NAMESPACE") or "").strip("/")
 
 
-def split_http_uri(uri: str) -> tuple[str, int, str]:
-    """(host, port, path) of ``http://host:port/path``. Raises ValueError.
+def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
+    """(host, port, path) of ``scheme://host:port/path``. Raises ValueError.
 
     By hand: importing urllib.parse takes a command a twentieth of its time.
     """
-    scheme, _, rest = uri.partition("://")
+    found, _, rest = uri.partition("://")
     address, slash, path = rest.partition("/")
     host, _, port = address.rpartition(":")
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]
-    if scheme.lower() != "http" or host[:1] in ("", "[") or not (port.isascii() and port.isdecimal()):
-        raise ValueError(f"[{uri}] is not of the form http://host:port")
+    if found.lower() != scheme or host[:1] in ("", "[") or not (port.isascii() and port.isdecimal()):
+        raise ValueError(f"[{uri}] is not of the form {scheme}://host:port")
     if not 0 < int(port) < 65536:
         raise ValueError(f"[{uri}]: a port lies between 1 and 65535")
     return host.lower(), int(port), slash + path or "/"
@@ -155,7 +155,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 
 def _checked_uri(uri: str) -> str:
     try:
-        split_http_uri(uri)
+        split_uri(uri)
     except ValueError as error:
         raise UsageError(
             f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311"
@@ -197,7 +197,8 @@ def _advertised_host(environ: Mapping[str, str]) -> str:
             return _checked_host(named, variable)
     name = socket.gethostname()
     try:
-        socket.getaddrinfo(name, None, socket.AF_INET)
+        # The look-up of a str would import the IDNA codec.
+        socket.getaddrinfo(name.encode() if name.isascii() else name, None, socket.AF_INET)
     except OSError:
         return "localhost"
     return name

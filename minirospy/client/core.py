@@ -11,11 +11,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
 from minirospy.client.naming import ParameterInvalid, Validator, valid_name
 from minirospy.client.process import process
 from minirospy.clock import SimulatedClock, WallClock
+from minirospy.environment import split_uri
 from minirospy.errors import ROSException
 from minirospy.times import Time
 
@@ -93,12 +93,9 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
     if not uri.startswith(_ROSRPC):
         raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
     try:
-        parts = urlsplit(uri)
-        host, port = parts.hostname, parts.port
+        host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
-        host = port = None
-    if host is None or port is None:
-        raise ParameterInvalid(f"ROS service URL is invalid: {uri}")
+        raise ParameterInvalid(f"ROS service URL is invalid: {uri}") from None
     return host, port
 
 

@@ -7,7 +7,7 @@ import socket
 from collections import deque
 from typing import Any
 
-from minirospy.environment import split_http_uri
+from minirospy.environment import split_uri
 from minirospy.errors import RpcProtocolError, RpcUnreachable
 from minirospy.runtime import local
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
@@ -112,6 +112,6 @@ class RpcClient:
 def parse_http_uri(uri: str) -> tuple[str, int, str]:
     """(host, port, path) of ``http://host:port/path``. Raises RpcUnreachable."""
     try:
-        return split_http_uri(uri)
+        return split_uri(uri)
     except ValueError as error:
         raise RpcUnreachable(uri, "not a URI of the form http://host:port") from error

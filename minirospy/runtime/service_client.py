@@ -11,8 +11,8 @@ import select
 import socket
 import struct
 from collections.abc import Mapping
-from urllib.parse import urlsplit
 
+from minirospy.environment import split_uri
 from minirospy.errors import CallFailed, WireError
 from minirospy.runtime import local, sockets
 from minirospy.wire.framing import MAX_FRAME
@@ -127,12 +127,9 @@ class ServiceClient:
 def parse_service_uri(uri: str) -> tuple[str, int]:
     """(host, port) of ``rosrpc://host:port``. Raises WireError."""
     try:
-        parts = urlsplit(uri)
-        host, port = parts.hostname, parts.port
+        host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
-        host = port = None
-    if parts.scheme != "rosrpc" or not host or not port:
-        raise WireError(f"protocol uri is invalid: {uri}")
+        raise WireError(f"protocol uri is invalid: {uri}") from None
     # "localhost" may name IPv6 first, where no server of ROS 1 listens.
     return ("127.0.0.1" if host == "localhost" else host), port
 

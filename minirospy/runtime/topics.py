@@ -13,8 +13,8 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from urllib.parse import urlsplit
 
+from minirospy.environment import split_uri
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime import local, sockets, tcp
@@ -421,7 +421,10 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
     """Whose address is wrong, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
-    host = urlsplit(uri).hostname or ""
+    try:
+        host = split_uri(uri)[0]
+    except ValueError:
+        return "That is no address of a node: whoever registered it has to say http://host:port/"
     if nameless:
         return (
             f"This machine does not know the name '{host}': on the publisher's machine set ROS_IP to its address, "

@@ -350,6 +350,16 @@ async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
     return sock
 
 
+def test_a_publisher_whose_address_is_none_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (node,)):
+            subscription = await listen(node, "/t", Box())
+            subscription.publishers_changed(["nonsense"])
+            await eventually(lambda: "no address of a node" in caplog.text)
+
+    run(scene)
+
+
 @pytest.mark.parametrize("latch", [False, True])
 def test_who_has_the_header_misses_nothing_that_is_published_from_then_on(*, latch: bool) -> None:
     rounds = 200
