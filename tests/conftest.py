@@ -8,6 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# A busy machine makes examples slow, and nothing wrong.
+settings.register_profile("minirospy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("minirospy")
 
 
 @pytest.fixture(scope="session")

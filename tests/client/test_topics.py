@@ -275,4 +275,6 @@ print("alone", flush=True)
     listener.kill()
     output, errors = talker.communicate("go\n", timeout=20)
     assert (output, talker.returncode) == ("alone\n", 0)
-    assert errors.count("\n") == errors.count("SyntaxWarning") == 1
+    # Python 3.13 shows the line too.
+    (warning,) = [text for text in errors.splitlines() if not text.startswith(" ")]
+    assert "SyntaxWarning" in warning

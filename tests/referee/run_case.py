@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -39,10 +40,16 @@ def run_case(name: str, python: str, uri: str, home: Path) -> str:
 
 
 def differences(said: str, expected: str) -> str:
-    """The lines in which two outputs differ; nothing where they are the same."""
-    return "\n".join(
-        difflib.unified_diff(expected.splitlines(), said.splitlines(), "expected", "said", lineterm="", n=1)
-    )
+    """The lines in which two outputs differ, whatever the Python; nothing where they are the same."""
+    lines, others = (_as_every_python(text).splitlines() for text in (said, expected))
+    return "\n".join(difflib.unified_diff(others, lines, "expected", "said", lineterm="", n=1))
+
+
+def _as_every_python(text: str) -> str:
+    """Without what Python adds to its messages from 3.13 on."""
+    text = text.replace(" and no __dict__ for setting new attributes", "")
+    # The source of a line of `python -c`, and what marks the place in it.
+    return re.sub(r'^(\s*)(File "<string>", .*\n)(?:\1 .*\n)+', r"\1\2", text, flags=re.MULTILINE)
 
 
 def recorded(name: str) -> Path:
