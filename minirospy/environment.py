@@ -130,7 +130,8 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
     host, _, port = address.rpartition(":")
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]
-    if found.lower() != scheme or host[:1] in ("", "[") or not (port.isascii() and port.isdecimal()):
+    is_host = host.isprintable() and host[:1] not in ("", "[")
+    if found.lower() != scheme or not is_host or not (port.isascii() and port.isdecimal()):
         raise ValueError(f"[{uri}] is not of the form {scheme}://host:port")
     if not 0 < int(port) < 65536:
         raise ValueError(f"[{uri}]: a port lies between 1 and 65535")

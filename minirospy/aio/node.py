@@ -463,7 +463,13 @@ class Node:
             try:
                 uri = await self._node.master("lookupService", name)
                 client = await AsyncServiceClient.connect(
-                    uri, name, ANY, self.name, probe=True, timeout=_PROBE_SECONDS
+                    uri,
+                    name,
+                    ANY,
+                    self.name,
+                    probe=True,
+                    timeout=_PROBE_SECONDS,
+                    nearby=self._node.environment.nearby,
                 )
             except (RpcError, MasterUnreachableError):
                 pass

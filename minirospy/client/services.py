@@ -349,7 +349,8 @@ def _probe(name: str, timeout: float) -> str | None:
     except (MasterUnreachableError, RpcError) as error:
         return f"the master does not answer ({error})"
     try:
-        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=timeout).close()
+        nearby = process.environment.nearby
+        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=timeout, nearby=nearby).close()
     except (OSError, WireError):
         return _NO_CONTACT
     return None

@@ -11,13 +11,15 @@ import os
 import socket
 import struct
 import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
-_ABSTRACT = "\0"
-_CREDENTIALS = struct.Struct("3i")
+_CREDENTIALS = struct.Struct("iII")
+"""Of a peer: process, user and group."""
+
 _TRUSTED = frozenset({0})
 """Users that are believed to be whom they say: root, and oneself."""
 
@@ -51,26 +53,15 @@ def bind(host: str, port: int) -> socket.socket | None:
     """The socket beside ``port`` of a server that is known as ``host``; None where there can be none."""
     if sys.platform != "linux":
         return None
-    sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        sock.setblocking(False)
-        sock.bind(_ABSTRACT + name_of(host, port))
+        return _open(name_of(host, port), lambda sock, address: sock.bind(address))
     except OSError:
-        sock.close()
         return None
-    return sock
 
 
 def connect(name: str) -> socket.socket:
     """A connected, non-blocking socket; a Unix socket needs no waiting. Raises OSError."""
-    sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    sock.setblocking(False)
-    try:
-        sock.connect(_ABSTRACT + name)
-    except BaseException:
-        sock.close()
-        raise
-    return sock
+    return _open(name, lambda sock, address: sock.connect(address))
 
 
 def reach(host: str, port: int) -> socket.socket | None:
@@ -99,3 +90,16 @@ def parse_answer(answer: Any) -> UnixAddress | None:
             return UnixAddress(name, host, port)
         case _:
             return None
+
+
+def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.socket:
+    """A non-blocking socket, bound or connected to ``name``. Raises OSError."""
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        # A zero byte makes it abstract. As UTF-8 in any locale: the two ends may have different ones.
+        use(sock, b"\0" + name.encode(errors="surrogatepass"))
+    except BaseException:
+        sock.close()
+        raise
+    return sock

@@ -125,8 +125,9 @@ class Node:
             *watching,
             return_exceptions=True,
         )
-        await self._listener.close()
+        # Its name goes before the port, which the next server takes with a name of its own.
         await self._nearby.close()
+        await self._listener.close()
         for table in (self.publications, self.subscriptions, self.services):
             for part in table.values():
                 part.close()

@@ -173,7 +173,7 @@ class Call:
         self._loop = asyncio.get_running_loop()
         self._address: _Address = ("", 0)
         self._request = body
-        self._left = b""
+        self._left = memoryview(body)
         self._reader = HttpReader()
         self._sock: socket.socket | None = None
         # A number, since the loop makes a text of what it does not know yet.
@@ -265,7 +265,8 @@ class Call:
     def _use(self, sock: socket.socket) -> None:
         self._sock = sock
         self._fd = sock.fileno()
-        self._left = self._request
+        # A view: a Unix socket takes a large request in many pieces.
+        self._left = memoryview(self._request)
 
     def _send_early(self) -> None:
         """A connection to this machine is made by now, although nobody has said so yet."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from minirospy.environment import split_uri
 from minirospy.errors import RpcProtocolError, RpcUnreachable
-from minirospy.runtime import local
+from minirospy.runtime import local, sockets
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
 
@@ -57,11 +57,11 @@ class RpcClient:
             sock: socket.socket | None = self._idle.pop()
         except IndexError:
             sock = None
-        if sock is not None:
-            # A kept connection may have been closed by the peer meanwhile: then once more on a new one.
-            with contextlib.suppress(OSError, EOFError):
-                return self._ask(sock, request)
         try:
+            if sock is not None:
+                # A kept connection may have been closed by the peer meanwhile: then once more on a new one.
+                with contextlib.suppress(ConnectionError, EOFError):
+                    return self._ask(sock, request)
             return self._ask(self._connect(), request)
         except TimeoutError as error:
             raise RpcUnreachable(self.uri, f"timed out after {self._timeout:g} s") from error
@@ -76,10 +76,7 @@ class RpcClient:
             return near
         try:
             # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
-            host: Any = "127.0.0.1" if self._host == "localhost" else self._host
-            if host.isascii():
-                # The look-up of a str imports the IDNA codec, which takes a command a tenth of its time.
-                host = host.encode()
+            host: Any = sockets.resolvable("127.0.0.1" if self._host == "localhost" else self._host)
             sock = socket.create_connection((host, self._port), self._timeout)
         except ConnectionRefusedError:
             if self._host != "localhost" or not socket.has_ipv6:

@@ -18,7 +18,7 @@ from itertools import islice
 from typing import Any
 
 from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.runtime import local, tcp
+from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
@@ -192,8 +192,7 @@ class RpcServer:
                 loop.remove_reader(sock)
                 loop.call_later(0.05, self._watch_again, sock)
                 return
-            # Who comes by a Unix socket has no address.
-            if not address or self._allows(peer, address[0]):
+            if peer.family not in sockets.FAMILIES or self._allows(peer, address[0]):
                 self._serve(peer, loop)
             else:
                 peer.close()
@@ -212,10 +211,11 @@ class RpcServer:
     def tell_refusal(self, sock: socket.socket, why: str) -> None:
         """Log that a request was refused; a flood of them is summed up."""
         try:
-            name = sock.getpeername()
+            # Who comes by a Unix socket has no address.
+            name = sock.getpeername()[0] if sock.family in sockets.FAMILIES else "this machine"
         except OSError:
-            name = ()
-        self._complaints.warning("a request from %s was refused: %s", name[0] if name else "a client", why)
+            name = "a client"
+        self._complaints.warning("a request from %s was refused: %s", name, why)
 
     def _end_longest_silent(self) -> None:
         """One goes that asks nothing, or else the one that was silent longest."""

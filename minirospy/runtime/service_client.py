@@ -11,6 +11,7 @@ import select
 import socket
 import struct
 from collections.abc import Mapping
+from typing import Any
 
 from minirospy.environment import split_uri
 from minirospy.errors import CallFailed, WireError
@@ -29,6 +30,7 @@ LENGTH = struct.Struct("<I")
 
 _RECEIVE = 16 * 1024
 _MOST = 1024 * 1024
+_WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 
 
 class ServiceClient:
@@ -172,15 +174,15 @@ class Reader:
                     return b""
                 raise PeerEndedError(len(data))
             data = data + more if data else more
-            if count > _MOST:
+            if count > _RECEIVE:
                 return self._take_large(data, count)
         self._rest = data[count:]
         return data[:count]
 
-    def _some(self, count: int) -> bytes:
+    def _some(self, count: int, flags: int = 0) -> bytes:
         """Up to so many bytes; none where the peer has ended."""
         try:
-            return self._receive(min(count, _MOST))
+            return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
             # It ended with something unread: the end all the same.
             return b""
@@ -189,7 +191,7 @@ class Reader:
         parts = [data]
         missing = count - len(data)
         while missing > 0:
-            more = self._some(missing)
+            more = self._some(missing, _WAIT_ALL)
             if not more:
                 raise PeerEndedError(count - missing)
             parts.append(more)
@@ -208,7 +210,8 @@ def _connected(address: tuple[str, int], timeout: float, *, nearby: bool) -> soc
     try:
         socket.inet_pton(socket.AF_INET, address[0])
     except OSError:
-        sock = socket.create_connection(address, timeout)
+        named: Any = (sockets.resolvable(address[0]), address[1])
+        sock = socket.create_connection(named, timeout)
         sockets.tune(sock)
         return sock
     # Most services are found by an address: no resolver has to be asked.

@@ -180,7 +180,7 @@ class Listener:
         if len(self._handshakes) >= MOST_HANDSHAKES:
             self._end_oldest(f"it said nothing, and {MOST_HANDSHAKES} others are waiting")
         # Who comes by a Unix socket has no address.
-        where = f"{address[0]}:{address[1]}" if address else "this machine"
+        where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))
         self._handshakes[task] = where
 
@@ -242,7 +242,8 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, Any]]:
             socket.inet_pton(family, host)
             return [(family, (host, port))]
     try:
-        infos = await asyncio.get_running_loop().getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        name = sockets.resolvable(host)
+        infos = await asyncio.get_running_loop().getaddrinfo(name, port, type=socket.SOCK_STREAM)
     except RuntimeError as error:
         # Python lets no thread begin once the program is ending.
         raise OSError(f"the address of {host} was not looked for: {error}") from error

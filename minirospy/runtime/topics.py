@@ -121,7 +121,7 @@ class Publication:
         # before the header goes.
         with self._latch_lock:
             self.links += (link,)
-            latched = self._latched
+            latched = self._latched if self.latch else None
             if latched is not None:
                 link.send(latched)
         link.open()

@@ -14,6 +14,7 @@ from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
 from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
+from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.wire.xmlrpc import serialize_call
 
@@ -46,6 +47,32 @@ def test_a_kept_connection_that_the_peer_closed_is_made_anew() -> None:
             await client.call(uri, "a", 4)
         assert not client.under_way
         await client.close()
+
+    run(test)
+
+
+def test_a_call_that_was_late_on_a_kept_connection_is_not_made_again() -> None:
+    async def test() -> None:
+        made: list[str] = []
+
+        async def late() -> int:
+            await asyncio.sleep(60)
+            return 0
+
+        def dispatch(method: str, _: object) -> object:
+            made.append(method)
+            return late() if method == "late" else 1
+
+        server = RpcServer(dispatch)
+        await server.start()
+        client = RpcClient(f"http://127.0.0.1:{server.port}/", 0.2)
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(None, client.call, "quick")
+        with pytest.raises(RpcUnreachable, match=r"timed out after 0\.2 s"):
+            await loop.run_in_executor(None, client.call, "late")
+        assert made == ["quick", "late"]
+        client.close()
+        await server.close()
 
     run(test)
 

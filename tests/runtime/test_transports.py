@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import functools
 import os
 import signal
 import socket
 import subprocess
 import sys
+import tracemalloc
 from typing import Any
 
 import pytest
 
 from minirospy.environment import Environment
-from minirospy.errors import UsageError
+from minirospy.errors import RpcUnreachable, UsageError, WireError
 from minirospy.runtime import local
+from minirospy.runtime.access import Access
 from minirospy.runtime.node import Node
+from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.service_client import ServiceClient
 from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.slave import SlaveApi
+from minirospy.runtime.tcp import Listener
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
 from minirospy.wire.header import Header
 from tests.runtime.test_topics import STRING, Box, eventually, graph, listen, publish, run
@@ -178,6 +185,194 @@ def test_a_name_that_somebody_else_took_is_not_believed(monkeypatch: pytest.Monk
             taken.listen()
             assert local.reach("127.0.0.1", port) is None
             assert local.bind("localhost", port) is None
+
+
+OWN = f"test-{os.getpid()}"
+"""A host that no other test has."""
+
+
+def program(text: str, **environment: str) -> str:
+    """What a program prints."""
+    return subprocess.run(
+        [sys.executable, "-c", text],
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    ).stdout
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root becomes somebody else")
+@pytest.mark.parametrize("user", [65534, 2**32 - 6])
+def test_each_user_believes_himself_and_root(user: int) -> None:
+    printed = program(
+        f"""
+import os
+from minirospy.runtime import local
+OWN = {OWN!r}
+server = local.bind(OWN, 2)
+os.setresuid({user}, {user}, 0)
+server.listen()
+print(local.reach(OWN, 2) is not None)
+os.seteuid(0)
+print(local.reach(OWN, 2) is not None)
+"""
+    )
+    assert printed.split() == ["True", "False"]
+
+
+def test_without_unix_sockets_there_is_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where systemd's RestrictAddressFamilies leaves them out, or no file descriptor is left."""
+
+    def restricted(*_: object) -> None:
+        raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(socket, "socket", restricted)
+        assert local.bind(OWN, 2) is None
+        assert local.reach(OWN, 2) is None
+
+
+def test_a_name_is_the_same_in_every_locale() -> None:
+    printed = program(
+        """
+import os
+from minirospy.runtime import local
+host, port = "\\u00fc\\u0431", os.getpid()
+print(local.bind(host, port).getsockname() == f"\\0minirospy-{host}:{port}".encode())
+""",
+        LC_ALL="C",
+        PYTHONCOERCECLOCALE="0",
+        PYTHONUTF8="0",
+    )
+    assert printed == "True\n"
+
+
+@pytest.mark.parametrize("host", ["a..b", "a" * 64, "\u00fc" * 64, "\udcff", "a\0b"])
+def test_what_can_be_nobodys_name_is_told_of_as_unreachable(host: str) -> None:
+    async def scene() -> None:
+        uri, service = f"http://{host}:9/", f"rosrpc://{host}:9"
+        with pytest.raises(RpcUnreachable):
+            RpcClient(uri).call("getPid", "/c")
+        with pytest.raises((OSError, WireError)):
+            ServiceClient(service, "/s", "*", "/c")
+        with pytest.raises((OSError, WireError)):
+            await AsyncServiceClient.connect(service, "/s", "*", "/c")
+        client = AsyncRpcClient()
+        with pytest.raises(RpcUnreachable) as caught:
+            await client.call(uri, "getPid", "/c")
+        assert "timed out" not in str(caught.value)
+        await client.close()
+
+    run(scene)
+
+
+def test_a_client_whose_unix_socket_has_a_name_is_served() -> None:
+    own = b"\0" + OWN.encode()
+    where: list[str] = []
+
+    async def accept(sock: socket.socket, address: str) -> None:
+        where.append(address)
+        sock.close()
+
+    async def scene() -> None:
+        server = RpcServer(lambda *_: 5, access=Access.parse("10.0.0.0/8"), known_as=["127.0.0.1"])
+        await server.start()
+        with socket.socket(socket.AF_UNIX) as named:
+            named.bind(own)
+            named.connect(b"\0" + local.name_of("127.0.0.1", server.port).encode())
+            await eventually(lambda: server.clients == 1)
+        listener, beside = Listener(accept), local.bind(OWN, 2)
+        assert beside
+        listener.listen(beside)
+        with socket.socket(socket.AF_UNIX) as named:
+            named.bind(own)
+            named.connect(b"\0" + local.name_of(OWN, 2).encode())
+            await eventually(lambda: where)
+        await listener.close()
+        await server.close()
+
+    run(scene)
+    assert where == ["this machine"]
+
+
+def test_a_large_request_is_not_copied_for_each_piece_that_the_socket_takes() -> None:
+    size = 8_000_000
+
+    async def scene() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+            beside = local.bind("127.0.0.1", port)
+            assert beside
+            with beside:
+                beside.listen()
+                client, body = AsyncRpcClient(), bytes(size)
+                tracemalloc.start()
+                call = client.begin(f"http://127.0.0.1:{port}/", body, 5.0, lambda _: None)
+                peak = tracemalloc.get_traced_memory()[1]
+                tracemalloc.stop()
+                call.cancel()
+                await client.close()
+        # The request itself is one.
+        assert peak < 1.5 * size
+
+    run(scene)
+
+
+def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or the next server of that port would have none."""
+    order: list[str] = []
+    close = Listener.close
+
+    async def scene() -> None:
+        async with graph("/a") as (_, (node,)):
+
+            async def closing(listener: Listener) -> None:
+                order.append("name" if listener is node._nearby else "port")
+                await close(listener)
+
+            monkeypatch.setattr(Listener, "close", closing)
+
+    run(scene)
+    assert order == ["name", "port"]
+
+
+TCP_ALONE = """
+import asyncio
+from minirospy import aio
+from minirospy.runtime import local
+import rospy, std_srvs.srv
+
+local.reach = lambda *address: print("looked for", address)
+rospy.init_node("n")
+rospy.Service("/s", std_srvs.srv.Empty, lambda _: [])
+rospy.wait_for_service("/s", 10)
+rospy.ServiceProxy("/s", std_srvs.srv.Empty)()
+
+async def main():
+    async with aio.Node("m") as node:
+        await node.wait_for_service("/s", 10)
+        await node.service_proxy("/s", std_srvs.srv.Empty)()
+
+asyncio.run(main())
+print("called")
+"""
+
+
+def test_a_node_on_tcp_looks_for_no_unix_socket() -> None:
+    async def scene() -> None:
+        async with graph() as (master, _):
+            environment = {
+                "ROS_MASTER_URI": f"http://127.0.0.1:{master.port}",
+                "ROS_IP": "127.0.0.1",
+                "MINIROSPY_TRANSPORT": "tcp",
+            }
+            printed = await asyncio.get_running_loop().run_in_executor(
+                None, functools.partial(program, TCP_ALONE, **environment)
+            )
+            assert printed == "called\n"
+
+    run(scene)
 
 
 @pytest.mark.parametrize("transport", ["auto", "tcp"])
