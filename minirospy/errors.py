@@ -143,7 +143,10 @@ class NodeUnreachableError(MinirospyError):
 
     def __str__(self) -> str:
         why = f" ({self.why})" if self.why else ""
-        return f"{self.kind} [{self.name}] does not answer at {self.uri}{why}"
+        return (
+            f"{self.kind} [{self.name}] does not answer at {self.uri}{why}: "
+            "`rosnode cleanup` forgets nodes that have ended, `minirospy doctor` says what else is wrong"
+        )
 
 
 class RpcError(MinirospyError):

@@ -26,8 +26,8 @@ __all__ = [
     "resolve",
 ]
 
-_LEGAL = re.compile(r"^[~/A-Za-z][\w/]*$", re.ASCII)
-_LEGAL_BASE = re.compile(r"^[A-Za-z]\w*$", re.ASCII)
+_LEGAL = re.compile(r"^[~/A-Za-z][\w/]*\Z", re.ASCII)
+_LEGAL_BASE = re.compile(r"^[A-Za-z]\w*\Z", re.ASCII)
 _ASSIGNMENT = re.compile(r"^[~/A-Za-z_][\w/]*:=")
 
 

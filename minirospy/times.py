@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
 
 from __future__ import annotations
 
+import operator
 from typing import Any, TypeVar
 
 __all__ = ["Duration", "TVal", "Time"]
@@ -24,13 +25,10 @@ class TVal:
             self.secs: int = secs
             self.nsecs: int = nsecs
             return
-        if isinstance(secs, float):
+        if isinstance(secs, float) or not _is_integer(secs):
             if nsecs:
                 raise ValueError("if secs is a float, nsecs cannot be set")
-            whole = int(secs)
-            # Cut off, as genpy does it, not rounded.
-            nsecs = int((secs - whole) * 1e9)
-            secs = whole
+            secs, nsecs = _split(secs)
         self.secs = int(secs)
         self.nsecs = int(nsecs)
         self.canon()
@@ -38,8 +36,7 @@ class TVal:
     @classmethod
     def from_sec(cls: type[_V], float_secs: float) -> _V:
         """From seconds as a float."""
-        secs = int(float_secs)
-        return cls(secs, int((float_secs - secs) * 1e9))
+        return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
         """Whether it is zero."""
@@ -62,7 +59,12 @@ class TVal:
 
     def to_nsec(self) -> int:
         """Nanoseconds."""
-        return self.secs * _BILLION + self.nsecs
+        secs, nsecs = self.secs, self.nsecs
+        if type(secs) is int and type(nsecs) is int:
+            return secs * _BILLION + nsecs
+        # A program has set them to what numpy has computed, which overflows, or is a fraction.
+        whole, rest = _split(secs)
+        return whole * _BILLION + rest + int(nsecs)
 
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
@@ -208,3 +210,18 @@ class Duration(TVal):
         return self.to_nsec() >= other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
     __hash__ = TVal.__hash__
+
+
+def _split(seconds: float) -> tuple[int, int]:
+    """Whole seconds, and the nanoseconds of the rest: cut off, as genpy does it, not rounded."""
+    whole = int(seconds)
+    return whole, int(float(seconds - whole) * 1e9)
+
+
+def _is_integer(value: object) -> bool:
+    """Whether a number is one without a fraction, such as numpy's."""
+    try:
+        operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        return False
+    return True

@@ -135,3 +135,13 @@ def test_set_takes_what_it_is_given(kind: type[TVal]) -> None:
     assert (value.secs, value.nsecs) == (5, 6 * BILLION)
     value.canon()
     assert (value.secs, value.nsecs) == (11, 0)
+
+
+def test_what_numpy_computed_does_not_overflow() -> None:
+    numpy = pytest.importorskip("numpy")
+    stamp = Time()
+    stamp.secs, stamp.nsecs = numpy.int32(3), numpy.uint32(5)
+    assert stamp.to_nsec() == 3_000_000_005
+    assert stamp - Time(1) == Duration(2, 5)
+    stamp.set(numpy.float32(1.5), 0)
+    assert stamp.to_nsec() == 1_500_000_000

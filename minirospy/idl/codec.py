@@ -45,10 +45,14 @@ class _Leaf(NamedTuple):
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
-        """The expressions that ``struct`` packs."""
+        """The expressions of what ``struct`` holds of it."""
         if self.type.base in _TIMES:
             return [f"{self.path}.secs", f"{self.path}.nsecs"]
         return [self.path]
+
+    def packed(self) -> list[str]:
+        """The same, for ``struct`` to pack: a bool of numpy is no integer to it, a sum with one is."""
+        return [f"{self.path} + 0"] if self.type.base == "bool" and not self.type.is_array else self.values()
 
 
 class _Chunk(NamedTuple):
@@ -212,7 +216,7 @@ class _Writer:
     def _fixed(self, leaf: _Leaf) -> list[str]:
         """The values of a leaf of fixed size; of an array of bytes its length is checked, which struct does not."""
         if not leaf.type.is_array:
-            return leaf.values()
+            return leaf.packed()
         name = self._bytes(leaf)
         with self._source.block(f"if len({name}) != {leaf.type.length}:"):
             field = leaf.path.rpartition(".")[2]
@@ -285,7 +289,7 @@ class _Writer:
         )
         if leaves and all(leaf.letters and not leaf.type.is_array for leaf in leaves):
             letters = "".join(leaf.letters for leaf in leaves)
-            pack = self._pack(letters, [value for leaf in leaves for value in leaf.values()])
+            pack = self._pack(letters, [value for leaf in leaves for value in leaf.packed()])
             self._line(f'{self._write}(b"".join([{pack} for {one} in {name}]))')
         elif leaves:
             with self._source.block(f"for {one} in {name}:"):

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/ROS/Technical%20Overview ("Message serialization and
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from minirospy.errors import DefinitionError
 from minirospy.idl.spec import MessageSpec, ServiceSpec
@@ -15,6 +15,7 @@ __all__ = [
     "Lookup",
     "dependencies",
     "full_text",
+    "joined_texts",
     "md5_text",
     "message_md5",
     "service_md5",
@@ -60,9 +61,12 @@ def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
     """A message's text and that of all types that it needs, each after a line of 80 ``=``."""
-    parts = [spec.text]
-    parts += [f"{_SEPARATOR}\nMSG: {name}\n{lookup(name).text}" for name in dependencies(spec, lookup)]
-    return "\n".join(parts)
+    return joined_texts(spec.text, ((name, lookup(name).text) for name in dependencies(spec, lookup)))
+
+
+def joined_texts(text: str, needed: Iterable[tuple[str, str]]) -> str:
+    """A text, and the name and text of each type that it needs."""
+    return "\n".join((text, *(f"{_SEPARATOR}\nMSG: {name}\n{inner}" for name, inner in needed)))
 
 
 def _md5(text: str) -> str:

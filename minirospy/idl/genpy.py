@@ -10,7 +10,7 @@ import codecs
 import struct
 from typing import Any
 
-from minirospy.errors import MessageException
+from minirospy.errors import DefinitionError, MessageException
 
 __all__ = [
     "SIMPLE_TYPES",
@@ -68,13 +68,13 @@ def register_unicode_errors() -> None:
 
 
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, Any]:
-    """The class of a full text, and those of all types in it, by name.
+    """The class of a full text, and those of all types in it, by name. Raises InvalidMsgSpec on a text that is none."""
+    from minirospy.idl import genmsg, load
 
-    Raises DefinitionError on a text that is none.
-    """
-    from minirospy.idl import load
-
-    return dict(load.classes_from_text(core_type, msg_cat))
+    try:
+        return dict(load.classes_from_text(core_type, msg_cat))
+    except DefinitionError as error:
+        raise genmsg.InvalidMsgSpec(str(error)) from error
 
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:

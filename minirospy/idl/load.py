@@ -126,7 +126,7 @@ class Catalogue:
 def read_definition(path: Path) -> str:
     """The text of a definition's file. Raises DefinitionError where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise DefinitionError(str(path), 1, f"cannot be read: {error}") from error
 

@@ -396,12 +396,16 @@ def _fill_field(message: Any, name: str, type_: str, value: Any, words: Mapping[
 
 
 def _filled_array(name: str, type_: str, values: Any, words: Mapping[str, Any], path: str) -> Any:
-    base = type_.partition("[")[0]
+    base, _, length = type_.removesuffix("]").partition("[")
     if isinstance(values, bytes) and base in ("uint8", "char"):
         return values
     if not isinstance(values, list | tuple):
         raise MessageException(
             f"Field [{path}{name}] must be a list or tuple instead of: {type(values).__name__}"
+        )
+    if length and len(values) != int(length):
+        raise MessageException(
+            f"Field [{path}{name}] has incorrect number of elements: {len(values)} != {length}"
         )
     if base in ("time", "duration"):
         kind = Time if base == "time" else Duration

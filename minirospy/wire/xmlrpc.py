@@ -126,7 +126,7 @@ def _escape(text: str) -> str:
 def _write_int(value: int, parts: list[str], depth: int) -> None:
     if not -(2**31) <= value < 2**31:
         raise RpcProtocolError(f"the integer {value} does not fit XML-RPC's 32 bits")
-    parts.append(f"<value><int>{value}</int></value>")
+    parts.append(f"<value><int>{value:d}</int></value>")
 
 
 def _write_bool(value: bool, parts: list[str], depth: int) -> None:
@@ -134,7 +134,8 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    parts.append(f"<value><double>{value!r}</double></value>")
+    # A subclass, such as numpy's, may write itself in another way.
+    parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
 def _write_str(value: str, parts: list[str], depth: int) -> None:

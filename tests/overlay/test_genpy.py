@@ -14,12 +14,12 @@ import genpy.dynamic
 import genpy.message
 import genpy.rostime
 import pytest
+from genmsg import InvalidMsgSpec
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool
 
-from minirospy.errors import DefinitionError
 from minirospy.idl.load import Catalogue, class_from_text, message_class, service_class
 
 ROOT = Path(__file__).parents[2]
@@ -79,7 +79,7 @@ def test_dynamic_classes() -> None:
     ],
 )
 def test_texts_that_make_no_class(type_: str, text: str, why: str) -> None:
-    with pytest.raises(DefinitionError, match=why):
+    with pytest.raises(InvalidMsgSpec, match=why):
         genpy.dynamic.generate_dynamic(type_, text)
 
 

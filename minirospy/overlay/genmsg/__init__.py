@@ -1,0 +1,32 @@
+"""genmsg, filled in by minirospy: definitions as programs read them that generate code.
+
+Templates in Empy (genmsg.template_tools) are not part of it. Source: http://docs.ros.org/api/genmsg/html/.
+"""
+
+from genmsg import base as base
+from genmsg import gentools as gentools
+from genmsg import msg_loader as msg_loader
+from genmsg import msgs as msgs
+from genmsg import names as names
+from genmsg import srvs as srvs
+from genmsg.base import EXT_MSG, EXT_SRV, MSG_DIR, SEP, SRV_DIR, InvalidMsgSpec, MsgGenerationException
+from genmsg.gentools import compute_full_text, compute_md5, compute_md5_text
+from genmsg.msg_loader import MsgContext, MsgNotFound, load_depends, load_msg_by_type, load_srv_by_type
+from genmsg.msgs import DURATION, HEADER, TIME, Constant, Field, MsgSpec
+from genmsg.names import (
+    is_legal_resource_base_name,
+    is_legal_resource_name,
+    package_resource_name,
+    resource_name,
+    resource_name_base,
+    resource_name_package,
+)
+from genmsg.srvs import SrvSpec
+
+__all__ = [
+    "DURATION", "EXT_MSG", "EXT_SRV", "HEADER", "MSG_DIR", "SEP", "SRV_DIR", "TIME", "Constant", "Field",
+    "InvalidMsgSpec", "MsgContext", "MsgGenerationException", "MsgNotFound", "MsgSpec", "SrvSpec", "compute_full_text",
+    "compute_md5", "compute_md5_text", "is_legal_resource_base_name", "is_legal_resource_name", "load_depends",
+    "load_msg_by_type", "load_srv_by_type", "package_resource_name", "resource_name", "resource_name_base",
+    "resource_name_package",
+]  # fmt: skip
