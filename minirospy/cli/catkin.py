@@ -1,15 +1,21 @@
 """catkin_make, catkin, catkin_create_pkg, catkin_init_workspace: workspaces without CMake.
 
+catkin_make_isolated is catkin_make with folders of other names: packages that no compiler builds do not meet in CMake.
 Source: http://wiki.ros.org/catkin/commands/catkin_make, https://catkin-tools.readthedocs.io/.
 """
 
 from __future__ import annotations
 
+import argparse
 import getpass
+import json
+import re
 import shutil
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from minirospy.cli.command import Parser, run
 from minirospy.cli.verbs import Family, Verb
@@ -18,7 +24,7 @@ from minirospy.workspace.build import Report, Workspace, build, find_workspace, 
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import Plan
 
-__all__ = ["catkin", "catkin_create_pkg", "catkin_init_workspace", "catkin_make"]
+__all__ = ["catkin", "catkin_create_pkg", "catkin_init_workspace", "catkin_make", "catkin_make_isolated"]
 
 _TOP_LEVEL = """# The top of a catkin workspace, for those who build it with CMake.
 cmake_minimum_required(VERSION 3.0.2)
@@ -30,7 +36,12 @@ catkin_workspace()
 
 def catkin_make(argv: Sequence[str] | None = None) -> int:
     """catkin_make; its exit status."""
-    return run("catkin_make", lambda: _catkin_make(list(sys.argv[1:] if argv is None else argv)))
+    return run("catkin_make", lambda: _catkin_make("catkin_make", argv, ""))
+
+
+def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
+    """catkin_make_isolated; its exit status."""
+    return run("catkin_make_isolated", lambda: _catkin_make("catkin_make_isolated", argv, "_isolated"))
 
 
 def catkin_init_workspace(argv: Sequence[str] | None = None) -> int:
@@ -77,10 +88,66 @@ def catkin(argv: Sequence[str] | None = None) -> int:
 # --- catkin_make
 
 
-def _catkin_make(words: list[str]) -> int:
+_TESTS = {"run_tests", "test", "tests"}
+_GENERATED = re.compile(r"_(generate_messages(_\w+)?|gencfg|gencpp|genpy)$")
+_SETTINGS = ".catkin_tools/minirospy.json"
+_LISTS = {"blacklist": "are not", "whitelist": "alone are"}
+
+
+def _catkin_make(command: str, argv: Sequence[str] | None, suffix: str) -> int:
+    """catkin_make, with folders whose names end in ``suffix``."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    options = _make_parser(command, suffix).parse_args(_without_cmake(words))
+    variables = _variables(words)
+    root = options.directory.resolve()
+    if not root.is_dir():
+        raise UsageError(f"there is no folder {options.directory}")
+    workspace = Workspace(
+        root,
+        root / options.source,
+        root / options.build,
+        root / variables.get("CATKIN_DEVEL_PREFIX", options.devel),
+        root / variables.pop("CMAKE_INSTALL_PREFIX", options.install_space),
+    )
+    if not workspace.source.is_dir():
+        raise BuildError(
+            str(workspace.source),
+            0,
+            "The specified source space does not exist: "
+            f"run {command} in the folder above src, or `mkdir src` first",
+        )
+    if (root / "package.xml").is_file():
+        raise BuildError(str(root), 0, "is a package, not a workspace: go to the folder above its src")
+    for name, folder in (("Base path", root), *_spaces(workspace)):
+        print(f"{name}: {folder}")
+    if not suffix:
+        _top_level(workspace)
+    if "clean" in options.targets:
+        _remove(workspace)
+        return 0
+    if options.force_cmake:
+        shutil.rmtree(workspace.build / "minirospy", ignore_errors=True)
+    tests = [target for target in options.targets if target.startswith("run_tests_")]
+    others = {"all", "install", *_TESTS, *tests}
+    # VERBOSE=1 is a variable of make; what generates messages is all of a package.
+    targets = [_GENERATED.sub("", word) for word in options.targets if word not in others and "=" not in word]
+    chosen = [*(options.pkg or []), *targets]
+    plans = _built(workspace, chosen, options.only_pkg_with_deps or (), variables)
+    if "install" in options.targets or options.install:
+        _install(workspace, plans)
+    if tests or _TESTS & set(options.targets):
+        from minirospy.cli.catkin_tests import run_tests
+
+        return run_tests(
+            workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)]
+        )
+    return 0
+
+
+def _make_parser(command: str, suffix: str) -> Parser:
     parser = Parser(
-        "catkin_make",
-        description="Build a workspace: generate its messages, and devel/setup.bash to source. "
+        command,
+        description=f"Build a workspace: generate its messages, and devel{suffix}/setup.bash to source. "
         "Run it in the folder above src.",
     )
     parser.add_argument(
@@ -91,55 +158,39 @@ def _catkin_make(words: list[str]) -> int:
     )
     parser.add_argument("-C", "--directory", type=Path, default=Path(), help="the workspace (default: here)")
     parser.add_argument("--source", default="src", help="the folder of packages (default: src)")
-    parser.add_argument("--build", default="build", help="the folder of notes (default: build)")
+    for option, name in (("--build", "build"), ("--devel", "devel"), ("--install-space", "install")):
+        parser.add_argument(option, default=name + suffix, help=f"the folder {name}{suffix} by another name")
+    parser.add_argument("--install", action="store_true", help="install what was built")
     parser.add_argument("--pkg", nargs="+", metavar="PKG", help="build these packages only")
     parser.add_argument(
         "--only-pkg-with-deps", nargs="+", metavar="PKG", help="these and what they depend on"
     )
     parser.add_argument("--force-cmake", action="store_true", help="make everything again")
-    parser.add_argument("--no-color", action="store_true", help="accepted: output has no colours")
+    for flags in (("--no-color",), ("--merge",), ("-v", "--verbose"), ("-k", "--keep-going")):
+        parser.add_argument(*flags, action="store_true", help="accepted: it is so anyway")
+    parser.add_argument("--override-build-tool-check", action="store_true", help="accepted")
     parser.add_argument(
         "--use-ninja", "--use-gmake", "--use-nmake", action="store_true", help="accepted; there is no make"
     )
     parser.add_argument("-j", "--jobs", nargs="?", help="accepted: there is nothing to wait for")
     parser.add_argument("-l", "--load-average", nargs="?", help="accepted")
-    parser.add_argument("--cmake-args", nargs="*", help="accepted; there is no CMake")
-    parser.add_argument("--make-args", nargs="*", help="accepted; there is no make")
-    options = parser.parse_args([word for word in words if not word.startswith(("-D", "-W", "-G"))])
-    root = options.directory.resolve()
-    if not root.is_dir():
-        raise UsageError(f"there is no folder {options.directory}")
-    workspace = Workspace.at(root, options.source, options.build)
-    if not workspace.source.is_dir():
-        raise BuildError(
-            str(workspace.source),
-            0,
-            "The specified source space does not exist: "
-            "run catkin_make in the folder above src, or `mkdir src` first",
-        )
-    if (root / "package.xml").is_file():
-        raise BuildError(str(root), 0, "is a package, not a workspace: go to the folder above its src")
-    for name, folder in (("Base path", root), *_spaces(workspace)):
-        print(f"{name}: {folder}")
-    _top_level(workspace)
-    if "clean" in options.targets:
-        _remove(workspace)
-        return 0
-    if options.force_cmake:
-        shutil.rmtree(workspace.build / "minirospy", ignore_errors=True)
-    known = {"all", "install", "run_tests", "test", "tests"}
-    tests = [target for target in options.targets if target.startswith("run_tests_")]
-    chosen = [*(options.pkg or []), *(target for target in options.targets if target not in {*known, *tests})]
-    plans = _built(workspace, chosen, options.only_pkg_with_deps or ())
-    if "install" in options.targets:
-        _install(workspace, plans)
-    if tests or {"run_tests", "test", "tests"} & set(options.targets):
-        from minirospy.cli.catkin_tests import run_tests
+    parser.add_argument(
+        "--cmake-args", nargs="*", help="-DNAME=VALUE: what CMakeLists.txt sees as ${NAME}; also without this"
+    )
+    for option in ("--make-args", "--catkin-make-args"):
+        parser.add_argument(option, nargs="*", help="accepted; there is no make")
+    return parser
 
-        return run_tests(
-            workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)]
-        )
-    return 0
+
+def _without_cmake(words: Sequence[str]) -> list[str]:
+    """Words without those that are meant for CMake: what these set is read by :func:`_variables`."""
+    return [word for word in words if not word.startswith(("-D", "-W", "-G"))]
+
+
+def _variables(words: Sequence[str]) -> dict[str, str]:
+    """What ``-DNAME=VALUE`` and ``-DNAME:TYPE=VALUE`` set."""
+    pairs = [word[2:].partition("=") for word in words if word.startswith("-D")]
+    return {name.partition(":")[0]: value for name, equals, value in pairs if equals}
 
 
 def _spaces(workspace: Workspace) -> list[tuple[str, Path]]:
@@ -162,14 +213,20 @@ def _top_level(workspace: Workspace) -> None:
         print(f'Creating file "{file}"')
 
 
-def _built(workspace: Workspace, chosen: Collection[str], with_deps: Collection[str] = ()) -> list[Plan]:
+def _built(
+    workspace: Workspace,
+    chosen: Collection[str],
+    with_deps: Collection[str] = (),
+    variables: Mapping[str, str] = MappingProxyType({}),
+) -> list[Plan]:
     """Build what was chosen, or all; say so, a line a package."""
-    plans = read_plans(workspace.source)
+    white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
+    plans = read_plans(workspace.source, variables)
     names = {plan.name for plan in plans}
-    for name in (*chosen, *with_deps):
+    for name in (*chosen, *with_deps, *white):
         if name not in names:
             raise NotFoundError("package", name, names, f"the workspace is {workspace.root}")
-    only = {*chosen, *_with_dependencies(plans, with_deps)}
+    only = {*chosen, *white, *_with_dependencies(plans, with_deps)}
     done = 0
     count = len(only or plans)
 
@@ -248,6 +305,13 @@ def _this_package() -> str:
     raise UsageError("--this: the current folder is not in a package")
 
 
+_ACCEPTED = """
+    -c --continue-on-failure -s --summarize --no-summarize -v --verbose -i --interleave-output --force-cmake --no-status
+    --no-color --no-notify --pre-clean --limit-status-rate --unbuilt --env-cache --no-env-cache --jobserver --no-jobserver
+""".split()  # noqa: SIM905
+"""Options of `catkin build` that change nothing where nothing is compiled."""
+
+
 def _build(argv: Sequence[str]) -> int:
     parser = _parser("build", "Build packages in a workspace.")
     parser.add_argument(
@@ -255,39 +319,55 @@ def _build(argv: Sequence[str]) -> int:
     )
     parser.add_argument("--this", action="store_true", help="the package around the current folder")
     parser.add_argument("--no-deps", action="store_true", help="not what they depend on")
-    for flag in ("-j", "--jobs", "-p", "--parallel-packages", "-l", "--load-average"):
-        parser.add_argument(flag, nargs="?", help="accepted: there is nothing to wait for")
-    for flag in (
-        "-c",
-        "--continue-on-failure",
-        "-s",
-        "--summarize",
-        "-v",
-        "--verbose",
-        "-i",
-        "--interleave-output",
-        "--force-cmake",
-        "--no-status",
-        "--no-color",
-        "--no-notify",
-        "--pre-clean",
-        "--limit-status-rate",
+    parser.add_argument("-n", "--dry-run", action="store_true", help="only list what would be built")
+    for flags in (
+        ("-j", "--jobs"),
+        ("-p", "--parallel-packages"),
+        ("-l", "--load-average"),
+        ("--mem-limit",),
+        ("--start-with",),
     ):
+        parser.add_argument(*flags, nargs="?", help="accepted: there is nothing to wait for")
+    for flag in _ACCEPTED:
         parser.add_argument(flag, action="store_true", help="accepted")
-    parser.add_argument("--cmake-args", nargs="*", help="accepted; there is no CMake")
-    parser.add_argument("--catkin-make-args", nargs="*", help="accepted")
-    options = parser.parse_args(argv)
+    parser.add_argument("--cmake-args", nargs="*", help="-DNAME=VALUE: what CMakeLists.txt sees as ${NAME}")
+    for flag in ("--make-args", "--catkin-make-args"):
+        parser.add_argument(flag, nargs="*", help="accepted; there is no make")
+    options = parser.parse_args(_without_cmake(argv))
     workspace = _workspace_of(options.workspace)
     if not workspace.source.is_dir():
         raise BuildError(str(workspace.source), 0, "the workspace has no folder src: `mkdir src`")
     (workspace.root / ".catkin_tools").mkdir(exist_ok=True)
+    settings = _settings(workspace)
+    variables = {
+        **_variables([*settings.get("cmake_args", []), *argv]),
+        **{
+            f"CATKIN_{name.upper()}_PACKAGES": ";".join(settings.get(name, []))
+            for name in ("whitelist", "blacklist")
+        },
+    }
     chosen = [*options.packages, *([_this_package()] if options.this else [])]
-    if options.no_deps:
-        _built(workspace, chosen)
-    else:
-        _built(workspace, (), chosen)
-    print(f"[build] Done: source {workspace.devel / 'setup.bash'}")
+    if options.dry_run:
+        for plan in read_plans(workspace.source, variables):
+            print(f"- {plan.name}")
+        return 0
+    alone, with_deps = (chosen, []) if options.no_deps else ([], chosen)
+    plans = _built(workspace, alone, with_deps, variables)
+    if settings.get("install"):
+        _install(workspace, plans)
+    print(
+        f"[build] Done: source {(workspace.install if settings.get('install') else workspace.devel) / 'setup.bash'}"
+    )
     return 0
+
+
+def _settings(workspace: Workspace) -> dict[str, Any]:
+    """What `catkin config` keeps for `catkin build`."""
+    try:
+        found = json.loads((workspace.root / _SETTINGS).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _clean(argv: Sequence[str]) -> int:
@@ -312,23 +392,44 @@ def _clean(argv: Sequence[str]) -> int:
 
 
 def _config(argv: Sequence[str]) -> int:
-    parser = _parser("config", "Show where a workspace's folders are.")
-    for flag in ("--init", "--install", "--no-install", "--merge-devel", "--link-devel", "--merge-install"):
+    parser = _parser("config", "Show where a workspace's folders are; set what `catkin build` does.")
+    parser.add_argument("--install", action=argparse.BooleanOptionalAction, help="build also installs")
+    for name, alias in (("blacklist", "skiplist"), ("whitelist", "buildlist")):
+        parser.add_argument(
+            f"--{name}", f"--{alias}", nargs="+", metavar="PKG", help=f"packages that {_LISTS[name]} built"
+        )
+        parser.add_argument(
+            f"--no-{name}", f"--no-{alias}", dest=name, action="store_const", const=[], help=f"no {name}"
+        )
+    parser.add_argument("--cmake-args", nargs="*", help="-DNAME=VALUE: what CMakeLists.txt sees as ${NAME}")
+    parser.add_argument(
+        "--no-cmake-args", dest="cmake_args", action="store_const", const=[], help="nothing of the kind"
+    )
+    for flag in ("--init", "--merge-devel", "--link-devel", "--merge-install"):
         parser.add_argument(flag, action="store_true", help="accepted")
     parser.add_argument("--extend", help="accepted: what is sourced is what is extended")
-    parser.add_argument("--cmake-args", nargs="*", help="accepted; there is no CMake")
-    options = parser.parse_args(argv)
+    options = parser.parse_args(_without_cmake(argv))
     workspace = _workspace_of(options.workspace)
+    if options.cmake_args is not None:
+        options.cmake_args = [word for word in argv if word.startswith("-D")]
+    names = ("install", "blacklist", "whitelist", "cmake_args")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    settings = {**_settings(workspace), **given}
+    if given:
+        (workspace.root / ".catkin_tools").mkdir(exist_ok=True)
+        (workspace.root / _SETTINGS).write_text(json.dumps(settings, indent=1), encoding="utf-8")
     for name, folder in (("Workspace", workspace.root), *_spaces(workspace)):
         print(f"{name + ':':16} [{'exists' if folder.is_dir() else 'missing'}] {folder}")
+    for name in names:
+        value = settings.get(name)
+        shown = " ".join(value) if isinstance(value, list) else value and "yes"
+        print(f"{name.replace('_', ' ').capitalize() + ':':16} {shown or 'none'}")
     return 0
 
 
 def _create_verb(argv: Sequence[str]) -> int:
-    if argv[:1] != ["pkg"]:
-        raise UsageError("`catkin create pkg NAME` is its form")
-    _create("catkin create pkg", argv[1:], Path.cwd())
-    return 0
+    package = Verb("pkg", "Create a package", lambda words: _create("catkin create pkg", words, Path.cwd()))
+    return Family("catkin create", "", (package,)).main(argv)
 
 
 def _init(argv: Sequence[str]) -> int:

@@ -1,9 +1,9 @@
-"""rospack: where packages are, and which needs which.
+"""rospack, rosstack: where packages are, and which needs which.
 
-What is printed, also of errors, and the exit statuses are rospack's:
-http://docs.ros.org/api/rospack/html/commandline.html. Parsed without argparse, since shells and scripts call
-`rospack find` again and again. Differences on purpose: a package.xml that does not read ends only what needs it,
-conditions are evaluated, and a circle of packages is an error only for those in it.
+To rosstack metapackages are packages too; to rospack they are none. What is printed, also of errors, and the exit
+statuses are theirs: http://docs.ros.org/api/rospack/html/commandline.html. Parsed without argparse, since shells and
+scripts call `rospack find` again and again. Differences on purpose: a package.xml that does not read ends only what
+needs it, conditions are evaluated, and a circle of packages is an error only for those in it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.cli.command import run
-from minirospy.errors import ManifestError, MinirospyError, NotFoundError
+from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, crawl_times, package_name
 
 if TYPE_CHECKING:
     from minirospy.workspace.manifest import Export
 
-__all__ = ["main"]
+__all__ = ["main", "rosstack"]
 
 _OPTIONS = {"target", "attrib", "top", "lang", "length"}
 _FLAGS = {"deps-only", "zombie-only"}
@@ -30,7 +30,7 @@ _FOOTER = """\
   Extra options:
     -q     Quiets error reports.
 
- If [package] is omitted, the current working directory
+ If [{thing}] is omitted, the current working directory
  is used (if it contains a package.xml).
 """
 
@@ -57,33 +57,53 @@ class _Verb(NamedTuple):
     takes_package: bool = True
 
 
+class _Tool(NamedTuple):
+    """A command: its name, what it calls a package, and its verbs."""
+
+    name: str
+    thing: str
+    verbs: dict[str, _Verb]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """The command; its exit status is 1 where rospack's is."""
+    return _run(_Tool("rospack", "package", _VERBS), argv)
+
+
+def rosstack(argv: Sequence[str] | None = None) -> int:
+    """The command rosstack; its exit status is 1 where rosstack's is."""
+    return _run(_Tool("rosstack", "stack", _STACK_VERBS), argv)
+
+
+def _run(tool: _Tool, argv: Sequence[str] | None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
-    return run("rospack", lambda: _dispatch(words))
+    return run(tool.name, lambda: _dispatch(words, tool))
 
 
-def _dispatch(words: list[str]) -> int:
+def _dispatch(words: list[str], tool: _Tool) -> int:
     quiet = "-q" in words
     words = [word for word in words if word != "-q"]
 
     def complain(kind: str, text: object) -> None:
         if not quiet:
             sys.stdout.flush()
-            print(f"[rospack] {kind}: {text}", file=sys.stderr)
+            print(f"[{tool.name}] {kind}: {text}", file=sys.stderr)
 
     try:
         line = _parse(words)
         if line.verb == "help":
-            print(_help(line.package))
+            print(_help(tool, line.package))
             return 0
         if not line.verb:
             # No failure, to rospack.
-            complain("Error", "no command given.  Try 'rospack help'")
+            complain("Error", f"no command given.  Try '{tool.name} help'")
             return 0
-        _checked(line).body(line, _dependencies(lambda error: complain("Warning", error)))
+        tree = Dependencies(
+            Packages(), os.environ, lambda error: complain("Warning", error), tool.name == "rosstack"
+        )
+        _checked(line, tool).body(line, tree)
     except NotFoundError as error:
-        complain("Error", _not_found(line.verb, error))
+        complain("Error", _not_found(tool, line.verb, error))
     except MinirospyError as error:
         complain("Error", error)
     else:
@@ -118,13 +138,13 @@ def _parse(words: list[str]) -> _Line:
     return _Line(_ALIASES.get(verb, verb), package, options)
 
 
-def _checked(line: _Line) -> _Verb:
+def _checked(line: _Line, tool: _Tool) -> _Verb:
     """The verb of a line. Raises where the line does not suit it."""
-    verb = _VERBS.get(line.verb)
+    verb = tool.verbs.get(line.verb)
     if verb is None:
         import difflib
 
-        near = difflib.get_close_matches(line.verb, _VERBS, n=2)
+        near = difflib.get_close_matches(line.verb, tool.verbs, n=2)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         raise _RospackError(f"command {line.verb} not implemented{hint}")
     if set(line.options) - verb.takes or (line.package and not verb.takes_package):
@@ -132,12 +152,8 @@ def _checked(line: _Line) -> _Verb:
     return verb
 
 
-def _dependencies(complain: Callable[[ManifestError], None]) -> Dependencies:
-    return Dependencies(Packages(), os.environ, complain)
-
-
-def _not_found(verb: str, error: NotFoundError) -> str:
-    text = f"package '{error.name}' not found"
+def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
+    text = f"{tool.thing} '{error.name}' not found"
     if verb in _SAYS_NO_SUCH:
         text = f"no such package {error.name}"
     hint = error.hint
@@ -279,6 +295,17 @@ def _langs(line: _Line, tree: Dependencies) -> None:
     print(" ".join(name for name in tree.dependents("roslang") if name not in disabled))
 
 
+def _contents(line: _Line, tree: Dependencies) -> None:
+    folder = tree.folder(_package(line))
+    _print_lines(name for name, folders in tree.copies.items() if folders[0].is_relative_to(folder))
+
+
+def _contains(line: _Line, tree: Dependencies) -> None:
+    package = _package(line)
+    tree.folder(package)
+    print(package)
+
+
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
     """The compiler's or linker's words in <cpp> exports, of those that ``keep`` chooses, without ``prefix``."""
 
@@ -397,6 +424,17 @@ _VERBS = {
     "vcs": _Verb(_vcs, "[package]", "Nothing: no package.xml says where its source is kept."),
     "vcs0": _Verb(_vcs, "[package]", "Nothing: no package.xml says where its source is kept."),
 }  # fmt: skip
+_STACK_VERBS = {
+    **{verb: entry for verb, entry in _VERBS.items() if verb in ("find", "list", "list-names", "profile")},
+    **{
+        verb: entry
+        for verb, entry in _VERBS.items()
+        if verb.startswith("depends") and verb != "depends-msgsrv"
+    },
+    "contains": _Verb(_contains, "[package]", "The stack of a package, which is its own."),
+    "contains-path": _Verb(_find, "[package]", "The absolute path of a package's stack."),
+    "contents": _Verb(_contents, "[stack]", "The packages in the folder of a stack."),
+}
 _ALIASES = {
     "deps": "depends",
     "deps1": "depends1",
@@ -410,12 +448,11 @@ _ALIASES = {
 _SAYS_NO_SUCH = {"depends", "depends1", "depends-on", "depends-on1", "plugins", "langs"}
 
 
-def _help(verb: str) -> str:
+def _help(tool: _Tool, verb: str) -> str:
     verb = _ALIASES.get(verb, verb)
-    if verb in _VERBS:
-        usage = _VERBS[verb].usage.partition(" (alias")[0]
-        return f"Usage: rospack {verb} {usage}".rstrip() + f"\n\n{_VERBS[verb].summary}"
-    lines = [f"    {name} {entry.usage}".rstrip() for name, entry in _VERBS.items()]
-    return "\n".join(
-        ["USAGE: rospack <command> [options] [package]", "  Allowed commands:", "    help", *lines, _FOOTER]
-    )
+    if verb in tool.verbs:
+        usage = tool.verbs[verb].usage.partition(" (alias")[0]
+        return f"Usage: {tool.name} {verb} {usage}".rstrip() + f"\n\n{tool.verbs[verb].summary}"
+    lines = [f"    {name} {entry.usage}".rstrip() for name, entry in sorted(tool.verbs.items())]
+    usage = f"USAGE: {tool.name} <command> [options] [{tool.thing}]"
+    return "\n".join([usage, "  Allowed commands:", "    help", *lines, _FOOTER.format(thing=tool.thing)])

@@ -15,12 +15,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from minirospy.errors import BuildError, NotFoundError
+from minirospy.errors import BuildError, DefinitionError, NotFoundError
 from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
 from minirospy.idl.spec import MessageSpec
 from minirospy.workspace.manifest import Kind
-from minirospy.workspace.packages import Packages, built_in_roots, crawl
-from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
+from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
+from minirospy.workspace.plan import DIST_PACKAGES, Plan, did_you_mean, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
 
@@ -48,7 +48,7 @@ PROVIDED = frozenset(
 )
 """Packages without messages that packages of Python name: minirospy does their part, or a compiler would."""
 
-_WORDS = {".msg": "message", ".srv": "service", ".action": "action"}
+_KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
 _RELAY = '''"""Made by catkin_make: {name} lies in {folder}; what was generated for it lies here."""
 
 import sys
@@ -63,6 +63,20 @@ with open(__file__, "rb") as _source:
 """
 
 
+# The interpreter that has rospy, unless its path is none that a first line can hold.
+_SHEBANG = (
+    sys.executable
+    if sys.executable and not re.search(r"\s|.{120}", sys.executable)
+    else "/usr/bin/env python3"
+)
+_PROGRAM = """#!{python}
+# Made by catkin_make: {name} lies in {folder}.
+import sys
+
+sys.path[0] = {folder!r}
+"""
+
+
 class Workspace(NamedTuple):
     """The folders of a workspace."""
 
@@ -73,9 +87,9 @@ class Workspace(NamedTuple):
     install: Path
 
     @classmethod
-    def at(cls, root: Path, source: str = "src", build: str = "build", devel: str = "devel") -> Workspace:
-        """The workspace whose folder is ``root``."""
-        return cls(root, root / source, root / build, root / devel, root / "install")
+    def at(cls, root: Path) -> Workspace:
+        """The workspace whose folder is ``root``, with folders of the usual names."""
+        return cls(root, *(root / name for name in ("src", "build", "devel", "install")))
 
 
 def find_workspace(start: Path) -> Path:
@@ -93,14 +107,18 @@ def find_workspace(start: Path) -> Path:
     raise BuildError(str(start), 0, "not in a workspace: make one with `mkdir src`, and put packages into it")
 
 
-def read_plans(source: Path) -> list[Plan]:
+def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
     """The plans of all packages below a folder, in the order to build them in.
 
+    ``variables`` as in read_plan; CATKIN_BLACKLIST_PACKAGES names those that are not read.
     Raises BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
     """
     plans: dict[str, Plan] = {}
+    left_out = (variables or {}).get("CATKIN_BLACKLIST_PACKAGES", "").split(";")
     for folder in crawl(source):
-        plan = read_plan(folder)
+        if package_name(folder) in left_out:
+            continue
+        plan = read_plan(folder, variables)
         if plan.name in plans:
             raise BuildError(
                 str(folder / "package.xml"),
@@ -189,7 +207,10 @@ def write_set_up(
     Where none is sourced, those of the last time stay.
     """
     # A workspace that is built from its own terminal does not stand on itself.
-    own = {prefix, prefix.parent / "devel", prefix.parent / "install"}
+    own = {
+        prefix,
+        *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
+    }
     sourced = map(Path, filter(None, environment.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)))
     parents = [path for path in sourced if path not in own and (path / ".catkin").is_file()]
     note = prefix / ".minirospy_parents"
@@ -212,23 +233,27 @@ class _Builder:
         self._stamps = workspace.build / "minirospy"
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
-        self._key = _key([path for plan in plans for path in (*plan.definitions, plan.cmake_lists)])
+        # What generated code depends on: definitions, what CMake is told of them, and the compiler.
+        compiler = (Path(__file__).parents[1] / "idl").glob("*.py")
+        made_of = [path for plan in plans for path in (*plan.definitions, plan.cmake_lists)]
+        self._key = _key([*made_of, *compiler])
 
     def package(self, plan: Plan) -> Report:
-        warnings = self._check_needs(plan)
-        warnings += tuple(
-            f"{path} is not built: no add_{_WORDS[path.suffix]}_files() names it" for path in plan.left_out
-        )
+        warnings = self._check_needs(plan) + plan.warnings
         stamp = self._stamps / f"{plan.name}.json"
         setup = read_python_setup(plan.folder) if plan.has_setup else None
-        relays = _relays(setup, self._workspace.devel) if setup else {}
+        relays = {**_relays(setup, self._workspace.devel), **_programs(plan, setup, self._workspace.devel)}
         changed = [path for path, text in relays.items() if write_if_changed(path, text)]
+        for path in changed:
+            if path.suffix != ".py" or path.read_bytes().startswith(b"#!"):
+                path.chmod(0o755)
         outputs = list(relays)
         if plan.definitions:
             before = _read_stamp(stamp)
             if (
                 before.get("key") == self._key
-                and all(map(os.path.exists, before.get("outputs", [])))
+                and before.get("outside_key") == self._outside_key(before.get("outside", []))
+                and all(map(os.path.exists, before["outputs"]))
                 and not changed
             ):
                 return Report(plan, "", False, warnings)
@@ -236,7 +261,8 @@ class _Builder:
             modules = self._compile(plan, bool(setup and plan.name in setup.packages))
             changed += [path for path, text in modules.items() if write_if_changed(path, text)]
             outputs += modules
-        self._finish(stamp, outputs)
+        outside = sorted(self._closure(plan.message_depends) - self._plans.keys())
+        self._finish(stamp, outputs, outside)
         return Report(plan, _counts(plan, setup), bool(changed), warnings)
 
     def remove_gone(self) -> None:
@@ -249,18 +275,40 @@ class _Builder:
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
         """The generated modules of a package: file -> text. Raises DefinitionError, BuildError."""
         folder = self._modules / plan.name
-        modules = {folder / name: text for name, text in compile_package(self._catalogue, plan.name).items()}
+        try:
+            texts = compile_package(self._catalogue, plan.name)
+        except DefinitionError as error:
+            # A type that contains itself is named, not its file.
+            files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
+            raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
+        modules = {folder / name: text for name, text in texts.items()}
         if not has_relay:
             modules[folder / "__init__.py"] = (
                 f'"""{plan.name}: generated by minirospy from its definitions."""\n'
             )
         return modules
 
-    def _finish(self, stamp: Path, outputs: Iterable[Path]) -> None:
+    def _outside_key(self, names: Iterable[str]) -> str:
+        """What the messages of other workspaces are, by their files: a workspace below this one may be built again."""
+        known = [name for name in names if name in self._folders]
+        return _key(
+            path
+            for name in known
+            for kind in ("msg", "action")
+            for path in self._catalogue.files(name, kind).values()
+        )
+
+    def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
         """Note what was made; take away what was made before and is not any more."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
-        write_if_changed(stamp, json.dumps({"key": self._key, "outputs": names}, indent=1))
+        note = {
+            "key": self._key,
+            "outputs": names,
+            "outside": outside,
+            "outside_key": self._outside_key(outside),
+        }
+        write_if_changed(stamp, json.dumps(note, indent=1))
 
     def _remove(self, names: Iterable[str]) -> None:
         for name in names:
@@ -301,12 +349,11 @@ class _Builder:
         """Every type in a package's definitions is there, and its package is named where catkin wants it named."""
         for name in plan.message_depends:
             if name not in self._folders:
-                near = difflib.get_close_matches(name, sorted(self._folders), n=1)
                 raise BuildError(
                     str(plan.cmake_lists),
                     _line_of(plan.cmake_lists, name),
                     f"generate_messages(DEPENDENCIES {name}): no such package"
-                    + (f"; did you mean {near[0]}?" if near else ""),
+                    + did_you_mean(name, sorted(self._folders)),
                 )
         allowed = {plan.name, *self._closure(plan.message_depends)}
         for file in plan.definitions:
@@ -370,14 +417,13 @@ class _Builder:
 
 
 def _key(files: Iterable[Path]) -> str:
-    """What generated code depends on: the definitions and the compiler, by their times and sizes."""
-    compiler = sorted((Path(__file__).parents[1] / "idl").glob("*.py"))
-    marks = []
-    for path in (*sorted(files), *compiler):
-        status = path.stat()
-        marks.append(f"{path} {status.st_mtime_ns} {status.st_size}")
+    """What files are, by their names, times and sizes."""
     import hashlib
 
+    marks = []
+    for path in sorted(files):
+        status = path.stat()
+        marks.append(f"{path} {status.st_mtime_ns} {status.st_size}")
     return hashlib.sha256("\n".join(marks).encode()).hexdigest()
 
 
@@ -386,11 +432,31 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
         found = json.loads(stamp.read_bytes())
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return found if isinstance(found, dict) and isinstance(found.get("outputs"), list) else {}
 
 
-def _relays(setup: PythonSetup, devel: Path) -> dict[Path, str]:
+def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
+    """The programs in devel that stand for those in source folders: file -> text.
+
+    So a program that setup.py names is found on PATH, and real ROS finds one that is not executable itself.
+    """
+    places = {devel / "bin" / path.name: path for path in (setup.scripts if setup else ())}
+    for rule in plan.installs:
+        if rule.python and not rule.optional:
+            sources = [plan.folder / name for name in rule.sources]
+            places.update({devel / rule.destination / path.name: path for path in sources})
+    return {
+        place: _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
+        + _RELAY_RUN.format(file=str(path))
+        for place, path in places.items()
+        if is_python(path)
+    }
+
+
+def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
     """The modules in devel that stand for those in source folders: file -> text."""
+    if setup is None:
+        return {}
     modules = devel / DIST_PACKAGES
     relays = {}
     for name, folder in setup.packages.items():
@@ -407,7 +473,7 @@ def _relays(setup: PythonSetup, devel: Path) -> dict[Path, str]:
 def _counts(plan: Plan, setup: PythonSetup | None) -> str:
     """``2 messages, 1 service, package foo``."""
     words = []
-    for suffix, word in _WORDS.items():
+    for suffix, word in _KINDS.items():
         count = sum(path.suffix == suffix for path in plan.definitions)
         if count:
             words.append(f"{count} {word}{'' if count == 1 else 's'}")

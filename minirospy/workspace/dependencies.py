@@ -38,8 +38,8 @@ class CircularDependencyError(MinirospyError):
 class Dependencies:
     """The dependencies between packages; manifests are read when they are asked for, once.
 
-    Metapackages are no packages here, as they are none to rospack. ``complain`` hears of manifests that do not
-    read, where all are searched.
+    Metapackages are no packages here, as they are none to rospack; ``with_metapackages`` they are, as to rosstack.
+    ``complain`` hears of manifests that do not read, where all are searched.
     """
 
     def __init__(
@@ -47,10 +47,12 @@ class Dependencies:
         packages: Packages,
         variables: Mapping[str, str] | None = None,
         complain: Callable[[ManifestError], None] | None = None,
+        with_metapackages: bool = False,
     ) -> None:
         self._packages = packages
         self._variables = variables
         self._complain = complain or (lambda error: None)
+        self._left_out = (lambda folder: False) if with_metapackages else is_metapackage
         self._manifests: dict[str, Manifest] = {}
 
     @property
@@ -64,7 +66,7 @@ class Dependencies:
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
-            if not is_metapackage(folders[0])
+            if not self._left_out(folders[0])
         }
 
     @cached_property
@@ -75,7 +77,7 @@ class Dependencies:
     def folder(self, name: str) -> Path:
         """The folder of a package. Raises NotFoundError, with the nearest names."""
         folder = self._packages.find(name)
-        if is_metapackage(folder):
+        if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
         return folder
 

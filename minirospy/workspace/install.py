@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import fnmatch
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -37,10 +37,12 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)
     for path in plan.definitions:
+        if path in plan.not_installed:
+            continue
         yield share / path.suffix[1:] / path.name, (path, False)
     built = workspace.devel / DIST_PACKAGES / plan.name
     if plan.definitions:
-        for path in built.rglob("*.py"):
+        for path in _files(built):
             yield modules / plan.name / path.relative_to(built), (path, False)
     if plan.has_setup:
         setup = read_python_setup(plan.folder)
@@ -56,6 +58,7 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
 
 
 def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Path, tuple[Path, bool]]]:
+    rule.check(plan.folder)
     place = workspace.install / rule.destination
     for name in rule.sources:
         source = plan.folder / name
@@ -65,14 +68,12 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         # As in CMake: with a slash at its end, what is in the folder; else the folder.
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
-            if any(
-                fnmatch.fnmatch(part, each)
-                for each in rule.excluded
-                for part in path.relative_to(source).parts
-            ):
-                continue
-            if not rule.patterns or any(fnmatch.fnmatch(path.name, pattern) for pattern in rule.patterns):
-                yield target / path.relative_to(source), (path, _is_script(path))
+            below = path.relative_to(source)
+            # What is left out may be a folder on the way.
+            ways = [f"/{each.as_posix()}" for each in (below, *below.parents)]
+            left_out = any(re.search(pattern, way) for pattern in rule.excluded for way in ways)
+            if not left_out and (not rule.chosen or any(re.search(each, ways[0]) for each in rule.chosen)):
+                yield target / below, (path, _is_script(path))
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -82,5 +83,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _is_script(path: Path) -> bool:
+    if os.access(path, os.X_OK):
+        return True
     with path.open("rb") as file:
         return bool(_SHEBANG.match(file.readline(200)))

@@ -1,7 +1,7 @@
 """A package.xml: its text in, a frozen :class:`Manifest` out. Formats 1, 2 and 3.
 
 Reading is lenient: what catkin refuses and a reader can do without (a package without a maintainer, a tag of another
-format) is kept in :attr:`Manifest.problems`, and :meth:`Manifest.check` raises the first of them.
+format) is kept in :attr:`Manifest.problems`, of which a build warns.
 
 Source: http://wiki.ros.org/catkin/package.xml, https://ros.org/reps/rep-0127.html (format 1),
 https://ros.org/reps/rep-0140.html (format 2), https://ros.org/reps/rep-0149.html (format 3, conditions).
@@ -19,6 +19,7 @@ from xml.parsers import expat
 from minirospy.errors import ManifestError
 
 __all__ = [
+    "PACKAGE_NAME",
     "VARIABLES",
     "Dependency",
     "Export",
@@ -35,6 +36,8 @@ __all__ = [
 VARIABLES: Mapping[str, str] = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
 """What conditions see where the caller's variables do not say otherwise."""
 
+PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
+
 
 class Kind(Enum):
     """What a dependency is for. The value is the tag of formats 2 and 3."""
@@ -49,16 +52,12 @@ class Kind(Enum):
 
 
 class Dependency(NamedTuple):
-    """A dependency on a package or a rosdep key; ``versions`` holds what is asked: ``{"version_gte": "1.2.0"}``.
-
-    ``tag`` is what the file says (``depend``, ``run_depend``), ``line`` where.
-    """
+    """A dependency on a package or a rosdep key; ``tag`` is what the file says (``run_depend``), ``line`` where."""
 
     name: str
     kinds: frozenset[Kind]
     tag: str
     line: int
-    versions: Mapping[str, str]
 
 
 class Person(NamedTuple):
@@ -94,7 +93,7 @@ class Problem(NamedTuple):
 class Manifest(NamedTuple):
     """A package.xml. Conditions are evaluated: what they leave out is not here.
 
-    ``dependencies`` stand in the order of the file; the properties (``build_depends``, ...) choose their names.
+    ``dependencies`` stand in the order of the file; :meth:`depends` chooses their names.
     """
 
     path: Path
@@ -108,10 +107,6 @@ class Manifest(NamedTuple):
     urls: tuple[Url, ...]
     dependencies: tuple[Dependency, ...]
     exports: tuple[Export, ...]
-    conflicts: tuple[str, ...]
-    replaces: tuple[str, ...]
-    group_depends: tuple[str, ...]
-    member_of_groups: tuple[str, ...]
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
@@ -120,51 +115,13 @@ class Manifest(NamedTuple):
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
     @property
-    def build_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.BUILD)
-
-    @property
-    def build_export_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.BUILD_EXPORT)
-
-    @property
-    def buildtool_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.BUILDTOOL)
-
-    @property
-    def buildtool_export_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.BUILDTOOL_EXPORT)
-
-    @property
-    def exec_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.EXEC)
-
-    @property
-    def test_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.TEST)
-
-    @property
-    def doc_depends(self) -> tuple[str, ...]:
-        return self.depends(Kind.DOC)
-
-    @property
     def is_metapackage(self) -> bool:
         return any(export.tag == "metapackage" for export in self.exports)
-
-    @property
-    def deprecated(self) -> str | None:
-        """Why the package is deprecated ("" where it does not say); None where it is not."""
-        return next((export.text for export in self.exports if export.tag == "deprecated"), None)
 
     @property
     def build_type(self) -> str:
         """What builds the package: catkin unless it says otherwise."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
-
-    def check(self) -> None:
-        """Raise ManifestError on the first thing that catkin would refuse."""
-        for problem in self.problems:
-            raise ManifestError(str(self.path), *problem)
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
@@ -282,7 +239,6 @@ _REPLACED = {
 }
 _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_gt"}
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
-_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 _EMAIL = re.compile(r"^[^@\s]+@[^@\s]+\.[^@\s.]+$")
 
@@ -319,10 +275,6 @@ class _Reader:
             urls=tuple(Url(e.text, e.attributes.get("type", "website")) for e in self._elements("url")),
             dependencies=self._dependencies(),
             exports=tuple(self._exports()),
-            conflicts=self._texts("conflict"),
-            replaces=self._texts("replace"),
-            group_depends=self._texts("group_depend"),
-            member_of_groups=self._texts("member_of_group"),
             problems=tuple(sorted(self._problems)),
         )
 
@@ -358,7 +310,7 @@ class _Reader:
             ) from error
 
     def _check_texts(self, name: str, version: str) -> None:
-        if not _NAME.match(name):
+        if not PACKAGE_NAME.match(name):
             self._problem(self._element("name"), f"'{name}' is not a package name: letters, digits, '_'")
         if version and not _VERSION.match(version):
             self._problem(self._element("version"), f"version '{version}' is not of the form 1.2.3")
@@ -395,13 +347,7 @@ class _Reader:
     def _dependencies(self) -> tuple[Dependency, ...]:
         kinds = _OLD_KINDS if self._format == 1 else _KINDS
         found = [
-            Dependency(
-                element.text,
-                frozenset(kinds.get(tag) or _ALL_KINDS[tag]),
-                tag,
-                element.line,
-                {name: value for name, value in element.attributes.items() if name in _VERSIONS},
-            )
+            Dependency(element.text, frozenset(kinds.get(tag) or _ALL_KINDS[tag]), tag, element.line)
             for tag in _ALL_KINDS
             for element in self._elements(tag)
         ]

@@ -24,6 +24,7 @@ __all__ = [
     "built_in_roots",
     "crawl",
     "crawl_times",
+    "is_python",
     "package_name",
 ]
 
@@ -33,6 +34,8 @@ _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
+_SHOWN = 12
+"""Programs that an error names: a screen's width of them."""
 
 
 class NotExecutableError(MinirospyError):
@@ -112,22 +115,21 @@ class Packages:
         """
         folder = self.find(package)
         candidates = (
-            [folder / name] if "/" in name else [path for path in _files(folder) if path.name == name]
+            [folder / name.lstrip("/")]
+            if "/" in name
+            else [path for path in _files(folder) if path.name == name]
         )
         candidates = [path for path in candidates if path.is_file()]
-        runnable = [path for path in candidates if _is_python(path) or os.access(path, os.X_OK)]
+        runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
             # What a build has put beside a script of the package is that script again.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
-            return [[sys.executable, str(path)] if _is_python(path) else [str(path)] for path in own]
+            return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
             raise NotExecutableError(candidates[0])
-        raise NotFoundError(
-            "executable",
-            name,
-            self.executables(package),
-            f"package [{package}] is in {folder}",
-        )
+        known = self.executables(package)
+        has = ", ".join(known[:_SHOWN]) + (" ..." if known[_SHOWN:] else "") if known else "no programs"
+        raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}")
 
     def find_resource(self, package: str, name: str) -> Path:
         """A file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
@@ -197,7 +199,16 @@ def _subfolders(folder: Path) -> list[Path]:
         return []
     if any(entry.name in _IGNORE for entry in entries):
         return []
-    return [Path(entry.path) for entry in entries if not entry.name.startswith(".") and entry.is_dir()]
+    return [
+        Path(entry.path)
+        for entry in entries
+        if not entry.name.startswith(".") and entry.is_dir() and not _leads_back(entry)
+    ]
+
+
+def _leads_back(entry: os.DirEntry[str]) -> bool:
+    """Whether a folder is a link to one that it lies in: a search would never end."""
+    return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
@@ -226,11 +237,12 @@ def _is_program(path: Path) -> bool:
     if path.name in ("setup.py", "__init__.py"):
         return False
     return (
-        _is_python(path) if path.suffix == ".py" else os.access(path, os.X_OK) and _starts_like_program(path)
+        is_python(path) if path.suffix == ".py" else os.access(path, os.X_OK) and _starts_like_program(path)
     )
 
 
-def _is_python(path: Path) -> bool:
+def is_python(path: Path) -> bool:
+    """Whether a file is a program for Python, by its name or by its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:

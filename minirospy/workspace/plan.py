@@ -8,78 +8,91 @@ http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/index.html.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Collection
+import fnmatch
+import os
+import re
+import sys
+from collections.abc import Callable, Collection, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import BuildError
-from minirospy.workspace.cmake import Command, keyword_arguments, parse_cmake
-from minirospy.workspace.manifest import Kind, Manifest, read_manifest
+from minirospy.errors import BuildError, ManifestError
+from minirospy.workspace.cmake import keyword_arguments
+from minirospy.workspace.cmake_run import Command, run_cmake
+from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest, read_manifest
 
-__all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
+__all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "did_you_mean", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
 """Where Python packages lie below a devel or install folder, as ROS on Debian and Ubuntu has it."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
-_COMPILED = {
-    "add_executable": "program",
-    "add_library": "library",
-    "catkin_add_gtest": "test",
-    "add_rostest_gtest": "test",
-}
+_COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
 _TESTS = {
     "catkin_add_nosetests": "pytest",
     "catkin_add_pytests": "pytest",
     "add_rostest": "rostest",
     "roslaunch_add_file_check": "roslaunch-check",
 }
-_TEST_WORDS = frozenset(
-    [
-        "ARGS",
-        "DEPENDENCIES",
-        "IGNORE_UNSET_ARGS",
-        "OPTIONS",
-        "TIMEOUT",
-        "USE_TEST_DEPENDENCIES",
-        "WORKING_DIRECTORY",
-    ]
+
+
+def _keywords(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_FILES_WORDS = _keywords("FILES DIRECTORY NOINSTALL BASE_DIR")
+_TEST_WORDS = _keywords(
+    "ARGS DEPENDENCIES IGNORE_UNSET_ARGS OPTIONS TIMEOUT USE_TEST_DEPENDENCIES WORKING_DIRECTORY"
 )
-_WORDS = frozenset(
-    ["REQUIRED", "QUIET", "COMPONENTS", "OPTIONAL_COMPONENTS", "EXACT", "MODULE", "CONFIG", "NO_MODULE"]
+_WORDS = _keywords("REQUIRED QUIET COMPONENTS OPTIONAL_COMPONENTS EXACT MODULE CONFIG NO_MODULE")
+_PACKAGE_WORDS = _keywords(
+    "INCLUDE_DIRS LIBRARIES CATKIN_DEPENDS DEPENDS CFG_EXTRAS EXPORTED_TARGETS SKIP_CMAKE_CONFIG_GENERATION"
 )
-_PACKAGE_WORDS = frozenset(
-    [
-        "INCLUDE_DIRS",
-        "LIBRARIES",
-        "CATKIN_DEPENDS",
-        "DEPENDS",
-        "CFG_EXTRAS",
-        "EXPORTED_TARGETS",
-        "SKIP_CMAKE_CONFIG_GENERATION",
-    ]
+_INSTALL_WORDS = _keywords(
+    """
+    PROGRAMS FILES DIRECTORY TARGETS DESTINATION RUNTIME LIBRARY ARCHIVE RENAME PATTERN FILES_MATCHING EXCLUDE REGEX
+    PERMISSIONS COMPONENT OPTIONAL USE_SOURCE_PERMISSIONS FILE_PERMISSIONS DIRECTORY_PERMISSIONS CONFIGURATIONS EXPORT
+    """
 )
-_INSTALL_WORDS = frozenset(
-    ["PROGRAMS", "FILES", "DIRECTORY", "TARGETS", "DESTINATION", "RUNTIME", "LIBRARY", "ARCHIVE", "RENAME",
-     "PATTERN", "FILES_MATCHING", "EXCLUDE", "REGEX", "PERMISSIONS", "COMPONENT", "OPTIONAL",
-     "USE_SOURCE_PERMISSIONS", "FILE_PERMISSIONS", "DIRECTORY_PERMISSIONS", "CONFIGURATIONS", "EXPORT"]
-)  # fmt: skip
+_TYPE_NAME = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*$", re.ASCII)
+_SYSTEMS = {"Windows": ("WIN32", "MSVC"), "Darwin": ("UNIX", "APPLE"), "Linux": ("UNIX",)}
+_BEFORE = {
+    "generate_messages": ("catkin_package",),
+    "catkin_python_setup": ("generate_messages",),
+}
+"""What catkin wants before what, though it makes no difference here."""
+_GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
+"""Packages of which one, found before, brings the macros of messages to CMake."""
+_CMAKE_VERSION = "3.25.1"
+"""The CMake that package files believe to be read by."""
 
 
 class Install(NamedTuple):
     """Files for the install folder: sources below the package; ``destination`` below the install folder.
 
-    A source that is a folder is copied with its name, or with ``contents`` only what is in it.
-    ``patterns`` choose files (none: all), ``excluded`` leave some out. ``program``: made executable.
+    Of a folder that ends in a slash, what is in it is copied; of any other, the folder itself.
+    ``chosen`` and ``excluded`` are regular expressions for paths: only those files (none: all), not those.
+    ``program``: made executable; ``python``: a script, which devel points to; ``optional``: it may be missing.
     """
 
+    command: Command
     sources: tuple[str, ...]
     destination: str
-    line: int
     program: bool = False
-    patterns: tuple[str, ...] = ()
+    python: bool = False
+    optional: bool = False
+    chosen: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
     rename: str = ""
+
+    def check(self, folder: Path) -> None:
+        """Raise BuildError where a source, below a folder, is not there."""
+        for name in self.sources:
+            source = folder / name
+            if not source.exists() and not self.optional:
+                near = did_you_mean(source.name, os.listdir(source.parent) if source.parent.is_dir() else ())
+                raise _error(self.command, f"{self.command.name}: there is no [{name}]{near}")
 
 
 class Test(NamedTuple):
@@ -97,7 +110,7 @@ class Plan(NamedTuple):
 
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages they may
     contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a
-    compiler; ``has_setup``: setup.py names Python packages; ``left_out``: definitions that no macro names.
+    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions for this workspace alone.
     """
 
     name: str
@@ -107,10 +120,11 @@ class Plan(NamedTuple):
     message_depends: tuple[str, ...]
     needs: tuple[tuple[str, int], ...]
     has_setup: bool
-    left_out: tuple[Path, ...]
+    not_installed: frozenset[Path]
     skipped: tuple[str, ...]
     installs: tuple[Install, ...]
     tests: tuple[Test, ...]
+    warnings: tuple[str, ...]
 
     @property
     def cmake_lists(self) -> Path:
@@ -118,32 +132,50 @@ class Plan(NamedTuple):
         return self.folder / "CMakeLists.txt"
 
 
-def read_plan(folder: Path) -> Plan:
-    """The plan of the package in ``folder``. Raises ManifestError, DefinitionError, BuildError."""
+def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
+    """The plan of the package in ``folder``; ``variables`` are what ``catkin_make -DNAME=VALUE`` sets.
+
+    Raises ManifestError, BuildError.
+    """
     manifest = read_manifest(folder)
+    if not PACKAGE_NAME.match(manifest.name):
+        # It becomes the name of folders and modules.
+        problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
+        raise ManifestError(str(manifest.path), *problem)
     file = folder / "CMakeLists.txt"
+    collector = _Collector(folder, manifest)
+    if manifest.build_type != "catkin":
+        collector.warn(manifest.path, 1, f"left out: it is built by [{manifest.build_type}], not by catkin")
+        return collector.plan()
+    for problem in manifest.problems:
+        collector.warn(manifest.path, *problem)
+    if not file.is_file():
+        raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt")
     try:
-        text = file.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt") from None
-    commands = parse_cmake(text, str(file), _variables(folder, manifest.name))
-    return _Collector(folder, file, manifest).read(commands)
+        for command in run_cmake(file, {**_variables(folder, manifest.name), **(variables or {})}):
+            collector.read(command)
+    except RecursionError:
+        raise BuildError(str(file), 1, "is nested too deeply") from None
+    collector.check()
+    return collector.plan()
 
 
 class _Collector:
     """Gathers a plan, command by command."""
 
-    def __init__(self, folder: Path, file: Path, manifest: Manifest) -> None:
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
-        self._file = file
         self._manifest = manifest
-        self._definitions: dict[Path, int] = {}
+        self._definitions: dict[Path, Command] = {}
+        self._not_installed: set[Path] = set()
         self._message_depends: list[str] | None = None
         self._needs: list[tuple[str, int]] = []
+        self._seen: set[str] = set()
         self._has_setup = False
         self._skipped: list[str] = []
         self._installs: list[Install] = []
         self._tests: list[Test] = []
+        self._warnings: list[str] = []
         self._readers: dict[str, Callable[[Command], None]] = {
             "project": self._project,
             "find_package": self._find_package,
@@ -152,21 +184,45 @@ class _Collector:
             "catkin_package": self._catkin_package,
             "catkin_install_python": self._install_python,
             "install": self._install,
+            "generate_dynamic_reconfigure_options": self._options,
             **dict.fromkeys(_FOLDERS, self._add_files),
             **dict.fromkeys(_COMPILED, self._compiled),
             **dict.fromkeys(_TESTS, self._test),
         }
 
-    def read(self, commands: list[Command]) -> Plan:
-        for command in commands:
-            reader = self._readers.get(command.name)
-            if reader:
-                reader(command)
+    def read(self, command: Command) -> None:
+        """Note what a command asks for. Raises BuildError."""
+        reader = self._readers.get(command.name)
+        if reader is None:
+            return
+        reader(command)
+        self._seen.add(command.name)
+        for later in _BEFORE.get(command.name, ()):
+            if later in self._seen:
+                self._refused(command, f"{command.name}() must stand before {later}()")
+
+    def _refused(self, command: Command, text: str) -> None:
+        """Warn of what real catkin refuses, and a build can do without."""
+        self.warn(command.file, command.line, f"real catkin refuses this: {text}")
+
+    def warn(self, file: Path, line: int, text: str) -> None:
+        """Note what works all the same."""
+        self._warnings.append(f"{file}:{line}: {text}")
+
+    def check(self) -> None:
+        """Raise BuildError where definitions are not generated; warn of those that no macro names."""
         if self._definitions and self._message_depends is None:
-            raise self._error(
+            raise _error(
                 next(iter(self._definitions.values())),
                 "generate_messages() is missing: messages, services and actions are added, but not generated",
             )
+        for macro, kind in _FOLDERS.items():
+            for path in sorted((self._folder / kind).glob(f"*.{kind}")):
+                if path not in self._definitions:
+                    self._warnings.append(f"{path} is not built: no {macro}() names it")
+
+    def plan(self) -> Plan:
+        """What all commands ask for."""
         return Plan(
             name=self._manifest.name,
             folder=self._folder,
@@ -175,25 +231,26 @@ class _Collector:
             message_depends=tuple(self._message_depends or ()),
             needs=tuple(self._needs),
             has_setup=self._has_setup,
-            left_out=tuple(
-                path
-                for kind in _FOLDERS.values()
-                for path in sorted((self._folder / kind).glob(f"*.{kind}"))
-                if path not in self._definitions
-            ),
+            not_installed=frozenset(self._not_installed),
             skipped=tuple(self._skipped),
             installs=tuple(self._installs),
             tests=tuple(self._tests),
+            warnings=tuple(self._warnings),
         )
 
-    def _error(self, line: int, text: str) -> BuildError:
-        return BuildError(str(self._file), line, text)
+    def _path(self, command: Command, name: str) -> str:
+        """A path that a command names, as it is below the package."""
+        if command.folder == self._folder:
+            return name
+        path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
+        return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        if command.arguments and command.arguments[0] != self._manifest.name:
-            raise self._error(
-                command.line,
-                f"project({command.arguments[0]}), but package.xml names the package [{self._manifest.name}]",
+        # What a package brings along in a folder of its own may be another project.
+        if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
+            raise _error(
+                command,
+                f"project({' '.join(command.arguments[:1])}), but package.xml names the package [{self._manifest.name}]",
             )
 
     def _find_package(self, command: Command) -> None:
@@ -205,42 +262,61 @@ class _Collector:
 
     def _add_files(self, command: Command) -> None:
         if self._message_depends is not None:
-            raise self._error(command.line, f"{command.name}() must stand before generate_messages()")
+            raise _error(command, f"{command.name}() must stand before generate_messages()")
         kind = _FOLDERS[command.name]
-        given = keyword_arguments(
-            command.arguments, frozenset(["FILES", "DIRECTORY", "NOINSTALL", "BASE_DIR"])
-        )
-        folder = self._folder / next(iter(given.get("DIRECTORY", [])), kind)
-        if not folder.is_dir():
-            raise self._error(
-                command.line,
-                f"{command.name}: there is no folder [{folder.relative_to(self._folder).as_posix()}]",
+        given = keyword_arguments(command.arguments, _FILES_WORDS)
+        place = next(iter(given.get("DIRECTORY", [])), kind)
+        folder = command.folder / place
+        there = {path.name: path for path in sorted(folder.glob(f"*.{kind}")) if path.is_file()}
+        names = [*given[""], *given.get("FILES", [])]
+        if given[""]:
+            self._refused(command, f"FILES must stand before {given[''][0]}")
+        if not _GENERATORS & {name for name, _ in self._needs}:
+            self._refused(
+                command, "find_package(catkin REQUIRED COMPONENTS message_generation) must stand before it"
             )
-        there = {path.name: path for path in sorted(folder.glob(f"*.{kind}"))}
-        for name in given.get("FILES", []) + given[""] or list(there):
+        if not names and "FILES" not in given:
+            names = list(there)
+        if not folder.is_dir() and (names or "FILES" not in given):
+            raise _error(command, f"{command.name}: there is no folder [{place}]")
+        for name in names:
             path = folder / name
             if path.suffix != f".{kind}":
-                raise self._error(command.line, f"{command.name}: [{name}] does not end in .{kind}")
+                raise _error(command, f"{command.name}: [{name}] does not end in .{kind}")
             if not path.is_file():
-                near = difflib.get_close_matches(name, there, n=1)
-                hint = f"; did you mean {near[0]}?" if near else ""
-                place = folder.relative_to(self._folder).as_posix()
-                raise self._error(
-                    command.line, f"{command.name}: there is no [{name}] in folder [{place}]{hint}"
+                hint = did_you_mean(name, there)
+                raise _error(command, f"{command.name}: there is no [{name}] in folder [{place}]{hint}")
+            if not _TYPE_NAME.match(path.stem):
+                raise _error(
+                    command,
+                    f"{command.name}: [{name}] is no name of a type: letters, digits, underscores, a letter first",
                 )
-            self._definitions[path] = command.line
+            self._definitions[path] = command
+            if "NOINSTALL" in given:
+                self._not_installed.add(path)
 
     def _generate(self, command: Command) -> None:
+        if self._message_depends is not None:
+            self._refused(command, "generate_messages() must stand there once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
         self._message_depends = given.get("DEPENDENCIES", [])
         if not self._definitions:
-            raise self._error(
+            self.warn(
+                command.file,
                 command.line,
                 "generate_messages(): nothing to generate; add_message_files() and so on stand before it",
             )
 
+    def _options(self, command: Command) -> None:
+        for name in command.arguments:
+            self.warn(
+                command.file, command.line, f"[{name}] is not built: minirospy has no dynamic_reconfigure yet"
+            )
+
     def _catkin_package(self, command: Command) -> None:
         """What is passed on to other packages must be named in package.xml, for the build and for the run."""
+        if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
+            self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
         given = keyword_arguments(command.arguments, _PACKAGE_WORDS)
         found = {name for name, _ in self._needs}
         building = self._manifest.depends(Kind.BUILD, Kind.BUILDTOOL)
@@ -252,15 +328,15 @@ class _Collector:
                 missing = "exec_depend"
             else:
                 continue
-            raise self._error(
-                command.line,
+            raise _error(
+                command,
                 f"catkin_package(CATKIN_DEPENDS {name}), but package.xml does not name it: "
                 f"add <{missing}>{name}</{missing}> there",
             )
 
     def _python_setup(self, command: Command) -> None:
         if not (self._folder / "setup.py").is_file():
-            raise self._error(command.line, "catkin_python_setup() needs a setup.py beside this file")
+            raise _error(command, "catkin_python_setup() needs a setup.py beside this file")
         self._has_setup = True
 
     def _compiled(self, command: Command) -> None:
@@ -273,20 +349,17 @@ class _Collector:
             flags = ["-i"] if "IGNORE_UNSET_ARGS" in given else []
             arguments = (*flags, *given.get("ARGS", ()))
             folder = next(iter(given.get("WORKING_DIRECTORY", ())), "")
-            self._tests.append(
-                Test(command.arguments[0], _TESTS[command.name], command.line, arguments, folder)
-            )
+            path = self._path(command, command.arguments[0])
+            self._tests.append(Test(path, _TESTS[command.name], command.line, arguments, folder))
 
     def _install_python(self, command: Command) -> None:
         given = keyword_arguments(command.arguments, frozenset(["PROGRAMS", "DESTINATION", "OPTIONAL"]))
         programs, place = given.get("PROGRAMS", []), given.get("DESTINATION", [])
         if not programs or len(place) != 1:
-            raise self._error(
-                command.line, "catkin_install_python(PROGRAMS file ... DESTINATION folder) is its form"
-            )
-        for name in programs:
-            self._check_source(name, command)
-        self._installs.append(Install(tuple(programs), place[0], command.line, program=True))
+            raise _error(command, "catkin_install_python(PROGRAMS file ... DESTINATION folder) is its form")
+        rule = self._rule(command, programs, place[0])._replace(program=True, python=True)
+        rule.check(self._folder)
+        self._installs.append(rule)
 
     def _install(self, command: Command) -> None:
         given = keyword_arguments(command.arguments, _INSTALL_WORDS)
@@ -295,41 +368,40 @@ class _Collector:
         if kind is None or not place:
             # TARGETS, CODE, SCRIPT, EXPORT: what a compiler makes.
             return
-        patterns, excluded = _patterns(command.arguments)
-        for name in given[kind]:
-            self._check_source(name, command)
+        chosen, excluded = _patterns(command.arguments)
         self._installs.append(
-            Install(
-                tuple(given[kind]),
-                place[0],
-                command.line,
-                kind == "PROGRAMS" or "USE_SOURCE_PERMISSIONS" in command.arguments,
-                patterns,
-                excluded,
-                next(iter(given.get("RENAME", [])), ""),
+            self._rule(command, given[kind], place[0])._replace(
+                program=kind == "PROGRAMS",
+                chosen=chosen,
+                excluded=excluded,
+                rename=next(iter(given.get("RENAME", [])), ""),
             )
         )
 
-    def _check_source(self, name: str, command: Command) -> None:
-        if not (self._folder / name).exists() and "OPTIONAL" not in command.arguments:
-            parent = (self._folder / name).parent
-            near = difflib.get_close_matches(Path(name).name, _names(parent), n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise self._error(command.line, f"{command.name}: there is no [{name}]{hint}")
+    def _rule(self, command: Command, names: list[str], place: str) -> Install:
+        sources = tuple(self._path(command, name) for name in names)
+        return Install(command, sources, place, optional="OPTIONAL" in command.arguments)
 
 
-def _names(folder: Path) -> Collection[str]:
-    return [path.name for path in folder.iterdir()] if folder.is_dir() else []
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """``; did you mean X?``, or nothing."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _error(command: Command, text: str) -> BuildError:
+    return BuildError(str(command.file), command.line, text)
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What ``PATTERN x`` chooses, and what ``PATTERN x EXCLUDE`` leaves out."""
+    """What ``PATTERN x`` and ``REGEX x`` choose, and what they leave out with ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
-    for index, word in enumerate(arguments[:-1]):
-        if word == "PATTERN":
-            following = arguments[index + 2 : index + 3]
-            (excluded if following == ("EXCLUDE",) else chosen).append(arguments[index + 1])
+    for index, (kind, text) in enumerate(pairwise(arguments)):
+        if kind in ("PATTERN", "REGEX"):
+            leaves_out = arguments[index + 2 : index + 3] == ("EXCLUDE",)
+            pattern = text if kind == "REGEX" else "/" + fnmatch.translate(text)
+            (excluded if leaves_out else chosen).append(pattern)
     return tuple(chosen) if "FILES_MATCHING" in arguments else (), tuple(excluded)
 
 
@@ -339,17 +411,23 @@ def _variables(folder: Path, name: str) -> dict[str, str]:
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}
     package = {f"CATKIN_PACKAGE_{kind}_DESTINATION": f"{place}/{name}" for kind, place in places.items()}
     everywhere = {f"CATKIN_GLOBAL_{kind}_DESTINATION": place for kind, place in places.items()}
+    system = {"win32": "Windows", "darwin": "Darwin"}.get(sys.platform, "Linux")
     return {
+        **{f"ENV{{{key}}}": value for key, value in {**VARIABLES, **os.environ}.items()},
         **package,
         **everywhere,
+        **dict.fromkeys(_SYSTEMS[system], "1"),
         "CATKIN_PACKAGE_LIB_DESTINATION": "lib",
         "CATKIN_GLOBAL_LIB_DESTINATION": "lib",
         "CATKIN_GLOBAL_BIN_DESTINATION": "bin",
         "CATKIN_GLOBAL_LIBEXEC_DESTINATION": "lib",
         "CATKIN_PACKAGE_PYTHON_DESTINATION": f"{DIST_PACKAGES}/{name}",
         "CATKIN_GLOBAL_PYTHON_DESTINATION": DIST_PACKAGES,
+        "CATKIN_ENABLE_TESTING": "ON",
         "CMAKE_CURRENT_SOURCE_DIR": source,
         "CMAKE_CURRENT_LIST_DIR": source,
+        "CMAKE_SYSTEM_NAME": system,
+        "CMAKE_VERSION": _CMAKE_VERSION,
         "PROJECT_SOURCE_DIR": source,
         "CMAKE_INSTALL_PREFIX": ".",
         "PROJECT_NAME": name,

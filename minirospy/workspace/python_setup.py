@@ -6,16 +6,21 @@ nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide
 
 from __future__ import annotations
 
+import fnmatch
+import importlib
 import os
 import sys
 import traceback
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from minirospy.errors import BuildError
+from minirospy.workspace.manifest import read_manifest
 
 __all__ = ["PythonSetup", "read_python_setup"]
 
@@ -32,30 +37,46 @@ def read_python_setup(folder: Path) -> PythonSetup:
     """What ``folder``/setup.py names. Raises BuildError with its line."""
     file = folder / "setup.py"
     given = _run(file)
-    roots: dict[str, str] = given.get("package_dir") or {}
-    names = [name for name in given.get("packages") or [] if "." not in name]
+    roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
+    names = [name for name in _names(file, given, "packages") if name and "." not in name]
     packages = {name: folder / roots.get(name, f"{roots.get('', '.')}/{name}") for name in names}
     modules = {
         name: folder / roots.get("", ".") / f"{name}.py"
-        for name in given.get("py_modules") or []
+        for name in _names(file, given, "py_modules")
         if "." not in name
     }
-    scripts = tuple(folder / name for name in given.get("scripts") or [])
+    scripts = tuple(folder / name for name in _names(file, given, "scripts"))
     for name, path in [*packages.items(), *modules.items(), *((path.name, path) for path in scripts)]:
         if not path.exists():
             raise BuildError(str(file), 0, f"[{name}] is named, but there is no {path}")
     return PythonSetup(packages, modules, scripts)
 
 
-def _run(file: Path) -> dict[str, Any]:
-    """Run a setup.py; the arguments of its ``setup()``."""
+def _given(file: Path, given: Mapping[str, Any], name: str, kind: type, form: str) -> Any:
+    """An argument of ``setup()``; of None and of nothing, an empty one. Raises BuildError."""
+    value = given.get(name) or kind()
+    if not isinstance(value, kind):
+        raise BuildError(str(file), 0, f"{name} is {value!r}: {name}={form} is its form")
+    return value
+
+
+def _names(file: Path, given: Mapping[str, Any], name: str) -> list[str]:
+    value = given.get(name)
+    if isinstance(value, (tuple, set)):
+        value = sorted(value)
+    return [str(each) for each in _given(file, {name: value}, name, list, "['a', 'b']")]
+
+
+def _run(file: Path) -> Mapping[str, Any]:
+    """Run a setup.py; the arguments of its ``setup()``. Raises BuildError."""
     given: dict[str, Any] = {}
+    why = ""
     with _stand_ins(given, file.parent):
         try:
             code = compile(file.read_bytes(), str(file), "exec")
             exec(code, {"__name__": "__main__", "__file__": str(file)})
-        except SystemExit:
-            pass
+        except SystemExit as error:
+            why = f": it ended with {error}" if error.code else ""
         except SyntaxError as error:
             raise BuildError(str(file), error.lineno or 0, f"not Python: {error.msg}") from error
         except Exception as error:
@@ -67,53 +88,105 @@ def _run(file: Path) -> dict[str, Any]:
             raise BuildError(
                 str(file), (lines or [0])[-1] or 0, f"{type(error).__name__}: {error}"
             ) from error
+    if not given:
+        raise BuildError(str(file), 0, f"setup() was not called{why}")
     return given
+
+
+class _StandIn(types.ModuleType):
+    """A module whose names are whatever is asked for: empty classes, but for those that are set."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return type(name, (), {})
+
+
+class _Finder(MetaPathFinder, Loader):
+    """Finds stand-ins for what a setup.py imports to be set up with."""
+
+    def __init__(self, contents: Mapping[str, Mapping[str, Any]]) -> None:
+        self._contents = contents
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        return ModuleSpec(name, self, is_package=True) if name.split(".", maxsplit=1)[0] in _TOOLS else None
+
+    def create_module(self, spec: ModuleSpec) -> types.ModuleType:
+        return _StandIn(spec.name)
+
+    def exec_module(self, module: types.ModuleType) -> None:
+        module.__dict__.update(self._contents.get(module.__name__, {}))
+        for name in self._contents:
+            parent, _, child = name.rpartition(".")
+            if parent == module.__name__:
+                # `from catkin_pkg import python_setup`: else that were an empty class.
+                setattr(module, child, importlib.import_module(name))
+
+
+_TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 
 @contextmanager
 def _stand_ins(given: dict[str, Any], folder: Path) -> Iterator[None]:
-    """Modules that a setup.py imports, with a ``setup`` that notes its arguments; the folder is the current one."""
+    """Modules that a setup.py imports, with a ``setup`` that notes its arguments; the folder is the current one.
+
+    As of a script, modules beside it can be imported; they are forgotten afterwards.
+    """
 
     def setup(**arguments: Any) -> None:
-        given.update(arguments)
+        given.update({"name": None, **arguments})
 
     def generate_distutils_setup(package_xml_path: str = "", **arguments: Any) -> dict[str, Any]:
-        return arguments
+        return {**_metadata(folder), **arguments}
 
     def find_packages(where: str = ".", exclude: Any = (), include: Any = ("*",)) -> list[str]:
         found = []
         for path in sorted((folder / where).rglob("__init__.py")):
-            parts = path.parent.relative_to(folder / where).parts
-            if parts:
-                found.append(".".join(parts))
+            name = ".".join(path.parent.relative_to(folder / where).parts)
+            chosen = any(fnmatch.fnmatchcase(name, each) for each in include)
+            if name and chosen and not any(fnmatch.fnmatchcase(name, each) for each in exclude):
+                found.append(name)
         return found
 
-    contents: dict[str, dict[str, Any]] = {
-        "catkin_pkg": {},
-        "catkin_pkg.python_setup": {"generate_distutils_setup": generate_distutils_setup},
-        "distutils": {},
-        "distutils.core": {"setup": setup},
-        "setuptools": {
-            "setup": setup,
-            "find_packages": find_packages,
-            "find_namespace_packages": find_packages,
-        },
-    }
-    kept = {name: sys.modules.get(name) for name in contents}
-    before = os.getcwd()
-    for name, names in contents.items():
-        module = types.ModuleType(name)
-        module.__dict__.update(names)
-        sys.modules[name] = module
-    sys.modules["catkin_pkg"].__dict__["python_setup"] = sys.modules["catkin_pkg.python_setup"]
-    sys.modules["distutils"].__dict__["core"] = sys.modules["distutils.core"]
+    finder = _Finder(
+        {
+            "catkin_pkg.python_setup": {"generate_distutils_setup": generate_distutils_setup},
+            "distutils.core": {"setup": setup},
+            "setuptools": {
+                "setup": setup,
+                "find_packages": find_packages,
+                "find_namespace_packages": find_packages,
+            },
+        }
+    )
+    before, path_before, modules_before = os.getcwd(), sys.path[:], sys.modules.copy()
+    for name in modules_before:
+        if name.split(".")[0] in _TOOLS:
+            del sys.modules[name]
+    sys.meta_path.insert(0, finder)
+    sys.path.insert(0, str(folder))
     os.chdir(folder)
     try:
         yield
     finally:
         os.chdir(before)
-        for name, module_before in kept.items():
-            if module_before is None:
+        sys.path[:] = path_before
+        sys.meta_path.remove(finder)
+        for name in sys.modules.keys() - modules_before.keys():
+            file = getattr(sys.modules[name], "__file__", None)
+            if name.split(".")[0] in _TOOLS or (file and Path(file).is_relative_to(folder)):
                 del sys.modules[name]
-            else:
-                sys.modules[name] = module_before
+        sys.modules.update(modules_before)
+
+
+def _metadata(folder: Path) -> dict[str, Any]:
+    """What package.xml says of a package, under the names of ``setup()``'s arguments."""
+    manifest = read_manifest(folder)
+    return {
+        "name": manifest.name,
+        "version": manifest.version,
+        "description": manifest.description,
+        "license": ", ".join(manifest.licenses),
+        "maintainer": ", ".join(person.name for person in manifest.maintainers),
+        "author": ", ".join(person.name for person in manifest.authors),
+    }

@@ -7,7 +7,6 @@ Source: http://wiki.ros.org/catkin/workspaces, http://wiki.ros.org/ROS/Environme
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,12 +37,13 @@ def setup_files(setup: SetUp) -> dict[str, str]:
     """File name -> text, of all that a prefix needs to be sourced."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
-        "setup.sh": _posix(setup, setup.parents),
-        "local_setup.sh": _posix(setup, ()),
+        "setup.sh": _posix(setup, _others_make_way(setup)),
+        # As `setup.sh --extend`: what is sourced stays.
+        "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
-        "setup.fish": _fish(setup, setup.parents),
-        "setup.bat": _bat(setup, setup.parents),
-        "local_setup.bat": _bat(setup, ()),
+        "setup.fish": _fish(setup),
+        "setup.bat": _bat(setup, _others_make_way_bat(setup)),
+        "local_setup.bat": _bat(setup, ""),
         "env.bat": '@echo off\r\ncall "%~dp0setup.bat"\r\n%*\r\n',
     }
     for stem in ("setup", "local_setup"):
@@ -145,14 +145,10 @@ _minirospy_workspace() {
 """
 
 
-def _posix(setup: SetUp, parents: Sequence[Path]) -> str:
-    chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(parents))
-    return (
-        _HEAD
-        + f': "${{_minirospy_prefix:={setup.prefix}}}"\n'
-        + _POSIX_FUNCTIONS.replace("@DIST_PACKAGES@", DIST_PACKAGES)
-        + _posix_base(setup)
-        + f"""if [ "${{1:-}}" != --extend ]; then
+def _others_make_way(setup: SetUp) -> str:
+    """The workspaces that were sourced before go; those that this one stands on come."""
+    chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
+    return f"""if [ "${{1:-}}" != --extend ]; then
   # The workspaces that were sourced before make way.
   _minirospy_before=${{CMAKE_PREFIX_PATH:-}}
   while [ -n "$_minirospy_before" ]; do
@@ -165,7 +161,17 @@ def _posix(setup: SetUp, parents: Sequence[Path]) -> str:
   done
 {chain or "  :"}
 fi
-_minirospy_workspace "$_minirospy_prefix" put
+"""
+
+
+def _posix(setup: SetUp, others: str) -> str:
+    return (
+        _HEAD
+        + f': "${{_minirospy_prefix:={setup.prefix}}}"\n'
+        + _POSIX_FUNCTIONS.replace("@DIST_PACKAGES@", DIST_PACKAGES)
+        + _posix_base(setup)
+        + others
+        + """_minirospy_workspace "$_minirospy_prefix" put
 """
         + "".join(
             f'_minirospy_share={_quoted(folder)}\ncase ":${{ROS_PACKAGE_PATH:-}}:" in\n'
@@ -210,8 +216,8 @@ def _quoted(path: Path) -> str:
 # --- fish
 
 
-def _fish(setup: SetUp, parents: Sequence[Path]) -> str:
-    chain = "\n".join(f"    _minirospy_workspace {_quoted(parent)} put" for parent in reversed(parents))
+def _fish(setup: SetUp) -> str:
+    chain = "\n".join(f"    _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return (
         _HEAD
         + "set -l _minirospy_prefix (builtin realpath (dirname (status filename)))\n"
@@ -279,23 +285,29 @@ def _fish_base(setup: SetUp) -> str:
 # --- cmd.exe
 
 
-def _bat(setup: SetUp, parents: Sequence[Path]) -> str:
-    chain = "".join(f'call :minirospy_workspace put "{parent}"\n' for parent in reversed(parents))
+def _others_make_way_bat(setup: SetUp) -> str:
+    chain = "".join(f'call :minirospy_workspace put "{parent}"\n' for parent in reversed(setup.parents))
+    return f"""if "%~1"=="--extend" goto minirospy_own
+if not defined CMAKE_PREFIX_PATH goto minirospy_below
+rem The workspaces that were sourced before make way.
+for %%P in ("%CMAKE_PREFIX_PATH:;=" "%") do if exist "%%~P\\.catkin" call :minirospy_workspace take "%%~P"
+:minirospy_below
+{chain}:minirospy_own
+"""
+
+
+def _bat(setup: SetUp, others: str) -> str:
     share = "".join(f'call :minirospy_last ROS_PACKAGE_PATH "{folder}"\n' for folder in setup.share)
-    text = _BAT.format(base=_bat_base(setup), chain=chain, share=share, functions=setup.functions / "ros.bat")
+    text = _BAT.format(
+        base=_bat_base(setup), others=others, share=share, functions=setup.functions / "ros.bat"
+    )
     # cmd.exe misses labels in a file whose lines end in a line feed alone.
     return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 
 _BAT = """@echo off
 rem Made by minirospy: `call` it to work with the packages of this workspace.
-{base}if "%~1"=="--extend" goto minirospy_own
-if not defined CMAKE_PREFIX_PATH goto minirospy_below
-rem The workspaces that were sourced before make way.
-for %%P in ("%CMAKE_PREFIX_PATH:;=" "%") do if exist "%%~P\\.catkin" call :minirospy_workspace take "%%~P"
-:minirospy_below
-{chain}:minirospy_own
-for %%P in ("%~dp0.") do call :minirospy_workspace put "%%~fP"
+{base}{others}for %%P in ("%~dp0.") do call :minirospy_workspace put "%%~fP"
 {share}call "{functions}"
 exit /b 0
 

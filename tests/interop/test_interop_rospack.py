@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 REAL_PYTHON = "/usr/bin/python3"
-OUR_RUN = "import sys; from minirospy.cli.{module} import main; sys.exit(main())"
+OUR_RUN = "import sys; from minirospy.cli.{module} import {function}; sys.exit({function}())"
 
 TREE = {
     "a": "<depend>b</depend><depend>c</depend>",
@@ -133,12 +133,14 @@ def run(command: list[str], cwd: Path | None = None) -> tuple[int, str, str]:
     return done.returncode, done.stdout, "".join(errors)
 
 
-def real(line: str, cwd: Path | None = None) -> tuple[int, str, str]:
-    return run(["/usr/bin/rospack", *line.split()], cwd)
+def real(line: str, cwd: Path | None = None, tool: str = "rospack") -> tuple[int, str, str]:
+    return run([f"/usr/bin/{tool}", *line.split()], cwd)
 
 
-def ours(line: str, cwd: Path | None = None) -> tuple[int, str, str]:
-    return run([sys.executable, "-c", OUR_RUN.format(module="rospack"), *line.split()], cwd)
+def ours(line: str, cwd: Path | None = None, function: str = "main") -> tuple[int, str, str]:
+    return run(
+        [sys.executable, "-c", OUR_RUN.format(module="rospack", function=function), *line.split()], cwd
+    )
 
 
 @pytest.mark.timeout(180)
@@ -169,6 +171,29 @@ def test_lists(tree: Path) -> None:
         assert [each for each in ours(line)[1].splitlines() if each in expected] == expected
         assert len(expected) == len(TREE) - 1
     assert "ignored" not in ours("list-names")[1]
+
+
+def test_rosstack(tree: Path) -> None:
+    """To rosstack every package is a stack, and metapackages are packages."""
+    for line in """
+        find a
+        find meta
+        contents a
+        contains a
+        contains-path a
+        depends meta
+        depends1 meta
+        depends-why --target=e meta
+        depends-on1 a
+        langs
+        -q find nope
+    """.strip().splitlines():
+        assert ours(line, function="rosstack") == real(line, tool="rosstack"), line
+    for line in ("find nope", "depends nope"):
+        status, out, errors = real(line, tool="rosstack")
+        found = ours(line, function="rosstack")
+        assert found[:2] == (status, out)
+        assert found[2].startswith(errors.rstrip("\n"))
 
 
 def test_duplicates(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -267,5 +292,5 @@ def test_rospkg(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     ],
 )
 def test_rosmsg_proto(line: str) -> None:
-    ours = run([sys.executable, "-c", OUR_RUN.format(module="rosmsg_proto"), *line.split()])
+    ours = run([sys.executable, "-c", OUR_RUN.format(module="rosmsg_proto", function="main"), *line.split()])
     assert ours == run(["/usr/bin/rosmsg-proto", *line.split()])

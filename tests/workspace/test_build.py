@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.cli.catkin import catkin_make
+from minirospy.cli.catkin import catkin_make, catkin_make_isolated
 from minirospy.errors import BuildError, DefinitionError, ManifestError, SourceError
-from minirospy.workspace.build import find_workspace, read_plans
+from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
+from minirospy.workspace.packages import Packages, built_in_roots
 
 if TYPE_CHECKING:
     from conftest import Scene
@@ -88,6 +89,28 @@ def test_a_change_is_seen_also_in_packages_that_use_it(scene: Scene) -> None:
     assert python(scene, "from user.msg import User; print(User._md5sum)") != first
 
 
+def test_a_change_in_the_workspace_below_is_seen(scene: Scene) -> None:
+    below = type(scene)(scene.root / "below")
+    folder = below.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    far = below.messages("far_msgs", {"msg/Far.msg": "led_msgs/Led led\n"}, "led_msgs")
+    scene.messages("room_msgs", {"msg/Room.msg": "far_msgs/Far far\n"}, "far_msgs")
+    workspace = Workspace.at(scene.root)
+
+    def made() -> str:
+        outside = Packages.below(below.source, *built_in_roots())
+        found: list[Report] = []
+        build(workspace, read_plans(workspace.source), outside, None, found.append)
+        return found[0].made
+
+    assert made() == "1 message"
+    assert made() == ""
+    (folder / "msg" / "Led.msg").write_text("int64 number\nstring name\n")
+    assert made() == "1 message"
+    assert made() == ""
+    far.rename(below.source / "moved")
+    assert made() == "1 message"
+
+
 def test_what_is_gone_from_the_sources_goes_from_devel(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n", "msg/Old.msg": "int8 x\n"})
     scene.messages("old_msgs", {"msg/A.msg": "int8 x\n"})
@@ -161,13 +184,58 @@ def test_python_and_messages_in_one_package(scene: Scene) -> None:
         "import setuptools\nsetuptools.setup(name='x', packages=['tools'], package_dir={'': 'src'})",
         "#!/usr/bin/env python\nfrom setuptools import setup\nfrom catkin_pkg import python_setup\n"
         "d = python_setup.generate_distutils_setup()\nd['packages'] = ['tools']\nd['package_dir'] = {'': 'src'}\nsetup(**d)",
+        "from setuptools import Extension, setup\nfrom setuptools.command.install import install\nimport distutils.util\n"
+        "class Mine(install):\n    pass\n"
+        "setup(cmdclass={'install': Mine}, packages=('tools', ''), package_dir={'': 'src'}, scripts=None)",
+        "import beside\nfrom setuptools import find_packages, setup\n"
+        "if __name__ == '__main__':\n"
+        "    setup(packages=find_packages(beside.WHERE, exclude=['test*']), package_dir={'': beside.WHERE})",
+        "from setuptools import setup\nfrom catkin_pkg.python_setup import generate_distutils_setup\n"
+        "d = generate_distutils_setup()\nsetup(packages=[d['name']], package_dir={'': 'src'}, version=d['version'])",
     ],
 )
 def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
-    files = {"setup.py": text, "src/tools/__init__.py": "VALUE = 3\n"}
+    files = {
+        "setup.py": text,
+        "beside.py": "WHERE = 'src'\n",
+        "src/tools/__init__.py": "VALUE = 3\n",
+        "src/tests/__init__.py": "",
+    }
     scene.package("tools", "catkin_python_setup()", "", files)
+    before = sys.modules.copy()
     scene.build()
     assert python(scene, "import tools; print(tools.VALUE)") == "3\n"
+    if "exclude" in text:
+        assert not (scene.modules / "tests").exists()
+    changed = {name for name, module in sys.modules.items() if before.get(name) is not module}
+    assert not {name for name in changed if name.split(".", 1)[0] in ("beside", "setuptools", "distutils")}
+
+
+def test_programs_are_in_devel(scene: Scene) -> None:
+    """What setup.py calls a script is found on PATH, as in catkin; what is installed as Python, where real rosrun looks."""
+    lines = (
+        "#!/usr/bin/env python3\nimport helper, sys\nprint(__name__, __file__, helper.VALUE, sys.argv[1:])\n"
+    )
+    folder = scene.package(
+        "tools",
+        "catkin_python_setup()\ncatkin_install_python(PROGRAMS scripts/run.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})",
+        "",
+        {
+            "setup.py": SETUP.format("packages=[], scripts=['scripts/lamp', 'scripts/lamp.sh']"),
+            "scripts/lamp": lines,
+            "scripts/run.py": lines,
+            "scripts/lamp.sh": "#!/bin/sh\n",
+            "scripts/helper.py": "VALUE = 3\n",
+        },
+    )
+    scene.build()
+    for place, name in ((scene.devel / "bin", "lamp"), (scene.devel / "lib" / "tools", "run.py")):
+        assert [path.name for path in place.iterdir()] == [name]
+        said = subprocess.run([place / name, "a"], capture_output=True, text=True, check=True).stdout
+        assert said == f"__main__ {folder / 'scripts' / name} 3 ['a']\n"
+    (folder / "CMakeLists.txt").write_text("project(tools)")
+    scene.build()
+    assert not (scene.devel / "bin").exists()
 
 
 def test_a_compiler_is_not_needed(scene: Scene) -> None:
@@ -201,11 +269,10 @@ def good(cmake: str) -> str:
         (good("add_service_files(FILES Led.srv)"), 3, "add_service_files: there is no folder [srv]"),
         (good("add_message_files(FILES Led)"), 3, "[Led] does not end in .msg"),
         ("add_message_files(FILES Led.msg)", 3, "generate_messages() is missing"),
-        ("generate_messages()", 3, "nothing to generate"),
         (
             "generate_messages(DEPENDENCIES std_msgs)\nadd_message_files(FILES Led.msg)",
-            3,
-            "nothing to generate",
+            4,
+            "must stand before generate_messages()",
         ),
         (
             "add_message_files(FILES Led.msg)\ngenerate_messages()\nadd_message_files(FILES Led.msg)",
@@ -224,13 +291,20 @@ def good(cmake: str) -> str:
         ),
         ("catkin_python_setup()", 3, "needs a setup.py"),
         ("catkin_install_python(PROGRAMS scripts/x.py DESTINATION lib)", 3, "there is no [scripts/x.py]"),
-        ("install(DIRECTORY lanch DESTINATION share)", 3, "there is no [lanch]"),
+        ("if(A", 3, "if( is not closed"),
+        ("if(A)", 3, "if() without endif()"),
+        ("if(A B)\nendif()", 3, "if(): AND or OR is expected instead of [B]"),
+        ("add_subdirectory(nowhere)", 3, "add_subdirectory(nowhere): there is no"),
+        ("include(CMakeLists.txt)", 1, "includes or calls itself"),
+        ("if(" + "(" * 3000 + "1" + ")" * 3000 + ")\nendif()", 1, "is nested too deeply"),
+        ("# \0", 1, "is no text in UTF-8"),
+        ("add_message_files(FILES my-led.msg)", 3, "[my-led.msg] is no name of a type"),
         ("project(other)", 3, "project(other), but package.xml names the package [p]"),
         ("message(", 3, "message( is not closed"),
     ],
 )
 def test_mistakes_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> None:
-    folder = scene.package("p", cmake, "std_msgs", {"msg/Led.msg": "int8 x\n"})
+    folder = scene.package("p", cmake, "std_msgs", {"msg/Led.msg": "int8 x\n", "msg/my-led.msg": ""})
     error = mistakes(scene)
     assert isinstance(error, BuildError)
     assert (error.file, error.line) == (str(folder / "CMakeLists.txt"), line)
@@ -248,15 +322,14 @@ def test_mistakes_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> No
         ("std_msgs/Boool b\n", 1, "message type [std_msgs/Boool] not found; did you mean std_msgs/Bool"),
         ("Ledd l\n", 1, "message type [p/Ledd] not found; did you mean p/Led?"),
         ("int46 l\n", 1, "message type [p/int46] not found: did you mean int64?"),
-        ("int8 x\nLed l\n", 1, "contains itself"),
+        ("Led l\n", 1, "contains itself"),
     ],
 )
 def test_mistakes_in_a_message(scene: Scene, text: str, line: int, error: str) -> None:
     folder = scene.messages("p", {"msg/Led.msg": text})
     found = mistakes(scene)
     assert error in found.text
-    if "itself" not in error:
-        assert (found.file, found.line) == (str(folder / "msg" / "Led.msg"), line)
+    assert (found.file, found.line) == (str(folder / "msg" / "Led.msg"), line)
 
 
 def test_mistakes_in_services_and_actions(scene: Scene) -> None:
@@ -283,6 +356,30 @@ def test_two_packages_of_one_name(scene: Scene) -> None:
     assert [plan.name for plan in read_plans(scene.source)] == ["p"]
 
 
+@pytest.mark.parametrize("name", ["my pkg", "../evil"])
+def test_a_name_that_is_none(scene: Scene, name: str) -> None:
+    folder = scene.package("p")
+    (folder / "package.xml").write_text(f"<package>\n<name>{name}</name></package>")
+    assert str(mistakes(scene)).startswith(f"{folder / 'package.xml'}:2: '{name}' is not a package name")
+
+
+def test_a_link_that_leads_back(scene: Scene) -> None:
+    scene.package("p")
+    try:
+        (scene.source / "again").symlink_to(scene.source)
+        (scene.source / "p" / "here").symlink_to(scene.source / "p")
+    except OSError:
+        pytest.skip("this system makes no links")
+    assert [plan.name for plan in read_plans(scene.source)] == ["p"]
+
+
+def test_notes_of_a_build_that_are_none(scene: Scene) -> None:
+    scene.messages("p", {"msg/A.msg": "\ufeffint8 a\n"})
+    scene.build()
+    (scene.root / "build" / "minirospy" / "p.json").write_text('{"outputs": 3}')
+    assert scene.build()["p"].made == "1 message"
+
+
 def test_packages_in_a_circle(scene: Scene) -> None:
     scene.package("a", depends="b")
     scene.package("b", depends="c")
@@ -301,6 +398,14 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     assert "[q] is named, but there is no" in mistakes(scene).text
     (folder / "setup.py").write_text("x = (\n")
     assert mistakes(scene).line == 1
+    for line, text in {
+        "import sys; sys.exit('no numpy')": "setup() was not called: it ended with no numpy",
+        "": "setup() was not called",
+        "from setuptools import setup\nsetup(packages='q')": "packages is 'q': packages=['a', 'b'] is its form",
+        "from setuptools import setup\nsetup(package_dir={''})": "package_dir is {''}: package_dir={'': 'src'} is its form",
+    }.items():
+        (folder / "setup.py").write_text(line)
+        assert mistakes(scene).text == text
     (folder / "CMakeLists.txt").unlink()
     assert mistakes(scene).text == "package [p] has no CMakeLists.txt"
     (folder / "package.xml").write_text("<package>\n<name>p</nam></package>")
@@ -333,7 +438,7 @@ def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: 
 def test_warnings(scene: Scene) -> None:
     folder = scene.package(
         "p",
-        "find_package(catkin REQUIRED COMPONENTS rospy some_vendor_driver)\nadd_message_files(FILES A.msg)\n"
+        "find_package(catkin REQUIRED COMPONENTS rospy genmsg some_vendor_driver)\nadd_message_files(FILES A.msg)\n"
         "generate_messages(DEPENDENCIES geometry_msgs)",
         "",
         {"msg/A.msg": "geometry_msgs/Point p\n", "srv/Left.srv": "---\n"},
@@ -343,6 +448,89 @@ def test_warnings(scene: Scene) -> None:
         f"{folder / 'srv' / 'Left.srv'} is not built: no add_service_files() names it",
         f"{folder / 'package.xml'}: messages of [p] contain types of [geometry_msgs]: add <depend>geometry_msgs</depend>",
     )
+
+
+def test_options_of_dynamic_reconfigure_are_left_out(scene: Scene) -> None:
+    folder = scene.package(
+        "p", "generate_dynamic_reconfigure_options(cfg/Lamp.cfg)", "", {"cfg/Lamp.cfg": ""}
+    )
+    (warning,) = scene.build()["p"].warnings
+    assert warning.startswith(f"{folder / 'CMakeLists.txt'}:3: [cfg/Lamp.cfg] is not built")
+
+
+def test_what_catkin_would_refuse_in_package_xml(scene: Scene) -> None:
+    folder = scene.package("p")
+    (folder / "package.xml").write_text(
+        '<package format="2"><name>p</name>\n<run_depend>a</run_depend></package>'
+    )
+    warnings = scene.build()["p"].warnings
+    assert f"{folder / 'package.xml'}:1: the package has no <maintainer>" in warnings
+    assert any(
+        text.startswith(f"{folder / 'package.xml'}:2: format 2 has no tag <run_depend>: ")
+        for text in warnings
+    )
+    assert "package.xml must say <buildtool_depend>catkin</buildtool_depend>" in warnings[-1]
+
+
+@pytest.mark.parametrize(
+    ("cmake", "line", "text"),
+    [
+        ("{find}\ncatkin_package()\n{add}\ngenerate_messages()", 6, "generate_messages() must stand before catkin_package()"),
+        ("{find}\n{add}\ngenerate_messages()\ncatkin_python_setup()", 6, "catkin_python_setup() must stand before"),
+        ("{find}\n{add}\ngenerate_messages()\ngenerate_messages()", 6, "generate_messages() must stand there once"),
+        ("{find}\nadd_message_files(A.msg)\ngenerate_messages()", 4, "FILES must stand before A.msg"),
+        ("{add}\ngenerate_messages()", 3, "COMPONENTS message_generation) must stand before it"),
+    ],
+)  # fmt: skip
+def test_what_catkin_would_refuse_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> None:
+    """It builds here, and the author hears of it before a robot with real ROS refuses it."""
+    parts = {
+        "find": "find_package(catkin REQUIRED COMPONENTS message_generation)",
+        "add": "add_message_files(FILES A.msg)",
+    }
+    files = {
+        "msg/A.msg": "int8 a\n",
+        "setup.py": SETUP.format("packages=['p'], package_dir={'': 'src'}"),
+        "src/p/__init__.py": "",
+    }
+    folder = scene.package("p", cmake.format(**parts), "", files)
+    (warning,) = scene.build()["p"].warnings
+    assert warning.startswith(f"{folder / 'CMakeLists.txt'}:{line}: real catkin refuses this: ")
+    assert text in warning
+    assert python(scene, "import p.msg; print(p.msg.A(a=1).a)") == "1\n"
+
+
+def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
+    """A package of ROS 2 in the same repository has no CMakeLists.txt, or one of ament."""
+    folder = scene.package("p", "ament_package(")
+    file = folder / "package.xml"
+    file.write_text(
+        file.read_text().replace(
+            "</package>", "<export><build_type>ament_cmake</build_type></export></package>"
+        )
+    )
+    report = scene.build()["p"]
+    assert report.warnings == (f"{file}:1: left out: it is built by [ament_cmake], not by catkin",)
+    assert report.made == ""
+
+
+def test_nothing_to_generate_is_no_error(scene: Scene) -> None:
+    """As in catkin: packages in the wild have such a line left."""
+    folder = scene.package("p", "find_package(catkin REQUIRED)\ngenerate_messages()")
+    (warning,) = scene.build()["p"].warnings
+    assert warning.startswith(f"{folder / 'CMakeLists.txt'}:4: generate_messages(): nothing to generate")
+
+
+def test_an_empty_list_of_files_is_empty(scene: Scene) -> None:
+    """FILES without a name adds none; without FILES, the folder is taken whole."""
+    scene.package(
+        "p",
+        "add_message_files(DIRECTORY msg FILES A.msg)\nadd_service_files(DIRECTORY srv FILES ${NONE})\n"
+        "generate_messages()",
+        "",
+        {"msg/A.msg": "int8 a\n", "srv/S.srv": "---\n"},
+    )
+    assert scene.build()["p"].made == "1 message"
 
 
 # --- the command
@@ -367,8 +555,39 @@ def test_the_command(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
     assert find_workspace(scene.source / "cpp") == scene.root
     assert catkin_make(["-C", str(scene.root), "--pkg", "led_msgs"]) == 0
     assert "[100%] led_msgs: up to date" in capsys.readouterr().out
+    for target in ("led_msgs_generate_messages", "led_msgs_generate_messages_py", "led_msgs"):
+        assert catkin_make(["-C", str(scene.root), target, "VERBOSE=1", "-v"]) == 0
+        assert capsys.readouterr().out.endswith("\n[100%] led_msgs: up to date\n")
     assert catkin_make(["-C", str(scene.root), "clean"]) == 0
     assert not scene.devel.exists()
+
+
+def test_variables_of_cmake(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    """-DNAME=VALUE is what CMakeLists.txt sees; some names are catkin's own."""
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package("p", 'option(LAMP "with a lamp" OFF)\nif(LAMP)\ncatkin_python_setup()\nendif()')
+    words = ["-C", str(scene.root)]
+    assert catkin_make([*words, "-DCATKIN_WHITELIST_PACKAGES=led_msgs"]) == 0
+    assert "[100%] led_msgs: 1 message\n" in capsys.readouterr().out
+    assert catkin_make([*words, "-DCATKIN_BLACKLIST_PACKAGES=p", "-DCATKIN_WHITELIST_PACKAGES="]) == 0
+    assert "[100%] led_msgs: " in capsys.readouterr().out
+    assert catkin_make([*words, "-DCATKIN_WHITELIST_PACKAGES=led_msg"]) == 1
+    assert "package [led_msg] not found; did you mean led_msgs?" in capsys.readouterr().err
+    assert catkin_make([*words, "--cmake-args", "-DLAMP:BOOL=ON"]) == 1
+    assert "CMakeLists.txt:5: catkin_python_setup() needs a setup.py" in capsys.readouterr().err
+    assert catkin_make([*words, "install", "-DCMAKE_INSTALL_PREFIX=there"]) == 0
+    assert (scene.root / "there" / "share" / "led_msgs" / "package.xml").is_file()
+
+
+def test_catkin_make_isolated(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    assert catkin_make_isolated(["-C", str(scene.root), "--install", "--merge", "-j2"]) == 0
+    assert "[100%] led_msgs: 1 message\n" in capsys.readouterr().out
+    assert {path.name for path in scene.root.iterdir()} == {
+        *("src", "build_isolated", "devel_isolated", "install_isolated")
+    }
+    assert (scene.root / "install_isolated" / "share" / "led_msgs" / "msg" / "Led.msg").is_file()
+    assert list(scene.source.iterdir()) == [scene.source / "led_msgs"]
 
 
 @pytest.mark.parametrize(
@@ -421,10 +640,16 @@ def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
 def test_install(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package(
+        "tested",
+        "add_message_files(FILES T.msg NOINSTALL)\ngenerate_messages()\ninstall(FILES nowhere.yaml DESTINATION . OPTIONAL)",
+        "",
+        {"msg/T.msg": "int8 a\n"},
+    )
+    scene.package(
         "tools",
         "catkin_python_setup()\ncatkin_install_python(PROGRAMS scripts/run.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})\n"
         "install(DIRECTORY launch/ DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/launch\n"
-        '  FILES_MATCHING PATTERN "*.launch" PATTERN "old" EXCLUDE)\n'
+        '  FILES_MATCHING PATTERN "*.launch" PATTERN "old" EXCLUDE REGEX "/b[0-9]" EXCLUDE)\n'
         "install(FILES a.yaml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION} RENAME b.yaml)",
         "",
         {
@@ -434,6 +659,7 @@ def test_install(scene: Scene) -> None:
             "launch/x.launch": "<launch/>",
             "launch/x.txt": "",
             "launch/old/y.launch": "<launch/>",
+            "launch/b1.launch": "<launch/>",
             "a.yaml": "{}",
         },
     )
@@ -444,6 +670,12 @@ def test_install(scene: Scene) -> None:
         "lib/python3/dist-packages/led_msgs/__init__.py",
         "lib/python3/dist-packages/led_msgs/msg/__init__.py",
         "lib/python3/dist-packages/led_msgs/msg/_Led.py",
+        "lib/python3/dist-packages/led_msgs/py.typed",
+        "lib/python3/dist-packages/tested/__init__.py",
+        "lib/python3/dist-packages/tested/msg/__init__.py",
+        "lib/python3/dist-packages/tested/msg/_T.py",
+        "lib/python3/dist-packages/tested/py.typed",
+        "share/tested/package.xml",
         "lib/python3/dist-packages/tools/__init__.py",
         "lib/tools/run.py",
         "share/led_msgs/msg/Led.msg",
@@ -458,3 +690,14 @@ def test_install(scene: Scene) -> None:
     assert (
         python(scene, "import tools, led_msgs.msg; print(tools.VALUE, led_msgs.msg.Led().number)") == "3 0\n"
     )
+
+
+def test_what_is_not_there_is_missed_by_install_alone(
+    scene: Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in CMake: a package whose install rules name files that are gone builds."""
+    folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert catkin_make(["-C", str(scene.root), "install"]) == 1
+    error = f"{folder / 'CMakeLists.txt'}:3: install: there is no [lanch]; did you mean launch?\n"
+    assert capsys.readouterr().err == f"catkin_make: ERROR: {error}"

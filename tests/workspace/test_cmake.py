@@ -12,8 +12,10 @@ from minirospy.errors import BuildError
 from minirospy.workspace.cmake import keyword_arguments, parse_cmake
 
 
-def read(text: str, **variables: str) -> list[tuple[str, tuple[str, ...], int]]:
-    return [tuple(command) for command in parse_cmake(text, "f", variables)]  # type: ignore[misc]
+def read(text: str) -> list[tuple[str, tuple[str, ...], int]]:
+    return [
+        (node.name, tuple(word.text for word in node.words), node.line) for node in parse_cmake(text, "f")
+    ]
 
 
 def test_words_lines_and_case() -> None:
@@ -27,7 +29,7 @@ def test_comments() -> None:
 
 
 def test_quotes_and_brackets() -> None:
-    assert read('a("b c" "d\\"e;f" [[g "h]] [=[i]]j]=])') == [("a", ("b c", 'd"e;f', 'g "h', "i]]j"), 1)]
+    assert read('a("b c" "d\\"e;f" [[g "h]] [=[i]]j]=])') == [("a", ("b c", 'd\\"e;f', 'g "h', "i]]j"), 1)]
 
 
 def test_a_hash_in_quotes_is_no_comment() -> None:
@@ -35,33 +37,23 @@ def test_a_hash_in_quotes_is_no_comment() -> None:
 
 
 def test_nested_brackets_are_words() -> None:
-    assert read("if(A AND (B OR C))\nendif()") == [
-        ("if", ("A", "AND", "(", "B", "OR", "C", ")"), 1),
-        ("endif", (), 2),
-    ]
+    assert read("if(A AND (B OR C))\nendif()") == [("if", ("A", "AND", "(", "B", "OR", "C", ")"), 1)]
 
 
-def test_variables() -> None:
-    text = 'project(p)\nset(F a b)\nset(G "c;d")\nf(${F} ${G} "${F}" ${PROJECT_NAME}_x ${nobody} ${P}/y $ENV{HOME})'
-    assert read(text, P="lib")[-1] == ("f", ("a", "b", "c", "d", "a;b", "p_x", "lib/y"), 4)
-
-
-def test_lists_and_the_cache() -> None:
-    text = 'set(F a CACHE STRING "what for")\nlist(APPEND F b c)\nlist(APPEND G d)\nf(${F} ${G})'
-    assert read(text)[-1] == ("f", ("a", "b", "c", "d"), 4)
-
-
-def test_loops() -> None:
-    text = (
-        "set(L x y)\nforeach(T a b)\n f(${T})\n foreach(U IN LISTS L ITEMS z)\n  g(${T}${U})\n endforeach()\n"
+def test_what_stands_in_what() -> None:
+    (condition, last) = parse_cmake(
+        "if(A)\n f()\n foreach(x a)\n  g()\n endforeach(x)\nelse()\nENDIF(A)\nh()", "f"
     )
-    text += "endforeach(T)\nh()"
-    assert [(name, *arguments) for name, arguments, _ in read(text)] == [
-        ("set", "L", "x", "y"),
-        *(("f", "a"), ("g", "ax"), ("g", "ay"), ("g", "az")),
-        *(("f", "b"), ("g", "bx"), ("g", "by"), ("g", "bz")),
-        ("h",),
+    assert [(node.name, [inner.name for inner in node.body]) for node in condition.body] == [
+        ("f", []),
+        ("foreach", ["g"]),
+        ("else", []),
     ]
+    assert (last.name, last.line) == ("h", 8)
+
+
+def test_a_mark_of_the_byte_order_is_no_word() -> None:
+    assert read("\ufeffa(b)\r\n") == [("a", ("b",), 1)]
 
 
 def test_keywords() -> None:
@@ -77,6 +69,8 @@ def test_keywords() -> None:
         ("a", "f:1: a( is not closed"),
         ("a b()", "f:1: [a] is not followed by ( ... )"),
         ("x()\nforeach(T a)\nf()", "f:2: foreach() without endforeach()"),
+        ("x()\nif(A)\nforeach(T a)\nendif()", "f:3: foreach() without endforeach()"),
+        ("x()\nendif()", "f:2: endif() without if()"),
         ("\n)", "f:2: a closing bracket without an opening one"),
         ("(a)", "f:1: a bracket without a command before it"),
         ('a(\n"b)', 'f:2: a quote or bracket is not closed: "b)'),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from minirospy.cli.catkin import catkin, catkin_create_pkg, catkin_init_workspace
-from minirospy.workspace.manifest import read_manifest
+from minirospy.workspace.manifest import Kind, read_manifest
 from minirospy.workspace.plan import read_plan
 
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ def test_a_new_package(
         f"Successfully created files in {tmp_path / 'rpi_test'}. Please adjust the values in package.xml.\n"
     )
     manifest = read_manifest(tmp_path / "rpi_test")
-    manifest.check()
+    assert manifest.problems == ()
     assert (manifest.name, manifest.version, manifest.licenses) == ("rpi_test", "0.0.0", ("TODO",))
-    assert manifest.build_depends == manifest.exec_depends == ("rospy", "std_msgs")
+    assert manifest.depends(Kind.BUILD) == manifest.depends(Kind.EXEC) == ("rospy", "std_msgs")
     assert [name for name, _ in read_plan(tmp_path / "rpi_test").needs] == ["rospy", "std_msgs"]
 
 
@@ -49,7 +49,7 @@ def test_all_that_can_be_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     ]
     assert catkin_create_pkg(words) == 0
     manifest = read_manifest(tmp_path / "x")
-    manifest.check()
+    assert manifest.problems == ()
     assert (manifest.version, manifest.description, manifest.licenses) == ("1.2.3", "a & b < c", ("MIT",))
     assert [tuple(person) for person in (*manifest.authors, *manifest.maintainers)] == [
         ("Ann", ""),
@@ -63,7 +63,7 @@ def test_a_metapackage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert catkin_create_pkg(["all_of_it", "rospy", "--meta"]) == 0
     manifest = read_manifest(tmp_path / "all_of_it")
     assert manifest.is_metapackage
-    assert manifest.exec_depends == ("rospy",)
+    assert manifest.depends(Kind.EXEC) == ("rospy",)
     assert not (tmp_path / "all_of_it" / "src").exists()
 
 
@@ -124,6 +124,31 @@ def test_catkin(scene: Scene, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     assert catkin(["clean", "-y"]) == 0
     assert not scene.devel.exists()
     assert folder.is_dir()
+
+
+def test_catkin_config_is_kept(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.package("lamp", "if(NOT LAMP)\ncatkin_python_setup()\nendif()")
+    scene.package("wall", "catkin_python_setup()")
+    monkeypatch.chdir(scene.root)
+    assert catkin(["config", "--install", "--cmake-args", "-DLAMP=ON", "-DX=1"]) == 0
+    assert catkin(["config", "--blacklist", "wall"]) == 0
+    said = capsys.readouterr().out
+    assert said.endswith(
+        "Install:         yes\nBlacklist:       wall\nWhitelist:       none\nCmake args:      -DLAMP=ON -DX=1\n"
+    )
+    assert catkin(["build", "--dry-run"]) == 0
+    assert capsys.readouterr().out == "- lamp\n- led_msgs\n"
+    assert catkin(["build", "-j", "2", "--no-status", "--make-args", "x"]) == 0
+    assert f"[build] Done: source {scene.root / 'install' / 'setup.bash'}\n" in capsys.readouterr().out
+    assert (scene.root / "install" / "share" / "led_msgs" / "package.xml").is_file()
+    assert catkin(["build", "--cmake-args", "-DLAMP=OFF"]) == 1
+    assert "catkin_python_setup() needs a setup.py" in capsys.readouterr().err
+    assert catkin(["config", "--no-blacklist", "--no-install", "--no-cmake-args"]) == 0
+    assert capsys.readouterr().out.count("none\n") == 4
+    assert catkin(["build"]) == 1
 
 
 def test_catkin_outside_of_a_workspace(

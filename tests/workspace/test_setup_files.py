@@ -99,11 +99,12 @@ def test_workspaces_stand_on_one_another(scene: Scene, shell: str, ending: str) 
     assert variables(shell, script, scene.root)["PYTHONPATH"] == str(scene.modules)
 
 
-def test_extend_keeps_the_workspace_before(scene: Scene) -> None:
+@pytest.mark.parametrize("file", ["setup.bash' --extend '", "local_setup.bash", "local_setup.sh"])
+def test_extend_keeps_the_workspace_before(scene: Scene, file: str) -> None:
     scene.build()
     other = type(scene)(scene.root / "other")
     other.build()
-    script = f". '{other.devel}/setup.bash'\n. '{scene.devel}/setup.bash' --extend"
+    script = f". '{other.devel}/setup.bash'\n_minirospy_prefix='{scene.devel}'\n. '{scene.devel}/{file}'"
     assert variables("bash", script, scene.root)["PYTHONPATH"] == f"{scene.modules}:{other.modules}"
 
 

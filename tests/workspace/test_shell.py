@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 import minirospy
-from minirospy.cli.complete import _MODULES
-from minirospy.cli.sources import BY_HAND
+from minirospy.cli.complete import BY_HAND, ENTRANCES
 
 SHELL = Path(minirospy.__file__).parent / "workspace" / "shell"
 BIN = Path(sys.executable).parent
@@ -29,6 +32,14 @@ class Result(NamedTuple):
     err: str
 
 
+@cache
+def dotfiles() -> Path:
+    """Where zsh keeps what its completion system has found: for all tests, as that takes it a second."""
+    folder = tempfile.TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
 class Shell:
     """A shell that has sourced our file, in a workspace with the package ``my_robot``."""
 
@@ -39,6 +50,7 @@ class Shell:
         self.environ = {
             "PATH": os.pathsep.join([str(root / "bin"), str(BIN), "/usr/bin", "/bin"]),
             "HOME": str(root),
+            "ZDOTDIR": str(dotfiles()),
             "ROS_PACKAGE_PATH": str(root / "src"),
             "ROS_MASTER_URI": "http://localhost:1",
             "EDITOR": "echo EDIT",
@@ -69,16 +81,19 @@ def make_workspace(root: Path) -> None:
     for folder in ("scripts", "deep/er", ".git"):
         (package / folder / "talker.py").write_text("#!/usr/bin/env python3\n")
     (package / "config" / "a map.yaml").write_text("{}\n")
-    (package / "launch" / "all.launch").write_text('<launch><arg name="rate" default="10"/></launch>')
+    (package / "launch" / "all.launch").write_text(
+        '<launch><arg name="rate" default="10"/><arg name="name" default="a robot"/></launch>'
+    )
     (root / "devel").mkdir()
     (root / "devel" / "setup.bash").touch()
     if not (BIN / "rospack").exists():
         (root / "bin").mkdir()
-        stand_in = root / "bin" / "rospack"
-        stand_in.write_text(
-            f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.rospack import main\nsys.exit(main())\n"
-        )
-        stand_in.chmod(0o755)
+        for name, function in (("rospack", "main"), ("rosstack", "rosstack")):
+            stand_in = root / "bin" / name
+            stand_in.write_text(
+                f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.rospack import {function}\nsys.exit({function}())\n"
+            )
+            stand_in.chmod(0o755)
 
 
 @pytest.fixture(params=["bash", "zsh", "fish"])
@@ -105,6 +120,15 @@ def bash(tmp_path: Path) -> Shell:
 def test_roscd(shell: Shell) -> None:
     assert shell.run("roscd my_robot; pwd") == (0, [str(shell.package)], "")
     assert shell.run("roscd my_robot/deep/er; pwd") == (0, [str(shell.package / "deep" / "er")], "")
+
+
+def test_roscd_goes_to_a_metapackage_too(shell: Shell) -> None:
+    (shell.root / "src" / "my_robots").mkdir()
+    (shell.root / "src" / "my_robots" / "package.xml").write_text(
+        "<package><name>my_robots</name><export><metapackage/></export></package>"
+    )
+    done = shell.run("roscd my_robots; pwd; rosls my_robots")
+    assert (done.out, done.err) == ([str(shell.root / "src" / "my_robots"), "package.xml"], "")
 
 
 def test_roscd_alone_goes_to_devel_and_from_there_to_src(shell: Shell) -> None:
@@ -140,10 +164,15 @@ def test_roscd_to_what_is_no_folder(shell: Shell) -> None:
 
 def test_roscd_to_the_logs(shell: Shell) -> None:
     (shell.root / "logs").mkdir()
-    assert shell.run("roscd log; pwd", ROS_LOG_DIR=str(shell.root / "logs")).out == [str(shell.root / "logs")]
+    (shell.root / "logs" / "latest").mkdir()
+    logs = str(shell.root / "logs")
+    script = "roscd log; pwd; roscd log/latest; pwd; rosls log"
+    assert shell.run(script, ROS_LOG_DIR=logs).out == [logs, f"{logs}/latest", "latest"]
+    assert shell.run("roscd test_results; pwd", ROS_TEST_RESULTS_DIR=logs).out == [logs]
+    assert shell.run("rosls log", ROS_HOME=str(shell.root)).status > 0
 
 
-@pytest.mark.parametrize("command", ["roscd", "rosed", "roscp", "rospd", "rosls"])
+@pytest.mark.parametrize("command", ["roscd", "rosed", "roscat", "roscp", "rosmv", "rospd", "rosls"])
 def test_usage(shell: Shell, command: str) -> None:
     done = shell.run(f"{command} --help")
     assert (done.status, done.err) == (0, "")
@@ -153,7 +182,17 @@ def test_usage(shell: Shell, command: str) -> None:
     assert wrong.err.startswith(f"usage: {command} ")
 
 
-@pytest.mark.parametrize("command", ["rosls nobody", "rosed nobody x", "roscp nobody x y", "rospd nobody"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "rosls nobody",
+        "rosed nobody x",
+        "roscat nobody x",
+        "roscp nobody x y",
+        "rosmv -d nobody y",
+        "rospd nobody",
+    ],
+)
 def test_every_command_complains_of_an_unknown_package(shell: Shell, command: str) -> None:
     done = shell.run(command)
     assert (done.status, done.out) == (1, [])
@@ -207,6 +246,22 @@ def test_roscp(shell: Shell) -> None:
     assert done.err.startswith("roscp: ERROR: there is no file nothing in package [my_robot]")
 
 
+def test_roscat(shell: Shell) -> None:
+    assert shell.run("roscat my_robot 'a map.yaml'") == (0, ["{}"], "")
+    done = shell.run("roscat my_robot nothing")
+    assert (done.status, done.out) == (1, [])
+    assert done.err.startswith("roscat: ERROR: there is no file nothing in package [my_robot]")
+
+
+def test_rosmv(shell: Shell) -> None:
+    assert shell.run("rosmv my_robot all.launch moved.launch") == (0, [], "")
+    assert (shell.root / "moved.launch").is_file()
+    assert not (shell.package / "launch" / "all.launch").exists()
+    assert shell.run("rosmv -d my_robot elsewhere") == (0, [], "")
+    assert (shell.root / "elsewhere" / "package.xml").is_file()
+    assert not shell.package.exists()
+
+
 # --- rospd and rosd
 
 
@@ -231,14 +286,14 @@ def test_the_stack_has_no_such_number(shell: Shell) -> None:
 # --- TAB
 
 
-def bash_tab(bash: Shell, line: str, words: list[str] | None = None) -> list[str]:
-    """What bash is given for a TAB at the end of ``line``; ``words``: as bash takes it apart."""
+def bash_tab(bash: Shell, line: str, words: list[str] | None = None, at: int | None = None) -> list[str]:
+    """What bash is given for a TAB at the end of ``line``, or ``at``; ``words``: as bash takes it apart."""
     words = line.split(" ") if words is None else words
-    array = " ".join(f"{word!r}" for word in words)
+    current = len(words if at is None else line[:at].split(" ")) - 1
     done = bash.run(
         f"""
-        COMP_LINE={line!r}; COMP_POINT=${{#COMP_LINE}}
-        COMP_WORDS=({array}); COMP_CWORD={len(words) - 1}
+        COMP_LINE={shlex.quote(line)}; COMP_POINT={len(line) if at is None else at}
+        COMP_WORDS=({shlex.join(words)}); COMP_CWORD={current}
         function=$(complete -p {words[0]} | sed 's/.*-F \\([^ ]*\\) .*/\\1/')
         "$function" {words[0]} "${{COMP_WORDS[COMP_CWORD]}}"
         printf '<%s>\\0' "${{COMPREPLY[@]}}"
@@ -255,7 +310,7 @@ def test_bash_tab(bash: Shell) -> None:
     assert bash_tab(bash, "rosrun my_") == ["my_robot "]
     assert bash_tab(bash, "rosrun my_robot ") == ["talker.py "]
     assert bash_tab(bash, "roslaunch my_robot ") == ["all.launch "]
-    assert bash_tab(bash, "roslaunch my_robot all.launch ") == ["rate:="]
+    assert bash_tab(bash, "roslaunch my_robot all.launch ") == ["rate:=", "name:="]
     assert bash_tab(bash, "rostopic ec") == ["echo "]
     assert bash_tab(bash, "minirospy topic ec") == ["echo "]
     assert bash_tab(bash, "rostopic echo ") == []
@@ -274,11 +329,33 @@ def test_bash_takes_words_apart_at_colons(bash: Shell) -> None:
 def test_bash_inserts_a_message(bash: Shell) -> None:
     assert bash_tab(bash, "rostopic pub /t std_msgs/Bool ") == ['"data: false" ']
     assert bash_tab(bash, "rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\ny: 0.0\nz: 0.0" ']
-    # readline closes the quote.
-    assert bash_tab(bash, 'rostopic pub /t std_msgs/Bool "da') == ["data: false"]
+    # readline closes a quote that is not closed.
+    assert bash_tab(bash, 'rostopic pub /t std_msgs/Bool "da') == ['data: false"']
 
 
-_COMMANDS = {*_MODULES, *BY_HAND, "minirospy"}
+def test_bash_completes_at_the_cursor(bash: Shell) -> None:
+    # Behind the cursor there is a word already: no space is added.
+    assert bash_tab(bash, "rosrun my_robot ta --rate 5", at=len("rosrun my_robot ta")) == ["talker.py"]
+    assert bash_tab(bash, "rosrun my_robot talker.py", at=len("rosrun my_robot ta")) == ["talker.py"]
+
+
+def test_bash_completes_behind_a_break(bash: Shell) -> None:
+    line = "roslaunch my_robot all.launch name:="
+    words = ["roslaunch", "my_robot", "all.launch", "name", ":="]
+    assert bash_tab(bash, line, words) == ["a\\ robot "]
+    assert bash_tab(bash, line + '"a r', [*words, '"a r']) == ['a robot"']
+    # Who has taken the colon out of COMP_WORDBREAKS.
+    assert bash_tab(bash, line, [*words[:-2], "name:", "="]) == ["a\\ robot "]
+    assert bash_tab(bash, line, [*words[:-2], "name:="]) == ["name:=a\\ robot "]
+    assert bash_tab(bash, "rosparam load --x=", ["rosparam", "load", "--x", "="]) == []
+
+
+def test_bash_completes_names_with_blanks(bash: Shell) -> None:
+    assert bash_tab(bash, "rosed my_robot a") == ["a\\ map.yaml ", "all.launch "]
+    assert bash_tab(bash, "rosed my_robot 'a ", ["rosed", "my_robot", "'a "]) == ["a map.yaml'"]
+
+
+_COMMANDS = {*ENTRANCES, *BY_HAND, "minirospy"}
 
 
 def test_bash_knows_every_command(bash: Shell) -> None:
@@ -319,13 +396,13 @@ def test_zsh_tab(tmp_path: Path) -> None:
     assert zsh.run(script) == (
         0,
         [
-            "-Q -S  -a partial:my_robot/",
-            "-Q -a ready:talker.py",
-            "-Q -a ready:rate:=10",
-            '-Q -a ready:"x: 0.0',
+            "-U -Q -S  -a partial:my_robot/",
+            "-U -Q -a ready:talker.py",
+            "-U -Q -a ready:rate:=10",
+            '-U -Q -a ready:"x: 0.0',
             "y: 0.0",
             'z: 0.0"',
-            "-Q -a ready:data: false",
+            "-U -Q -a ready:data: false",
             "_ros_complete_zsh _ros_complete_zsh",
         ],
         "",
@@ -381,8 +458,17 @@ def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
         # The answer, not its echo: from then on the line editor reads.
         os.write(keyboard, f"source {source}\n{ready}\n".encode())
         read_until(b"42")
-        os.write(keyboard, b"rosrun my_robot ta\t")
-        read_until(b"talker.py ")
+        message = rb"data:\ false" if name == "fish" else b'"data: false"'
+        for typed, ending in (
+            (b"rosrun my_robot ta", b"lker.py "),
+            (b"roslaunch my_robot all.launch name:=", b"a\\ robot "),
+            (b"rosed my_robot a\\ ", b"map.yaml "),
+            (b'rosed my_robot "a ', b'map.yaml"'),
+            (b"rostopic pub /t std_msgs/Bool ", message),
+        ):
+            os.write(keyboard, typed + b"\t")
+            read_until(ending)
+            os.write(keyboard, b"\x15")
     finally:
         shell.kill()
         shell.wait()

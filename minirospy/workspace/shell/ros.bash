@@ -1,4 +1,4 @@
-# roscd, rosls, rosed, roscp, rospd, rosd and TAB completion, for bash and zsh: to be sourced.
+# roscd, rosls, rosed, roscat, roscp, rosmv, rospd, rosd and TAB completion, for bash and zsh: to be sourced.
 #
 # What can be completed is known by `minirospy complete` alone; here is only what a program cannot do for its shell:
 # change its folder, and take part in its line editing. Source: http://wiki.ros.org/rosbash.
@@ -6,9 +6,14 @@
 
 # --- where packages are
 
-# _ros_find PACKAGE: print its folder; complain and fail where there is none.
+# _ros_find PACKAGE: print its folder, or that of logs, of results of tests; complain and fail where there is none.
 _ros_find() {
-    command rospack find "$1"
+    case $1 in
+        log) printf '%s\n' "${ROS_LOG_DIR:-${ROS_HOME:-$HOME/.ros}/log}" ;;
+        test_results) printf '%s\n' "${ROS_TEST_RESULTS_DIR:-${ROS_HOME:-$HOME/.ros}/test_results}" ;;
+        # A metapackage is none to rospack.
+        *) command rospack find "$1" || command rosstack find "$1" 2>/dev/null ;;
+    esac
 }
 
 # _ros_folder COMMAND PACKAGE[/FOLDER]: print that folder; the complaint is COMMAND's.
@@ -48,11 +53,6 @@ _ros_workspace() {
     return 1
 }
 
-# _ros_log_folder: print where logs go.
-_ros_log_folder() {
-    printf '%s\n' "${ROS_LOG_DIR:-${ROS_HOME:-$HOME/.ros}/log}"
-}
-
 # _ros_usage COMMAND [STATUS]: print how it is typed, on stderr where STATUS is not 0; return STATUS.
 _ros_usage() {
     local text
@@ -60,6 +60,8 @@ _ros_usage() {
         roscd) text='package\n\nJump to target package.' ;;
         rosls) text='package [options of ls]\n\nLists contents of a package directory.' ;;
         rosed) text='package filename\n\nEdit a file in a package, with the editor that EDITOR names.' ;;
+        roscat) text='package filename\n\nPrint a file of a package.' ;;
+        rosmv) text='package filename target\n   or: rosmv -d package target\n\nMove a file of a package, or (-d) the package, to target.' ;;
         roscp) text='package filename target\n\nCopy a file from a package to target location.' ;;
         rospd) text='[package | number]\n\nLike pushd, but with packages; a number turns the stack that rosd shows.' ;;
     esac
@@ -78,7 +80,6 @@ roscd() {
     case "${#}:${1:-}" in
         1:-h | 1:--help) _ros_usage roscd && return ;;
         0: | 1:) folder=$(_ros_workspace) || return ;;
-        1:log) folder=$(_ros_log_folder) ;;
         1:*) folder=$(_ros_folder roscd "$1") || return ;;
         *) _ros_usage roscd 2 || return ;;
     esac
@@ -172,6 +173,28 @@ roscp() {
     cp -- "${_ros_found[@]}" "$3"
 }
 
+roscat() {
+    local -a _ros_found
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage roscat && return ;;
+        2:*) ;;
+        *) _ros_usage roscat 2 || return ;;
+    esac
+    _ros_file roscat "$1" "$2" || return
+    cat -- "${_ros_found[@]}"
+}
+
+rosmv() {
+    local -a _ros_found
+    case "${#}:${1:-}" in
+        1:-h | 1:--help) _ros_usage rosmv && return ;;
+        3:-d) _ros_found=("$(_ros_folder rosmv "$2")") || return ;;
+        3:*) _ros_file rosmv "$1" "$2" || return ;;
+        *) _ros_usage rosmv 2 || return ;;
+    esac
+    mv -- "${_ros_found[@]}" "$3"
+}
+
 # rosd: the stack of folders, numbered.
 rosd() {
     local number=0 folder
@@ -206,25 +229,27 @@ rospd() {
 
 # _ros_candidates INDEX WORD...: put what can stand at WORD number INDEX into _ros_found.
 _ros_candidates() {
-    local line
+    local into=-a vertical_tab=$'\v' line_feed=$'\n' return=$'\r'
+    [ -z "${ZSH_VERSION:-}" ] || into=-A
     _ros_found=()
-    while IFS= read -r line; do
-        # Not inside of "": there, zsh takes $'\n' as it stands.
-        line=${line%$'\r'}
-        line=${line//$'\v'/$'\n'}
-        _ros_found+=("$line")
-    done < <(command minirospy complete "$@" 2>/dev/null)
+    # Thousands of candidates at once: a loop over them would take longer than to find them.
+    IFS=$'\n' read -r -d '' "$into" _ros_found < <(command minirospy complete "$@" 2>/dev/null) || :
+    [ ${#_ros_found[@]} -gt 0 ] || return 0
+    _ros_found=("${_ros_found[@]%"$return"}")
+    _ros_found=("${_ros_found[@]//$vertical_tab/$line_feed}")
 }
 
 # _ros_complete_bash: what readline calls; COMP_* in, COMPREPLY out.
 _ros_complete_bash() {
-    local line="${COMP_LINE:0:COMP_POINT}" word='' fragment gap candidate cut=''
+    local line="${COMP_LINE:0:COMP_POINT}" word='' fragment='' gap cut end=''
     local -a words _ros_found
     words=()
     # bash takes words apart at = and : as in `rate:=5`; what has no space in between belongs together.
     for fragment in "${COMP_WORDS[@]:0:COMP_CWORD+1}"; do
         gap=${line%%[![:space:]]*}
         line=${line#"$gap"}
+        # The cursor may stand inside a word: what is behind it does not count.
+        [ ${#line} -ge ${#fragment} ] || fragment=$line
         if [ ${#words[@]} -gt 0 ] && [ -z "$gap" ] && [ -n "$word" ]; then
             word=$word$fragment
             words[${#words[@]}-1]=$word
@@ -234,51 +259,53 @@ _ros_complete_bash() {
         fi
         line=${line#"$fragment"}
     done
-    # The cursor may stand inside a word: what is behind it does not count.
     _ros_candidates "$((${#words[@]} - 1))" "${words[@]}"
-    case $word in
-        [\"\']*) cut=${word%"${word#?}"} ;;
-        *[:=]*) cut=${word%"${word##*[:=]}"} ;;
+    # readline puts a candidate in place of the last fragment: behind a = or :, and behind a quote, which it closes.
+    cut=${word%"$fragment"}
+    [ "$COMP_POINT" -lt "${#COMP_LINE}" ] || end=' '
+    case $fragment in
+        [\"\']*) cut=$cut${fragment%"${fragment#?}"} end='' ;;
+        *[!:=]*) ;;
+        *) cut=$word ;;
     esac
     COMPREPLY=()
-    for candidate in ${_ros_found[@]+"${_ros_found[@]}"}; do
-        candidate=${candidate#"$cut"}
-        case $word in
-            # readline closes a quote that it has found open.
-            [\"\']*) candidate=${candidate%"$cut"} ;;
-            *) case $candidate in */ | *=) ;; *) candidate="$candidate " ;; esac ;;
-        esac
-        COMPREPLY+=("$candidate")
-    done
+    [ ${#_ros_found[@]} -gt 0 ] || return 0
+    COMPREPLY=("${_ros_found[@]#"$cut"}")
+    COMPREPLY=("${COMPREPLY[@]/%/$end}")
+    # No space behind what goes on.
+    COMPREPLY=("${COMPREPLY[@]/%\/ //}")
+    COMPREPLY=("${COMPREPLY[@]/%= /=}")
 }
 
 # _ros_complete_zsh: what zsh's completion system calls; words and CURRENT in, compadd out.
 _ros_complete_zsh() {
-    local candidate word quote=''
-    local -a _ros_found ready partial
-    _ros_candidates "$((CURRENT - 1))" "${words[@]}"
-    word=${words[CURRENT]}
+    local candidate word=${words[CURRENT]} quote=''
+    local -a _ros_found ready partial end
+    # The cursor may stand inside a word: what is behind it does not count.
+    word=${word%"${SUFFIX:-}"}
+    _ros_candidates "$((CURRENT - 1))" "${words[@]:0:$((CURRENT - 1))}" "$word"
     case $word in [\"\']*) quote=${word%"${word#?}"} ;; esac
     for candidate in ${_ros_found[@]+"${_ros_found[@]}"}; do
-        if [ -n "$quote" ]; then
-            # zsh keeps a quote that it has found open to itself, and closes it.
-            candidate=${candidate#"$quote"}
-            candidate=${candidate%"$quote"}
-        fi
+        # zsh keeps a quote that it has found open to itself, and closes it.
+        candidate=${candidate#"$quote"}
+        candidate=${candidate%"$quote"}
         case $candidate in
             */ | *=) partial+=("$candidate") ;;
             *) ready+=("$candidate") ;;
         esac
     done
-    compadd -Q -S '' -a partial
-    compadd -Q -a ready
+    # -U: zsh would compare as it writes itself, and a[0] is not a\[0\] then.
+    compadd -U -Q -S '' -a partial
+    case ${RBUFFER:-} in ' '*) end=(-S '') ;; esac
+    compadd -U -Q ${end[@]+"${end[@]}"} -a ready
 }
 
 _ros_commands() {
-    printf '%s\n' roscd rosls rosed roscp rospd rosrun roslaunch roscore rosmaster rostopic rosnode rosservice rosparam \
-        rosmsg rossrv rosmsg-proto rospack rosconsole rosgraph rosclean rosversion roswtf rostest rosunit \
-        catkin_make catkin catkin_create_pkg catkin_init_workspace catkin_test_results \
-        catkin_find catkin_find_pkg catkin_topological_order minirospy
+    printf '%s\n' roscd rosls rosed roscat roscp rosmv rospd rosrun roslaunch roslaunch-deps roslaunch-logs \
+        roscore rosmaster rostopic rosnode rosservice rosparam rosmsg rossrv rosmsg-proto rospack rosstack rosdep \
+        rosconsole rosgraph rosclean rosversion roswtf rostest rosunit catkin_make catkin_make_isolated catkin \
+        catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
+        catkin_topological_order minirospy
 }
 
 if [ -n "${ZSH_VERSION:-}" ]; then

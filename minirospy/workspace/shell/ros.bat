@@ -1,9 +1,11 @@
-@rem roscd, rosls, rosed, roscp, rospd and rosd for cmd.exe: `call ros.bat` once in a window.
+@rem roscd, rosls, rosed, roscat, roscp, rosmv, rospd and rosd for cmd.exe: `call ros.bat` once in a window.
 @rem Each becomes a doskey macro, which calls this file with its name: a called file may change the window's folder.
 @if not "%~1"=="" goto %~1
 @doskey roscd=call "%~f0" roscd $*
 @doskey rosls=call "%~f0" rosls $*
 @doskey rosed=call "%~f0" rosed $*
+@doskey roscat=call "%~f0" roscat $*
+@doskey rosmv=call "%~f0" rosmv $*
 @doskey roscp=call "%~f0" roscp $*
 @doskey rospd=call "%~f0" rospd $*
 @doskey rosd=pushd
@@ -32,6 +34,20 @@
 @call :find "%~2" || exit /b 1
 @call :file "%~3" || exit /b 1
 @if "%EDITOR%"=="" (notepad "%ROS_FOUND%") else %EDITOR% "%ROS_FOUND%"
+@exit /b
+
+:roscat
+@if "%~3"=="" >&2 echo usage: roscat package filename& exit /b 2
+@call :find "%~2" || exit /b 1
+@call :file "%~3" || exit /b 1
+@type "%ROS_FOUND%"
+@exit /b
+
+:rosmv
+@if "%~4"=="" >&2 echo usage: rosmv package filename target& exit /b 2
+@call :find "%~2" || exit /b 1
+@call :file "%~3" || exit /b 1
+@move "%ROS_FOUND%" "%~4"
 @exit /b
 
 :roscp

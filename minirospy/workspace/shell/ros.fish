@@ -1,12 +1,22 @@
-# roscd, rosls, rosed, roscp, rospd, rosd and TAB completion, for fish: to be sourced.
+# roscd, rosls, rosed, roscat, roscp, rosmv, rospd, rosd and TAB completion, for fish: to be sourced.
 #
 # What can be completed is known by `minirospy complete` alone; here is only what a program cannot do for its shell.
 # The same as ros.bash, which says more. Source: http://wiki.ros.org/rosbash.
 
 # --- where packages are
 
-function _ros_find --argument-names package --description 'print the folder of a package'
-    command rospack find $package
+function _ros_find --argument-names package --description 'print the folder of a package, of logs, of results of tests'
+    set --local home $HOME/.ros
+    test -n "$ROS_HOME"; and set home $ROS_HOME
+    switch $package
+        case log
+            test -n "$ROS_LOG_DIR"; and printf '%s\n' $ROS_LOG_DIR; or printf '%s\n' $home/log
+        case test_results
+            test -n "$ROS_TEST_RESULTS_DIR"; and printf '%s\n' $ROS_TEST_RESULTS_DIR; or printf '%s\n' $home/test_results
+        case '*'
+            # A metapackage is none to rospack.
+            command rospack find $package; or command rosstack find $package 2>/dev/null
+    end
 end
 
 function _ros_folder --argument-names name target --description 'print the folder PACKAGE[/FOLDER]; complain as command name'
@@ -39,16 +49,6 @@ function _ros_workspace --description 'print where roscd alone goes'
     return 1
 end
 
-function _ros_log_folder --description 'print where logs go'
-    if set --query ROS_LOG_DIR
-        printf '%s\n' $ROS_LOG_DIR
-    else if set --query ROS_HOME
-        printf '%s\n' $ROS_HOME/log
-    else
-        printf '%s\n' $HOME/.ros/log
-    end
-end
-
 function _ros_usage --argument-names name --description 'print how a command is typed'
     printf 'usage: %s ' $name
     switch $name
@@ -58,6 +58,10 @@ function _ros_usage --argument-names name --description 'print how a command is 
             printf '%s\n' 'package [options of ls]' '' 'Lists contents of a package directory.'
         case rosed
             printf '%s\n' 'package filename' '' 'Edit a file in a package, with the editor that EDITOR names.'
+        case roscat
+            printf '%s\n' 'package filename' '' 'Print a file of a package.'
+        case rosmv
+            printf '%s\n' 'package filename target' '   or: rosmv -d package target' '' 'Move a file of a package, or (-d) the package, to target.'
         case roscp
             printf '%s\n' 'package filename target' '' 'Copy a file from a package to target location.'
         case rospd
@@ -83,8 +87,6 @@ function roscd --description 'go to the folder of a package'
     _ros_takes roscd 0 1 $argv; or return (math $status - 1)
     if test -z "$argv"
         set folder (_ros_workspace); or return
-    else if test "$argv" = log
-        set folder (_ros_log_folder)
     else
         set folder (_ros_folder roscd $argv); or return
     end
@@ -159,6 +161,22 @@ function roscp --description 'copy a file of a package'
     cp -- $_ros_found $argv[3]
 end
 
+function roscat --description 'print a file of a package'
+    _ros_takes roscat 2 2 $argv; or return (math $status - 1)
+    _ros_file roscat $argv; or return
+    cat -- $_ros_found
+end
+
+function rosmv --description 'move a file of a package, or the package'
+    _ros_takes rosmv 3 3 $argv; or return (math $status - 1)
+    if test "$argv[1]" = -d
+        set --global _ros_found (_ros_folder rosmv $argv[2]); or return
+    else
+        _ros_file rosmv $argv[1] $argv[2]; or return
+    end
+    mv -- $_ros_found $argv[3]
+end
+
 function rosd --description 'show the stack of folders, numbered'
     set --local number 0
     for folder in $PWD $dirstack
@@ -195,10 +213,11 @@ function _ros_complete --description 'print what can stand at the cursor'
     command minirospy complete --one-line (count $before) $before "$current" 2>/dev/null | string unescape
 end
 
-for name in roscd rosls rosed roscp rospd rosrun roslaunch roscore rosmaster rostopic rosnode rosservice rosparam \
-        rosmsg rossrv rosmsg-proto rospack rosconsole rosgraph rosclean rosversion roswtf rostest rosunit \
-        catkin_make catkin catkin_create_pkg catkin_init_workspace catkin_test_results \
-        catkin_find catkin_find_pkg catkin_topological_order minirospy
+for name in roscd rosls rosed roscat roscp rosmv rospd rosrun roslaunch roslaunch-deps roslaunch-logs \
+        roscore rosmaster rostopic rosnode rosservice rosparam rosmsg rossrv rosmsg-proto rospack rosstack rosdep \
+        rosconsole rosgraph rosclean rosversion roswtf rostest rosunit catkin_make catkin_make_isolated catkin \
+        catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
+        catkin_topological_order minirospy
     complete --command $name --erase
     complete --command $name --no-files --arguments '(_ros_complete)'
 end

@@ -1,0 +1,455 @@
+"""What a CMakeLists.txt comes to: its commands in, those that CMake would run out, with variables filled in.
+
+``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are followed, and the
+commands that set variables; all other commands are passed on. What nobody set is empty, and false, as in CMake.
+Source: https://cmake.org/cmake/help/latest/manual/cmake-commands.7.html.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.errors import BuildError
+from minirospy.workspace.cmake import Node, Word, keyword_arguments, parse_cmake
+
+__all__ = ["Command", "run_cmake"]
+
+_VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
+_FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
+_TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*\.?\d*)$")
+_HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
+"""What packages of Python look for, and go on without: it is there."""
+_DEEPEST = 40
+"""Files and macros that may stand in one another; more is a file that includes itself."""
+
+
+class Command(NamedTuple):
+    """One command: its name in lower case, its arguments, and where it stands: the line, the file, its folder."""
+
+    name: str
+    arguments: tuple[str, ...]
+    line: int
+    file: Path
+    folder: Path
+
+
+class _Macro(NamedTuple):
+    """What ``macro()`` or ``function()`` defines, and the file where it does."""
+
+    parameters: list[str]
+    body: tuple[Node, ...]
+    file: Path
+
+
+class _Leave(Exception):
+    """``return()``, ``break()`` or ``continue()``."""
+
+
+def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
+    """The commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is one of the environment.
+
+    Raises BuildError: no such file, a bracket that does not close, a condition or a pattern that does not parse.
+    """
+    return _Run(file.parent, dict(variables), {}, 0).file(file)
+
+
+def _items(text: str) -> list[str]:
+    return [item for item in text.split(";") if item]
+
+
+class _Run:
+    """Runs the commands of one folder. ``_known`` holds its variables, ``_macros`` what it defined."""
+
+    def __init__(self, folder: Path, known: dict[str, str], macros: dict[str, _Macro], depth: int) -> None:
+        self._folder = folder
+        self._known = known
+        self._macros = macros
+        self._depth = depth
+        self._readers: dict[str, Callable[[Node, list[str], Path], Iterator[Command]]] = {
+            "if": self._if,
+            "foreach": self._foreach,
+            "while": lambda node, arguments, file: iter(()),
+            "macro": self._define,
+            "function": self._define,
+            "include": self._include,
+            "add_subdirectory": self._subdirectory,
+            **dict.fromkeys(("return", "break", "continue"), self._leave),
+        }
+        self._setters: dict[str, Callable[[list[str]], None]] = {
+            "project": self._project,
+            "set": self._set,
+            "unset": self._unset,
+            "option": self._option,
+            "list": self._list,
+            "string": self._string,
+            "file": self._file,
+            "find_package": self._find_package,
+            "get_filename_component": self._filename,
+        }
+
+    def file(self, file: Path) -> Iterator[Command]:
+        """The commands of a file. Raises BuildError."""
+        try:
+            text = file.read_text(encoding="utf-8", errors="replace")
+        except OSError as error:
+            raise BuildError(str(file), 0, error.strerror or str(error)) from error
+        if "\0" in text:
+            raise BuildError(str(file), 1, "is no text in UTF-8")
+        yield from self._body(parse_cmake(text, str(file)), file)
+
+    def _body(self, nodes: Sequence[Node], file: Path) -> Iterator[Command]:
+        """A file's or a macro's commands, up to its ``return()``."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise BuildError(str(file), nodes[0].line if nodes else 0, "includes or calls itself")
+        try:
+            yield from self._run(nodes, file)
+        except _Leave:
+            pass
+        finally:
+            self._depth -= 1
+
+    def _run(self, nodes: Sequence[Node], file: Path) -> Iterator[Command]:
+        for node in nodes:
+            arguments = self._arguments(node.words)
+            if node.name in self._macros:
+                yield from self._call(node.name, arguments)
+            elif node.name in self._readers:
+                yield from self._readers[node.name](node, arguments, file)
+            else:
+                if node.name in self._setters:
+                    try:
+                        self._setters[node.name](arguments)
+                    except (re.error, ValueError, OSError) as error:
+                        raise BuildError(str(file), node.line, f"{node.name}(): {error}") from error
+                yield Command(node.name, tuple(arguments), node.line, file, self._folder)
+
+    def _arguments(self, words: Sequence[Word]) -> list[str]:
+        """Words with variables filled in; a list in one without quotes falls apart into words."""
+        found: list[str] = []
+        for word in words:
+            text = self._filled(word.text)
+            found += [text] if word.quoted else _items(text)
+        return found
+
+    def _filled(self, text: str) -> str:
+        """Variables are filled in from the innermost outwards, as in ``${${NAME}_SOURCE_DIR}``."""
+
+        def value(match: re.Match[str]) -> str:
+            name = f"ENV{{{match[2]}}}" if match[1] else match[2]
+            return self._known.get(name, "").replace("\\", "\\\\").replace("$", "\\$")
+
+        count = 1
+        while count:
+            text, count = _VARIABLE.subn(value, text)
+        return re.sub(r"\\(.)", r"\1", text, flags=re.DOTALL)
+
+    # --- what decides which commands run
+
+    def _if(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        holds = self._holds(node, file)
+        taken = False
+        for each in node.body:
+            if each.name in ("else", "elseif"):
+                taken = taken or holds
+                holds = not taken and (each.name == "else" or self._holds(each, file))
+            elif holds:
+                yield from self._run([each], file)
+
+    def _holds(self, node: Node, file: Path) -> bool:
+        words = [Word(text, word.quoted) for word in node.words for text in self._arguments([word])]
+        try:
+            return _Condition(words, self._known, self._folder).value()
+        except (ValueError, re.error) as error:
+            raise BuildError(str(file), node.line, f"{node.name}(): {error}") from error
+
+    def _foreach(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        for item in self._loop_items(arguments[1:]):
+            self._known[arguments[0]] = item
+            try:
+                yield from self._run(node.body, file)
+            except _Leave as leave:
+                if str(leave) == "return":
+                    raise
+                if str(leave) == "break":
+                    break
+
+    def _loop_items(self, words: list[str]) -> list[str]:
+        """What a loop runs over: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
+        if words[:1] == ["RANGE"]:
+            numbers = [int(word) for word in words[1:] if word.isdigit()]
+            start, stop, step = (0, *numbers, 1) if len(numbers) == 1 else (*numbers, 1, 1, 1)[:3]
+            return [str(number) for number in range(start, stop + 1, step or 1)]
+        if words[:1] != ["IN"]:
+            return words
+        given = keyword_arguments(tuple(words[1:]), frozenset(["LISTS", "ITEMS", "ZIP_LISTS"]))
+        lists = [item for name in given.get("LISTS", []) for item in _items(self._known.get(name, ""))]
+        return [*lists, *given.get("ITEMS", [])]
+
+    def _leave(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        raise _Leave(node.name)
+
+    def _define(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        if arguments:
+            self._macros[arguments[0].lower()] = _Macro(arguments[1:], node.body, file)
+        yield from ()
+
+    def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
+        macro = self._macros[name]
+        values = {
+            **dict(zip(macro.parameters, arguments, strict=False)),
+            **{f"ARGV{number}": value for number, value in enumerate(arguments)},
+            "ARGV": ";".join(arguments),
+            "ARGN": ";".join(arguments[len(macro.parameters) :]),
+            "ARGC": str(len(arguments)),
+        }
+        before = {key: self._known.get(key, "") for key in values}
+        self._known.update(values)
+        yield from self._body(macro.body, macro.file)
+        self._known.update(before)
+
+    def _include(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        """A file of the package; a module of CMake's own is left out."""
+        for name in arguments[:1]:
+            folders = [self._folder, *map(Path, _items(self._known.get("CMAKE_MODULE_PATH", "")))]
+            paths = [folder / f"{name}{ending}" for folder in folders for ending in ("", ".cmake")]
+            for path in filter(Path.is_file, paths):
+                self._known["CMAKE_CURRENT_LIST_DIR"] = path.parent.as_posix()
+                yield from self.file(path)
+                self._known["CMAKE_CURRENT_LIST_DIR"] = file.parent.as_posix()
+                break
+
+    def _subdirectory(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+        for name in arguments[:1]:
+            folder = self._folder / name
+            if not (folder / "CMakeLists.txt").is_file():
+                raise BuildError(
+                    str(file), node.line, f"add_subdirectory({name}): there is no {folder / 'CMakeLists.txt'}"
+                )
+            places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())
+            below = _Run(folder, {**self._known, **places}, self._macros, self._depth)
+            yield from below.file(folder / "CMakeLists.txt")
+
+    # --- what sets variables
+
+    def _project(self, arguments: list[str]) -> None:
+        for name in arguments[:1]:
+            place = self._folder.as_posix()
+            self._known.update(
+                {"PROJECT_NAME": name, "PROJECT_SOURCE_DIR": place, f"{name}_SOURCE_DIR": place}
+            )
+            if "CMAKE_PROJECT_NAME" not in self._known:
+                self._known["CMAKE_PROJECT_NAME"] = name
+
+    def _set(self, arguments: list[str]) -> None:
+        name, values = (*arguments[:1], "")[0], arguments[1:]
+        if "CACHE" in values and name in self._known and "FORCE" not in values:
+            return
+        ends = [values.index(word) for word in ("CACHE", "PARENT_SCOPE") if word in values]
+        self._known[name] = ";".join(values[: min(ends, default=len(values))])
+
+    def _unset(self, arguments: list[str]) -> None:
+        for name in arguments[:1]:
+            self._known.pop(name, None)
+
+    def _option(self, arguments: list[str]) -> None:
+        for name in arguments[:1]:
+            self._known.setdefault(name, (*arguments[2:], "OFF")[0])
+
+    def _list(self, arguments: list[str]) -> None:
+        verb, name, *words = (*arguments, "", "")[: max(2, len(arguments))]
+        items = _items(self._known.get(name, ""))
+        change = _LIST_VERBS.get(verb)
+        if verb == "LENGTH" and words:
+            self._known[words[0]] = str(len(items))
+        elif change:
+            self._known[name] = ";".join(change(items, words))
+
+    def _string(self, arguments: list[str]) -> None:
+        verb, *words = (*arguments, "")[: max(1, len(arguments))]
+        if verb in ("TOLOWER", "TOUPPER") and len(words) == 2:
+            self._known[words[1]] = words[0].lower() if verb == "TOLOWER" else words[0].upper()
+        elif verb == "REPLACE" and len(words) > 3:
+            self._known[words[2]] = "".join(words[3:]).replace(words[0], words[1])
+        elif verb == "REGEX" and words[:1] == ["REPLACE"] and len(words) > 4:
+            self._known[words[3]] = re.sub(words[1], words[2], "".join(words[4:]))
+        elif verb == "CONCAT" and words:
+            self._known[words[0]] = "".join(words[1:])
+        elif verb == "APPEND" and words:
+            self._known[words[0]] = self._known.get(words[0], "") + "".join(words[1:])
+
+    def _file(self, arguments: list[str]) -> None:
+        """``file(GLOB NAME pattern ...)``, ``GLOB_RECURSE``."""
+        if len(arguments) < 2 or arguments[0] not in ("GLOB", "GLOB_RECURSE"):
+            return
+        words = [word for word in arguments[2:] if word != "CONFIGURE_DEPENDS"]
+        base = None
+        for flag in ("LIST_DIRECTORIES", "RELATIVE"):
+            if flag in words:
+                index = words.index(flag)
+                base = self._folder / "".join(words[index + 1 : index + 2]) if flag == "RELATIVE" else base
+                del words[index : index + 2]
+        found: list[Path] = []
+        for pattern in words:
+            path = self._folder / pattern
+            # A package's own folder may hold signs that mean something in a pattern.
+            top = self._folder if path.is_relative_to(self._folder) else Path(path.anchor)
+            *folders, last = path.relative_to(top).parts or ("*",)
+            if arguments[0] == "GLOB":
+                found += top.glob("/".join([*folders, last]))
+            elif top == self._folder:
+                # Below what nobody set, `${NOBODY}/*`, lies the whole disk.
+                found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
+        names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
+        self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
+
+    def _find_package(self, arguments: list[str]) -> None:
+        """What a package asks for without a way out counts as found: who builds it is told what is missing."""
+        if "REQUIRED" in arguments or _HERE & {*arguments[:1]}:
+            self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
+
+    def _filename(self, arguments: list[str]) -> None:
+        """``get_filename_component(NAME file what)``."""
+        if len(arguments) > 2:
+            path = self._folder / arguments[1]
+            parts = {
+                "NAME": path.name,
+                "NAME_WE": path.name.split(".")[0],
+                "EXT": "".join(path.suffixes),
+                **dict.fromkeys(("DIRECTORY", "PATH"), Path(arguments[1]).parent.as_posix()),
+                **dict.fromkeys(("ABSOLUTE", "REALPATH"), path.resolve().as_posix()),
+            }
+            self._known[arguments[0]] = parts.get(arguments[2], "")
+
+
+def _filtered(items: list[str], words: list[str]) -> list[str]:
+    """``list(FILTER items INCLUDE|EXCLUDE REGEX pattern)``."""
+    keep = words[:1] == ["INCLUDE"]
+    return [item for item in items if bool(re.search(words[-1], item)) is keep] if words else items
+
+
+_LIST_VERBS: dict[str, Callable[[list[str], list[str]], list[str]]] = {
+    "APPEND": operator.add,
+    "PREPEND": lambda items, words: words + items,
+    "REMOVE_ITEM": lambda items, words: [item for item in items if item not in words],
+    "REMOVE_DUPLICATES": lambda items, words: list(dict.fromkeys(items)),
+    "SORT": lambda items, words: sorted(items),
+    "REVERSE": lambda items, words: items[::-1],
+    "FILTER": _filtered,
+}
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def _version(text: str) -> list[int]:
+    numbers = [int(part) for part in re.findall(r"\d+", text)]
+    while numbers and not numbers[-1]:
+        numbers.pop()
+    return numbers
+
+
+_COMPARE: dict[str, Callable[[str, str], bool]] = {
+    "MATCHES": lambda left, right: bool(re.search(right, left)),
+    # What a build makes is not there: CMake, too, then says that it must be made.
+    "IS_NEWER_THAN": lambda left, right: True,
+    **{
+        prefix + name: lambda left, right, read=read, test=test: test(read(left), read(right))  # type: ignore[misc]
+        for prefix, read in (("", _number), ("STR", str), ("VERSION_", _version))
+        for name, test in (
+            ("EQUAL", operator.eq),
+            ("LESS", operator.lt),
+            ("GREATER", operator.gt),
+            ("LESS_EQUAL", operator.le),
+            ("GREATER_EQUAL", operator.ge),
+        )
+    },
+}
+
+
+_OPERATORS = {Word(text) for text in (*_COMPARE, "IN_LIST", "AND", "OR", ")")}
+
+
+class _Condition:
+    """``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``."""
+
+    def __init__(self, words: Sequence[Word], known: Mapping[str, str], folder: Path) -> None:
+        self._words = words
+        self._next = 0
+        self._known = known
+        self._tests: dict[str, Callable[[str], bool]] = {
+            "DEFINED": lambda name: name in known,
+            "EXISTS": lambda name: bool(name) and (folder / name).exists(),
+            "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
+            "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
+            "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
+            # Targets are made of what is generated; commands and policies are CMake's, which has them.
+            "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
+            "COMMAND": lambda name: True,
+            "POLICY": lambda name: True,
+        }
+
+    def value(self) -> bool:
+        result = self._any()
+        if self._next < len(self._words):
+            raise ValueError(f"AND or OR is expected instead of [{self._words[self._next].text}]")
+        return result
+
+    def _any(self) -> bool:
+        # CMake takes AND and OR from left to right, neither before the other.
+        result = self._one()
+        while self._next < len(self._words):
+            if self._took("AND"):
+                result = self._one() and result
+            elif self._took("OR"):
+                result = self._one() or result
+            else:
+                break
+        return result
+
+    def _one(self) -> bool:
+        if self._took("NOT"):
+            return not self._one()
+        if self._took("("):
+            result = self._any()
+            if not self._took(")"):
+                raise ValueError("a bracket is not closed")
+            return result
+        for name, test in self._tests.items():
+            if self._next + 1 < len(self._words) and self._took(name):
+                return test(self._word().text)
+        left = self._word()
+        for name, compare in _COMPARE.items():
+            if self._took(name):
+                return compare(self._value(left), self._value(self._word()))
+        if self._took("IN_LIST"):
+            return self._value(left) in _items(self._known.get(self._word().text, ""))
+        if _TRUE.match(left.text) or _FALSE.match(left.text):
+            # These words mean themselves, whatever a variable of that name holds.
+            return bool(_TRUE.match(left.text))
+        return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
+
+    def _value(self, word: Word) -> str:
+        """A word without quotes may be the name of a variable."""
+        return word.text if word.quoted else self._known.get(word.text, word.text)
+
+    def _word(self) -> Word:
+        # What is empty leaves no word: `if(${NOBODY} STREQUAL "x")`.
+        if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
+            return Word("", True)
+        self._next += 1
+        return self._words[self._next - 1]
+
+    def _took(self, text: str) -> bool:
+        if self._next >= len(self._words) or self._words[self._next] != Word(text):
+            return False
+        self._next += 1
+        return True
