@@ -54,6 +54,10 @@ class Identity:
             self._name = names.join(self.environment.namespace, _UNNAMED)
         return self._name
 
+    def be_called(self, name: str) -> None:
+        """Go by a global name until :meth:`take_name`."""
+        self._name = name
+
     def resolve(self, name: str, caller_id: str | None = None) -> str:
         """The global name of ``name`` as this node, or the node ``caller_id``, sees it."""
         node_name = caller_id or self.name

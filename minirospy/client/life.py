@@ -66,9 +66,9 @@ class Life:
         self.lock = threading.RLock()
         self.listeners: dict[int, Listener] = {}
         """By the identifiers of threads."""
-        self._begin()
+        self.begin_new_life()
 
-    def _begin(self) -> None:
+    def begin_new_life(self) -> None:
         """Nothing has happened yet, and nobody has heard of anything."""
         self.shutting_down = SignalSafeEvent()
         """Set once the shutdown hooks have run: every blocking call ends."""
@@ -81,7 +81,8 @@ class Life:
         self.listeners.clear()
         self._thread = threading.local()
         self._begun = False
-        self._hooks: list[Callable[[], object]] = []
+        self.hooks: list[Callable[[], object]] = []
+        """What on_shutdown has been given."""
         self._hooks_before: list[Callable[[object], object]] = []
         self._hooks_after: list[Callable[[object], object]] = []
         self._interrupts: list[Callable[[], object]] = []
@@ -90,7 +91,7 @@ class Life:
 
     def on_shutdown(self, hook: Callable[[], object]) -> None:
         """Call ``hook`` when the node shuts down, before it leaves the graph. Raises TypeError."""
-        self._add_hook(self._hooks, hook, ())
+        self._add_hook(self.hooks, hook, ())
 
     def before_shutdown(self, hook: Callable[[object], object]) -> None:
         """Call ``hook(reason)`` after the hooks of :meth:`on_shutdown`, still before is_shutdown() is true."""
@@ -108,7 +109,7 @@ class Life:
             self.is_leaving = self._begun = True
         _log.debug("signal_shutdown [%s]", reason)
         try:
-            self._run_hooks(self._hooks, ())
+            self._run_hooks(self.hooks, ())
             self._run_hooks(self._hooks_before, (reason,))
             with self.lock:
                 # A hook that comes from now on is called at once.
@@ -201,7 +202,7 @@ class Life:
         """This process is a copy, with one thread and a life of its own. The hooks are for the parent's end."""
         was_down = self.is_shutdown()
         self.lock = threading.RLock()
-        self._begin()
+        self.begin_new_life()
         if was_down:
             self.shutting_down.set()
 

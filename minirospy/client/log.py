@@ -24,13 +24,13 @@ from minirospy.clock import SimulatedClock
 
 if TYPE_CHECKING:
     from minirospy.client.process import NodeProcess
-    from minirospy.client.topics import Publisher
 
 __all__ = [
     "DEBUG",
     "ERROR",
     "FATAL",
     "INFO",
+    "PYTHON_LEVELS",
     "WARN",
     "RosOutHandler",
     "RosStreamHandler",
@@ -62,7 +62,7 @@ __all__ = [
 DEBUG, INFO, WARN, ERROR, FATAL = 1, 2, 4, 8, 16
 """The levels of rosgraph_msgs/Log, as ``init_node(log_level=...)`` takes them."""
 
-_PYTHON_LEVEL = {
+PYTHON_LEVELS = {
     DEBUG: logging.DEBUG,
     INFO: logging.INFO,
     WARN: logging.WARNING,
@@ -76,7 +76,7 @@ _LEVEL_NAME = {
     logging.ERROR: "ERROR",
     logging.CRITICAL: "FATAL",
 }
-_ROS_LEVEL = {python: ros for ros, python in _PYTHON_LEVEL.items()}
+_ROS_LEVEL = {python: ros for ros, python in PYTHON_LEVELS.items()}
 _COLOUR = {
     logging.DEBUG: "\033[32m",
     logging.WARNING: "\033[33m",
@@ -122,7 +122,7 @@ def configure(node: NodeProcess, log_level: int | None, log_file: str | None) ->
     ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
     written or read is told of in one line. Raises ValueError on a log level that is none of rospy's.
     """
-    if log_level is not None and log_level not in _PYTHON_LEVEL:
+    if log_level is not None and log_level not in PYTHON_LEVELS:
         raise ValueError(
             f"log_level [{log_level}] is none of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
         )
@@ -135,16 +135,16 @@ def configure(node: NodeProcess, log_level: int | None, log_file: str | None) ->
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not _configured_by_file(node):
         _rosout.setLevel(logging.INFO)
-        _rosout.addHandler(RosStreamHandler())
-        _log_to_file(path)
+        _add_handler(node, _rosout, RosStreamHandler())
+        _log_to_file(node, path)
     if log_level is not None:
-        _rosout.setLevel(_PYTHON_LEVEL[log_level])
+        _rosout.setLevel(PYTHON_LEVELS[log_level])
     # Our own library speaks through the same lines, where something is wrong.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    ours.addHandler(terminal)
+    _add_handler(node, ours, terminal)
     if path.parent.parent == node.environment.log_dir:
         _link_latest(path.parent)
 
@@ -159,14 +159,16 @@ def start(node: NodeProcess, *, rosout: bool) -> None:
 
 def _start_rosout(node: NodeProcess) -> None:
     """Publish log lines to /rosout."""
-    from rosgraph_msgs.msg import Log
-
     from minirospy.client.params import get_param
-    from minirospy.client.topics import Publisher
 
     tell_topics = not get_param("/rosout_disable_topics_generation", False)
-    publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
-    _rosout.addHandler(RosOutHandler(node, publisher, tell_topics=tell_topics))
+    _add_handler(node, _rosout, RosOutHandler(tell_topics=tell_topics))
+
+
+def _add_handler(node: NodeProcess, logger: logging.Logger, handler: logging.Handler) -> None:
+    """Have ``logger`` write by ``handler``, until the process becomes another node."""
+    logger.addHandler(handler)
+    node.before_new_life.append(lambda: logger.removeHandler(handler))
 
 
 def _offer_logger_services() -> None:
@@ -241,32 +243,36 @@ class RosStreamHandler(logging.Handler):
 
 
 class RosOutHandler(logging.Handler):
-    """Log records to /rosout (http://wiki.ros.org/rosout)."""
+    """Log records to /rosout (http://wiki.ros.org/rosout); for a logger of the program's own, too."""
 
-    def __init__(self, node: NodeProcess, publisher: Publisher[Any], *, tell_topics: bool = True) -> None:
-        super().__init__()
-        self._node = node
-        self._publisher = publisher
+    def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
+        """``tell_topics``: say what the node publishes in each line."""
+        from rosgraph_msgs.msg import Log
+
+        from minirospy.client.topics import Publisher
+
+        super().__init__(level)
+        self._publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
         self._tell_topics = tell_topics
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Publish one record, unless publishing itself is what logs."""
-        if getattr(self._busy, "yes", False) or self._node.is_shutdown():
+        if getattr(self._busy, "yes", False) or not process.initialized or process.is_shutdown():
             return
         self._busy.yes = True
         try:
             message = self._publisher.data_class()
             stamp = message.header.stamp
-            stamp.secs, stamp.nsecs = divmod(self._node.clock.now(), 10**9)
+            stamp.secs, stamp.nsecs = divmod(process.clock.now(), 10**9)
             message.level = _ROS_LEVEL[_known_level(record.levelno)]
-            message.name = self._node.name
+            message.name = process.name
             message.msg = _message(record)
             message.file = record.filename
             message.function = record.funcName or ""
             message.line = record.lineno
-            if self._tell_topics and self._node.node:
-                message.topics = list(self._node.node.publications)
+            if self._tell_topics and process.node:
+                message.topics = list(process.node.publications)
             self._publisher.publish(message)
         except Exception as error:  # noqa: BLE001 - a log line must never stop the program that logs
             print(f"Unable to report rosout: {error}", file=sys.stderr)
@@ -300,7 +306,7 @@ def _configured_by_file(node: NodeProcess) -> bool:
     return False
 
 
-def _log_to_file(path: Path) -> None:
+def _log_to_file(node: NodeProcess, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
     from logging.handlers import RotatingFileHandler
 
@@ -321,7 +327,7 @@ def _log_to_file(path: Path) -> None:
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
-    root.addHandler(file)
+    _add_handler(node, root, file)
 
 
 def _is_not_ours(record: logging.LogRecord) -> bool:

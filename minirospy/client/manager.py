@@ -1,12 +1,13 @@
-"""The topics of this node, as rospy.impl.registration.get_topic_manager() tells of them."""
+"""The topics and services of this node, as rospy.impl.registration tells of them."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from minirospy.client.process import process
+from minirospy.client.services import Service
 
-__all__ = ["Registration", "TopicManager", "get_topic_manager"]
+__all__ = ["Registration", "ServiceManager", "TopicManager", "get_service_manager", "get_topic_manager"]
 
 
 class Registration:
@@ -55,6 +56,23 @@ class TopicManager:
         from minirospy.runtime.slave import SlaveApi
 
         return list(getattr(SlaveApi(process.node), method)(process.name)[2])
+
+
+class ServiceManager:
+    """Tells what services this node offers."""
+
+    def get_services(self) -> list[tuple[str, Any]]:
+        """The name and the URI of each."""
+        return [(name, service.uri) for name, service in list(process.offered.items())]
+
+    def get_service(self, resolved_service_name: str) -> Service[Any] | None:
+        """The service of this name; None where this node does not offer it."""
+        return process.offered.get(resolved_service_name)
+
+
+def get_service_manager() -> ServiceManager:
+    """The one of this process."""
+    return ServiceManager()
 
 
 def get_topic_manager() -> TopicManager:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import re
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -12,10 +13,14 @@ from minirospy.client.process import process
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 
 __all__ = [
+    "UNSPECIFIED",
+    "KeptParameters",
+    "Unspecified",
     "delete_param",
     "get_param",
     "get_param_cached",
     "get_param_names",
+    "get_param_server_cache",
     "has_param",
     "search_param",
     "set_param",
@@ -25,11 +30,11 @@ _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _T = TypeVar("_T")
 
 
-class _Unspecified:
+class Unspecified:
     """The default of ``default``: None is a value that a caller may want back."""
 
 
-_UNSPECIFIED = _Unspecified()
+UNSPECIFIED = Unspecified()
 
 
 class MasterGoneError(ROSException, ConnectionRefusedError):
@@ -39,7 +44,7 @@ class MasterGoneError(ROSException, ConnectionRefusedError):
         return str(self.args[0])
 
 
-def get_param(param_name: str, default: Any = _UNSPECIFIED) -> Any:
+def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
     """A parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
@@ -48,12 +53,12 @@ def get_param(param_name: str, default: Any = _UNSPECIFIED) -> Any:
     value = _get(process.resolve(param_name))
     if value is not KeyError:
         return _as_rospy(value)
-    if default is _UNSPECIFIED:
+    if default is UNSPECIFIED:
         raise KeyError(param_name)
     return default
 
 
-def get_param_cached(param_name: str, default: Any = _UNSPECIFIED) -> Any:
+def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
     """The same, without asking the master each time: it tells of changes. Before init_node, no different."""
     name = process.resolve(param_name)
     cache, node = process.parameters, process.node
@@ -71,7 +76,7 @@ def get_param_cached(param_name: str, default: Any = _UNSPECIFIED) -> Any:
             cache.store(name, value, changes)
     if value is not KeyError:
         return _as_rospy(copy.deepcopy(value))
-    if default is _UNSPECIFIED:
+    if default is UNSPECIFIED:
         raise KeyError(param_name)
     return default
 
@@ -131,6 +136,41 @@ def search_param(param_name: str) -> str | None:
 def get_param_names() -> list[str]:
     """The names of all parameters. Raises ROSException."""
     return _ask("list", "/", process.master.get_param_names)
+
+
+class KeptParameters:
+    """What get_param_cached keeps, for a program that looks into it, or listens for what the master tells of it.
+
+    Such a program may put a function of its own in the place of :meth:`update`.
+    """
+
+    def __init__(self) -> None:
+        self._notifier: Callable[[str, Any], object] | None = None
+        process.parameter_listeners.append(self._told)
+
+    def get(self, key: str) -> Any:
+        """A parameter that get_param_cached was asked for before. Raises KeyError."""
+        if process.node is None or process.resolve(key) not in process.node.parameters:
+            raise KeyError(key)
+        return get_param_cached(key)
+
+    def set_notifier(self, notifier: Callable[[str, Any], object] | None) -> None:
+        """Call ``notifier(key, value)`` when the master tells of a change; a deleted one has the value {}."""
+        self._notifier = notifier
+
+    def update(self, key: str, value: Any) -> None:
+        """The master has told of a change."""
+        if self._notifier:
+            self._notifier(key, value)
+
+    def _told(self, key: str, value: Any) -> None:
+        self.update(key, value)
+
+
+@functools.cache
+def get_param_server_cache() -> KeptParameters:
+    """The one of this process."""
+    return KeptParameters()
 
 
 def _get(name: str) -> Any:

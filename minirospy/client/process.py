@@ -60,7 +60,12 @@ class NodeProcess(Identity, Life):
         self.published: dict[str, Published] = {}
         self.subscribed: dict[str, Subscribed] = {}
         self.offered: dict[str, Service[Any]] = {}
-        self._init_arguments: tuple[object, ...] | None = None
+        self.init_arguments: tuple[object, ...] | None = None
+        """What init_node was called with; None before."""
+        self.parameter_listeners: list[Callable[[str, Any], object]] = []
+        """Called with the name and the value of each parameter that the master tells of."""
+        self.before_new_life: list[Callable[[], object]] = []
+        """What takes back what init_node has set up in the process."""
         self._loop: LoopThread | None = None
         self._made: Node | None = None
         """The node, from before it is ready."""
@@ -99,6 +104,11 @@ class NodeProcess(Identity, Life):
         except LoopClosedError as error:
             self.tell_shutdown()
             raise self.interrupted("rospy shutdown") from error
+
+    def _told_of_parameter(self, key: str, value: Any) -> None:
+        self.parameter_changed(key)
+        for listener in self.parameter_listeners:
+            listener(key, value)
 
     def post(self, function: Callable[..., object], *args: object) -> None:
         """Call ``function`` on the node's loop soon."""
@@ -145,11 +155,11 @@ class NodeProcess(Identity, Life):
             raise ValueError("namespaces are not allowed in node names")
         argv = list(sys.argv if argv is None else argv)
         given = (name, argv, anonymous, log_level, disable_rostime, disable_signals)
-        if self._init_arguments is not None:
-            if self._init_arguments != given:
+        if self.init_arguments is not None:
+            if self.init_arguments != given:
                 raise ROSException(
                     "rospy.init_node() has already been called with different arguments: "
-                    + str(self._init_arguments)
+                    + str(self.init_arguments)
                 )
             return
         if not names.is_legal_base_name(name):
@@ -157,10 +167,13 @@ class NodeProcess(Identity, Life):
                 f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
                 stacklevel=3,
             )
-        self._init_arguments = given
+        self.init_arguments = given
         self.take_name(name, argv, anonymous)
         parameters = private_parameters(self.arguments)
 
+        for take_back in self.before_new_life:
+            take_back()
+        self.before_new_life.clear()
         self.signals.end_quietly()
         if not disable_signals:
             self.signals.take()
@@ -179,7 +192,7 @@ class NodeProcess(Identity, Life):
             self.name,
             self.environment,
             on_shutdown=self._asked_to_shut_down,
-            on_parameter=lambda key, _: self.parameter_changed(key),
+            on_parameter=self._told_of_parameter,
         )
         node.when_registered_again.append(self._forget_parameters)
         atexit.register(self._at_exit)
@@ -192,7 +205,7 @@ class NodeProcess(Identity, Life):
         for key, value in parameters.items():
             self.master.set_param(names.resolve("~" + key, self.name), value)
         if not disable_rostime:
-            self._start_clock()
+            self.start_clock()
         self.has_time = True
         with self.lock:
             self.node = node
@@ -200,6 +213,16 @@ class NodeProcess(Identity, Life):
         for function in waiting:
             function()
         log.start(self, rosout=not disable_rosout)
+
+    def begin_again(self) -> None:
+        """Once the node has left the graph, init_node may make another. Before, and without a node, without effect.
+
+        What the program made for the old node, such as its publishers, stays with that.
+        """
+        if not self.gone.is_set() or self.signals.is_ended:
+            return
+        self._forget_node()
+        self.begin_new_life()
 
     # --- ending
 
@@ -251,13 +274,17 @@ class NodeProcess(Identity, Life):
         """
         for publication in self.node.publications.values() if self.node else ():
             publication.links = ()
-        self.node = self._made = self._loop = self._master = self._init_arguments = None
         self._is_forked = True
-        self.published, self.subscribed = {}, {}
-        self._waiting_for_node = []
-        self.forget_name()
+        self._forget_node()
         self.begin_life_in_fork()
         self.signals.begin_in_fork()
+
+    def _forget_node(self) -> None:
+        self.node = self._made = self._loop = self._master = self.init_arguments = None
+        self.published, self.subscribed, self.offered = {}, {}, {}
+        self.parameters = ParameterCache()
+        self._waiting_for_node = []
+        self.forget_name()
 
     def _at_exit(self) -> None:
         """The program has ended. Where another thread shuts down, let it take the node out of the graph first."""
@@ -308,7 +335,8 @@ class NodeProcess(Identity, Life):
             for key in keys:
                 self.parameter_changed(key)
 
-    def _start_clock(self) -> None:
+    def start_clock(self) -> None:
+        """Go by /clock where the master says so. Raises ROSInitException where it says nothing."""
         try:
             simulated = self.master.has_param("/use_sim_time") and self.master.get_param("/use_sim_time")
         except RpcError as error:

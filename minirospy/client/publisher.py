@@ -129,7 +129,8 @@ class Published(Shared):
         super().__init__(topic, data_class)
         self.publication = Publication(topic, interface_type(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Any]] = set()
-        self._listeners: list[SubscribeListener] = []
+        self.subscriber_listeners: list[SubscribeListener] = []
+        """Who is told of subscribers; a program may add and remove."""
         self._events: InOrder | None = None
         self._waiting: list[Callable[[], None]] = []
         self._was_heard = False
@@ -157,7 +158,7 @@ class Published(Shared):
             )
         self._handles.add(handle)
         if listener:
-            self._listeners.append(listener)
+            self.add_subscriber_listener(listener)
         publication.queue_size = queue_size
         publication.latch = publication.latch or latch
         publication.tcp_nodelay = publication.tcp_nodelay or tcp_nodelay
@@ -174,11 +175,29 @@ class Published(Shared):
     def leave(self, handle: Publisher[Any]) -> None:
         with process.lock:
             self._handles.discard(handle)
-            is_last = not self._handles
+            # A process that has forked, or is another node by now, has forgotten it.
+            is_last = not self._handles and process.published.get(self.resolved_name) is self
             if is_last:
-                del process.published[self.publication.topic]
+                del process.published[self.resolved_name]
         if is_last and process.node and not process.is_shutdown():
             unregister_from_master(process.node.unadvertise(self.publication))
+
+    @property
+    def is_latch(self) -> bool:
+        """Whether who joins later gets the last message; may be changed."""
+        return self.publication.latch
+
+    @is_latch.setter
+    def is_latch(self, value: bool) -> None:
+        self.publication.latch = value
+
+    def enable_latch(self) -> None:
+        """Give who joins later the last message."""
+        self.is_latch = True
+
+    def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
+        """Have ``l`` told of subscribers that come and go from now on."""
+        self.subscriber_listeners.append(l)
 
     def check_initialized(self) -> None:
         """Raise ROSException before init_node."""
@@ -223,6 +242,10 @@ class Published(Shared):
         """The links to subscribers."""
         return self.publication.links
 
+    def has_connection(self, endpoint_id: str) -> bool:
+        """Whether the node of this name is connected."""
+        return any(link.peer == endpoint_id for link in self.connections)
+
     def _tell_unheard(self) -> None:
         """The first message went to nobody: worth a warning only where somebody wants it, and is on the way.
 
@@ -260,7 +283,7 @@ class Published(Shared):
         self._was_heard = True
         for look in list(self._waiting):
             look()
-        if not self._listeners or not process.node:
+        if not self.subscriber_listeners or not process.node:
             return
         if self._events is None:
             self._events = InOrder(process.node.workers)
@@ -274,7 +297,7 @@ class Published(Shared):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
-        for listener in self._listeners:
+        for listener in list(self.subscriber_listeners):
             if is_up:
                 self._events.start(listener.peer_subscribe, topic, publish_to_all, publish_to_peer)
             else:

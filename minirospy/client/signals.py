@@ -11,7 +11,8 @@ import logging
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from opcode import opname
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -22,6 +23,9 @@ from minirospy.errors import ROSInterruptException
 __all__ = ["Signals"]
 
 _ENDING = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+_TURNED_BACK_AT_MOST = 5
+_OWN = "minirospy.client."
+_TURNS = ("RESUME", "JUMP", "POP_JUMP")
 
 
 class Signals:
@@ -33,6 +37,7 @@ class Signals:
         self._is_inherited = False
         self._left_to_system: list[int] = []
         self._count = 0
+        self._turned_back = 0
         self._watch: EndWatch | None = None
         self._is_sending: Callable[[FrameType | None], bool] = lambda _: False
         self.late = 0
@@ -104,7 +109,7 @@ class Signals:
             if before == signal.SIG_DFL and signal.getsignal(number) == self._on_signal:
                 signal.signal(number, signal.SIG_DFL)
                 self._left_to_system.append(number)
-        self._count = self.late = 0
+        self._count = self._turned_back = self.late = 0
         if self._watch:
             self._watch.let_go()
             self._watch = None
@@ -127,6 +132,24 @@ class Signals:
             error = error.__context__ if isinstance(error, RuntimeError) else None
         return False
 
+    def _is_too_early(self, frame: FrameType | None) -> bool:
+        """Whether the program has just asked its own flag, and is about to act on the answer.
+
+        A hook that takes its hardware away at this moment would be a traceback. So a signal that comes at the turn of a
+        loop or at the first step of a function, where Python runs handlers, waits a moment for a better place.
+        """
+        if frame is None or self._life.is_shutdown_requested or self._turned_back >= _TURNED_BACK_AT_MOST:
+            return False
+        inside = list(_stack(frame))
+        # The watch may be so quick that the handler which turned back has not returned yet. A call of rospy's is a good
+        # place.
+        too_early = Signals._on_signal.__code__ in [each.f_code for each in inside] or (
+            _is_at_turn(frame)
+            and not any(each.f_globals.get("__name__", "").startswith(_OWN) for each in inside)
+        )
+        self._turned_back += too_early
+        return too_early
+
     def _watching(self) -> EndWatch:
         if self._watch is None:
             self._watch = EndWatch(self._life, lambda: self.late)
@@ -134,7 +157,7 @@ class Signals:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         watch = self._watching()
-        if self._is_sending(frame) or _is_logging(frame):
+        if self._is_sending(frame) or _is_logging(frame) or self._is_too_early(frame):
             # A hook that publishes, or logs, would need what this very thread holds. publish() takes the signal when it
             # has sent, loginfo() when it has written; for all others the watch sends it again. A loop that only
             # publishes is nearly always caught in the sending: the watch alone would try for seconds.
@@ -151,6 +174,9 @@ class Signals:
             signal.raise_signal(number)
             return
         if isinstance(order, BaseException):
+            if isinstance(order, ROSInterruptException) and self._life.knows_of_shutdown():
+                # It has heard while the order was on its way: what would be interrupted now is its clean-up.
+                return
             self._life.listener().knows = True
             self._life.told_at = where(frame)
             raise order
@@ -170,8 +196,15 @@ class Signals:
 
 def _is_logging(frame: FrameType | None) -> bool:
     """Whether the stack at ``frame`` is inside a handler of Python's logging, which writes to what is not re-entrant."""
+    return any(each.f_code is logging.Handler.handle.__code__ for each in _stack(frame))
+
+
+def _is_at_turn(frame: FrameType) -> bool:
+    """Whether the program is at the turn of a loop or begins a function; elsewhere it may be in C code that waits."""
+    return frame.f_lasti <= 0 or opname[frame.f_code.co_code[frame.f_lasti]].startswith(_TURNS)
+
+
+def _stack(frame: FrameType | None) -> Iterator[FrameType]:
     while frame is not None:
-        if frame.f_code is logging.Handler.handle.__code__:
-            return True
+        yield frame
         frame = frame.f_back
-    return False

@@ -75,7 +75,8 @@ class Subscriber(Topic[_M]):
             state.join(self, tcp_nodelay)
         self.impl = state
         process.when_ready(state.register)
-        state.replay(self, latched)
+        if callback is not None:
+            state.replay(data_class, _Callback(callback, callback_args), latched)
 
     def unregister(self) -> None:
         """Stop listening; the connections end with the last Subscriber of the topic in this process."""
@@ -133,6 +134,7 @@ class Subscribed(Shared):
         self.subscription: Subscription | None = None
         self._tcp_nodelay = False
         self._handles: list[Subscriber[Any]] = []
+        self._added: list[_Callback] = []
         self._receivers: tuple[_Receiver, ...] = ()
         self._statistics: StatisticsPublisher | None = None
         self._misfits = Complaints(_log)
@@ -143,6 +145,10 @@ class Subscribed(Shared):
         """The links to publishers."""
         return self.subscription.links if self.subscription else ()
 
+    def has_connection(self, endpoint_id: str) -> bool:
+        """Whether the node with this Slave API is connected."""
+        return any(link.uri == endpoint_id for link in self.connections)
+
     def join(self, handle: Subscriber[Any], tcp_nodelay: bool) -> None:
         self._tcp_nodelay = self._tcp_nodelay or tcp_nodelay
         self._handles.append(handle)
@@ -152,11 +158,39 @@ class Subscribed(Shared):
         with process.lock:
             self._handles.remove(handle)
             self._update()
-            is_last = not self._handles
+            is_last = not self._handles and process.subscribed.get(self.resolved_name) is self
             if is_last:
                 del process.subscribed[self.resolved_name]
         if is_last and process.node and self.subscription and not process.is_shutdown():
             unregister_from_master(process.node.unsubscribe(self.subscription))
+
+    def add_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
+        """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
+        callback = _Callback(cb, cb_args)
+        with process.lock:
+            latched = self.latched()
+            self._added.append(callback)
+            self._update()
+        self.replay(self.data_class, callback, latched)
+
+    def remove_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
+        """Call ``cb`` no more, which add_callback or a Subscriber was given. Raises KeyError."""
+        with process.lock:
+            if (callback := _Callback(cb, cb_args)) in self._added:
+                self._added.remove(callback)
+            else:
+                self._handle_with(callback).callback = None
+            self._update()
+
+    def set_queue_size(self, queue_size: int | None) -> None:
+        """Keep so many messages, as a Subscriber's ``queue_size`` has it."""
+        with process.lock:
+            for handle in self._handles:
+                handle._newest = max(0, queue_size or 0)
+            self._update()
+
+    def set_buff_size(self, buff_size: int) -> None:
+        """Accepted and not needed, as a Subscriber's ``buff_size``."""
 
     def register(self) -> None:
         """Tell the master, once."""
@@ -199,6 +233,7 @@ class Subscribed(Shared):
             callbacks = by_class.setdefault(handle.data_class, [])
             if handle.callback is not None:
                 callbacks.append(_Callback(handle.callback, handle.callback_args))
+        by_class.setdefault(self.data_class, []).extend(self._added)
         self._receivers = tuple(
             _Receiver(cls, getattr(cls, "_takes_memoryview", False), tuple(callbacks))
             for cls, callbacks in by_class.items()
@@ -209,14 +244,17 @@ class Subscribed(Shared):
         """The last message of each latched publisher, with the header of its link."""
         return [(link.latched, link.header) for link in self.connections if link.latched is not None]
 
-    def replay(self, handle: Subscriber[Any], latched: list[tuple[Frame, Header]]) -> None:
-        """Give a Subscriber the messages that came before it did."""
-        if handle.callback is None:
-            return
-        callbacks = (_Callback(handle.callback, handle.callback_args),)
-        receiver = _Receiver(handle.data_class, False, callbacks)
+    def replay(self, data_class: type[Any], callback: _Callback, latched: list[tuple[Frame, Header]]) -> None:
+        """Give a callback the messages that came before it did."""
+        receiver = _Receiver(data_class, False, (callback,))
         for frame, header in latched:
             self._deliver(frame, header, (receiver,))
+
+    def _handle_with(self, callback: _Callback) -> Subscriber[Any]:
+        for handle in self._handles:
+            if (handle.callback, handle.callback_args) == callback:
+                return handle
+        raise KeyError("no matching cb")
 
     def _deliver(self, frame: Frame, header: Header, receivers: tuple[_Receiver, ...] | None = None) -> None:
         statistics = None if receivers else self._statistics

@@ -110,7 +110,7 @@ class Rate:
 
     def remaining(self) -> Duration:
         """What is left of this turn."""
-        return Duration(0, self._remaining(process.clock.now()))
+        return self._remaining(get_rostime())
 
     def sleep(self) -> None:
         """Sleep until the turn is over. Raises as :func:`sleep` does."""
@@ -120,7 +120,7 @@ class Rate:
         """The same, and ``stop`` ends it early."""
         now = process.clock.now()
         try:
-            _sleep(self._remaining(now), stop)
+            _sleep(self._left(now), stop)
         except ROSTimeMovedBackwardsException:
             if not self._reset:
                 raise
@@ -132,7 +132,11 @@ class Rate:
         now = process.clock.now()
         self.last_time = _time(now if now - began > 2 * period else began)
 
-    def _remaining(self, now: int) -> int:
+    def _remaining(self, curr_time: times.Time) -> Duration:
+        """What is left of this turn at a time; a Rate of the program's own that sleeps in another way asks for it."""
+        return Duration(0, self._left(curr_time.to_nsec()))
+
+    def _left(self, now: int) -> int:
         if self.last_time.to_nsec() > now:
             # Time jumped back.
             self.last_time = _time(now)
@@ -179,12 +183,22 @@ class Timer(threading.Thread):
         self._callback = callback
         self._oneshot = oneshot
         self._reset = reset
-        self._shutdown = SignalSafeEvent()
+        self._ended = SignalSafeEvent()
         self.start()
+
+    @property
+    def _shutdown(self) -> bool:
+        """Whether it was shut down; programs read it of rospy's, and set it."""
+        return self._ended.is_set()
+
+    @_shutdown.setter
+    def _shutdown(self, value: bool) -> None:
+        if value:
+            self._ended.set()
 
     def shutdown(self) -> None:
         """Call back no more."""
-        self._shutdown.set()
+        self._ended.set()
 
     def run(self) -> None:
         """The timer's thread."""
@@ -193,9 +207,9 @@ class Timer(threading.Thread):
         last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
-        with process.interrupting(self._shutdown.set):
+        with process.interrupting(self._ended.set):
             while not self._is_over():
-                rate._sleep(self._shutdown)
+                rate._sleep(self._ended)
                 if self._is_over():
                     return
                 real = get_rostime()
@@ -208,7 +222,7 @@ class Timer(threading.Thread):
                 expected = expected + self._period
 
     def _is_over(self) -> bool:
-        return self._shutdown.is_set() or process.is_shutdown()
+        return self._ended.is_set() or process.is_shutdown()
 
 
 def follow_clock_topic(clock: SimulatedClock) -> None:

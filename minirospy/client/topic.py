@@ -113,6 +113,10 @@ class Shared:
         """Whether there is a link."""
         return bool(self.connections)
 
+    def has_connection(self, endpoint_id: str) -> bool:
+        """Whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""
+        raise NotImplementedError
+
 
 def interface_type(data_class: type[Any]) -> InterfaceType:
     """What a connection header tells of a message class."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import shutil
 import signal
 import subprocess
@@ -384,11 +385,18 @@ with multiprocessing.get_context("fork").Pool(2) as pool:
     "a node of its own": """
 def own_node():
     child()
+    for inherited in (pub, sub):
+        inherited.unregister()
+    service.shutdown()
     rospy.init_node("own", argv=[])
+    rospy.loginfo("own line")
     heard = threading.Event()
     subscriber = rospy.Subscriber("t", Int32, lambda message: heard.set())
     assert heard.wait(5)
     assert rospy.get_name() == "/own"
+    assert [kind.__name__ for kind in map(type, logging.getLogger("rosout").handlers)] == [
+        "RosStreamHandler", "RosOutHandler"
+    ]
 worker = multiprocessing.get_context("fork").Process(target=own_node)
 worker.start()
 while worker.is_alive():
@@ -404,9 +412,10 @@ assert worker.exitcode == 0
 @pytest.mark.parametrize("how", FORKS)
 def test_a_fork_leaves_the_parents_node_alone(master: str, how: str) -> None:
     script = f"""
-import multiprocessing, os, sys, threading, time
+import logging, multiprocessing, os, sys, threading, time
 import rospy
 from std_msgs.msg import Int32
+from std_srvs.srv import Empty
 
 def child():
     assert rospy.get_name() == "/parent" and not rospy.is_shutdown()
@@ -418,8 +427,9 @@ def child():
 rospy.init_node("parent", argv=[])
 rospy.on_shutdown(lambda: print("hook of", rospy.get_name()))
 heard = []
-rospy.Subscriber("t", Int32, lambda message: heard.append(message.data))
+sub = rospy.Subscriber("t", Int32, lambda message: heard.append(message.data))
 pub = rospy.Publisher("t", Int32, queue_size=10)
+service = rospy.Service("s", Empty, lambda request: {{}})
 while pub.get_num_connections() < 1:
     time.sleep(0.01)
 {FORKS[how]}
@@ -656,3 +666,47 @@ print("ended with", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), rospy.is
 """)
     out, _ = process.communicate("now\n", timeout=8)
     assert out.splitlines() == ["the child's hook", "[True, False]", "ended with 7 False"]
+
+
+def test_another_node_in_the_process_of_one_that_has_shut_down(master: str) -> None:
+    script = """
+import threading
+import rospy
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+for name in ("one", "two"):
+    rospy.init_node(name, argv=[])
+    rospy.on_shutdown(lambda: print("hook"))
+    heard = threading.Event()
+    pub = rospy.Publisher("c", Int32, queue_size=1)
+    sub = rospy.Subscriber("c", Int32, lambda message: heard.set())
+    service = rospy.Service("s", Trigger, lambda request: {"success": True})
+    pub.wait_for_subscribers()
+    pub.publish(1)
+    print(heard.wait(5), rospy.ServiceProxy("s", Trigger)().success, rospy.get_param_cached("/none", 5))
+    rospy.loginfo("once")
+    old = pub
+    rospy.signal_shutdown("")
+    rospy.core._shutdown_flag = False
+    rospy.client._init_node_args = None
+    old.unregister()
+print(rospy.is_shutdown(), rospy.core.is_initialized())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "ROSCONSOLE_FORMAT": "${node} ${message}"},
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
+    )
+    of_one = ["True True 5", "/one once", "hook"]
+    of_two = ["True True 5", "/two once", "hook"]
+    assert (done.returncode, done.stdout.splitlines(), done.stderr) == (
+        0,
+        [*of_one, *of_two, "False False"],
+        "",
+    )
+    assert not is_known(master, "/one")
+    assert not is_known(master, "/two")

@@ -46,6 +46,18 @@ def run(program: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+def test_numbers_of_numpy_and_of_a_programs_own(master: str) -> None:
+    pytest.importorskip("numpy")
+    assert run("""
+import enum, numpy, rospy
+rospy.init_node("case", disable_rosout=True)
+Level = enum.IntEnum("Level", ["LOW", "HIGH"])
+for value in (numpy.float64(2.5), Level.HIGH, {"gain": numpy.float64(1e-9)}, [numpy.str_("a")]):
+    rospy.set_param("/p", value)
+    print(rospy.get_param("/p"))
+""") == ["2.5", "2", "{'gain': 1e-09}", "['a']"]
+
+
 CACHED = """
 import os
 import threading

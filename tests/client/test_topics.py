@@ -180,6 +180,24 @@ print(eventually(lambda: got), got[0].point.y, repr(got[0].header.frame_id))
     assert output == "refused\nTrue 2.0 ''\n"
 
 
+def test_what_numpy_computes_is_a_value(start: Start) -> None:
+    pytest.importorskip("numpy")
+    output, _ = finished(
+        start("""
+import numpy
+rospy.init_node("talker")
+for kind, value in ((Bool, numpy.array([1, 3])[1] > 2), (Bool, numpy.any([False])), (Int32, numpy.arange(3).sum())):
+    publisher = rospy.Publisher(kind.__name__, kind, queue_size=10)
+    got = []
+    rospy.Subscriber(kind.__name__, kind, got.append)
+    publisher.wait_for_subscribers()
+    publisher.publish(value)
+    print(eventually(lambda: got), got[0].data)
+""")
+    )
+    assert output == "True True\nTrue False\nTrue 3\n"
+
+
 def test_listeners_hear_of_peers_in_order_and_a_faulty_one_ends_nothing(start: Start) -> None:
     output, errors = finished(
         start("""

@@ -42,6 +42,7 @@ AROUND = [
     "rosgraph.names",
     "rosgraph.network",
     "rosgraph.rosenv",
+    "rosgraph.roslogging",
     "rosgraph.xmlrpc",
     "rosgraph.impl.graph",
     "rosnode",
@@ -63,6 +64,15 @@ AROUND = [
     "genpy.message",
     "genpy.rostime",
     "genpy.dynamic",
+    "genmsg",
+    "genmsg.base",
+    "genmsg.names",
+    "genmsg.srvs",
+    "genmsg.msgs",
+    "genmsg.msg_loader",
+    "genmsg.gentools",
+    "catkin.find_in_workspaces",
+    "rospkg",
 ]
 """The modules of the second page."""
 
@@ -70,7 +80,7 @@ REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 OF_ROS = (
     "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
-    "rosparam", "rosmsg", "rosclean", "roslib",
+    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
@@ -86,7 +96,6 @@ REASONS = {
     "get_registration_listeners": "rospy's inside of registration",
     "set_topic_manager": "rospy's inside of registration",
     "get_tcpros_handler": "rospy's inside of TCPROS",
-    "ServiceManager": "rospy's inside of registration",
     "set_service_manager": "rospy's inside of registration",
     "Transport": "rospy's inside of TCPROS",
     "DeadTransport": "rospy's inside of TCPROS",
@@ -95,30 +104,19 @@ REASONS = {
     "python3": "a leftover of Python 2",
     **dict.fromkeys(
         (
-            "CallbackEcho",
             "argv_publish",
-            "create_field_filter",
-            "create_publisher",
-            "create_value_transform",
             "file_yaml_arg",
             "param_publish",
             "param_publish_once",
-            "publish_message",
             "stdin_publish",
             "stdin_yaml_arg",
             "wait_for_subscriber",
-            "get_api",
-            "get_info_text",
             "SUBSCRIBER_TIMEOUT",
         ),
         "the inside of the command rostopic",
     ),
     **dict.fromkeys(
         (
-            "cleanup_master_blacklist",
-            "cleanup_master_whitelist",
-            "get_node_connection_info_description",
-            "get_node_info_description",
             "lookup_uri",
             "rosnode_debugnode",
         ),
@@ -144,7 +142,6 @@ REASONS = {
             "create_names_filter",
             "fullusage",
             "get_array_type_instance",
-            "get_yaml_for_msg",
             "init_rosmsg_proto",
             "represent_ordered_mapping",
             "rosmsg_cmd_list",
@@ -154,7 +151,6 @@ REASONS = {
             "rosmsg_cmd_prototype",
             "rosmsg_cmd_show",
             "rosmsg_debug",
-            "spec_to_str",
         ),
         "the inside of the commands rosmsg and rosmsg-proto",
     ),
@@ -168,6 +164,17 @@ REASONS = {
     "generate_dynamic": "genpy.dynamic has it",
     "msg_generator": "genpy's own compiler; ours is minirospy.idl",
     "get_depends": "the inside of load_manifest",
+    **dict.fromkeys(("log", "log_verbose", "plog"), "the log of genmsg's own tools"),
+    "find_packages": "catkin_pkg has it",
+    "catkin_find": "passed on from catkin.find_in_workspaces",
+    **dict.fromkeys(
+        ("convert_constant_value", "load_msg_depends", "normalize_package_context", "verbose"),
+        "genmsg's inside",
+    ),
+    **dict.fromkeys(("compute_full_type_name", "compute_md5_v2"), "not used by genmsg itself"),
+    **dict.fromkeys(
+        ("ROS_LOG_DIR", "makedirs_with_parent_perms", "renew_latest_logdir"), "the inside of rospy's logging"
+    ),
 }
 """Why a name of real rospy is not offered: nothing but rospy itself has a use for it."""
 
@@ -179,6 +186,8 @@ MEMBERS_INSIDE = {
     "get_num_connections": "Publisher and Subscriber have it",
     "unregister": "Publisher and Subscriber have it",
     "error_handler": "rospy's inside",
+    "register": "rospy's inside",
+    "unregister_all": "rospy's inside",
     **dict.fromkeys(
         (
             "get_last_printed_tn",
@@ -193,6 +202,8 @@ MEMBERS_INSIDE = {
         "the inside of ROSTopicHz",
     ),
     "decode": "xmlrpc's own",
+    "custom_strify_message": "the inside of CallbackEcho",
+    "findCaller": "logging's own",
 }
 
 Description = dict[str, dict[str, Any]]
@@ -245,6 +256,8 @@ def shown_default(default: Any) -> str:
         return "os.environ"
     if default is sys.argv:
         return "sys.argv"
+    if isinstance(default, set):
+        return "{" + ", ".join(sorted(map(repr, default))) + "}"
     return re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default))
 
 
@@ -282,6 +295,9 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
     rows = []
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
         is_ours = ours.get(name)
+        told_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND)
+        if is_ours is None and told_at_home and name not in REASONS:
+            continue
         if is_ours is None:
             rows.append(
                 (
@@ -336,7 +352,7 @@ whether it is up to date.
 
 *same*: the same parameters and defaults (of a constant: the same value). *wider*: every call that real ROS takes, ours
 takes too. *left out*: an inside that nothing else has a use for. Names that a module only passes on from
-another are listed once, where they are at home; here only where they are not there. What the functions do is
+another are listed once, where they are at home. What the functions do is
 compared by the programs in `tests/referee/cases`.
 
 """ + "\n".join(tables)

@@ -1,7 +1,11 @@
 """actionlib.action_client, filled in by minirospy."""
 
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from std_msgs.msg import Header
+
 from minirospy.actionlib import (
     ActionClient,
+    ActionException,
     ClientGoalHandle,
     CommState,
     CommStateMachine,
@@ -12,10 +16,15 @@ from minirospy.actionlib import (
 
 __all__ = [
     "ActionClient",
+    "ActionException",
     "ClientGoalHandle",
     "CommState",
     "CommStateMachine",
+    "GoalID",
     "GoalManager",
+    "GoalStatus",
+    "GoalStatusArray",
+    "Header",
     "TerminalState",
     "get_name_of_constant",
 ]

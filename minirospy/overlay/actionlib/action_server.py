@@ -1,5 +1,26 @@
 """actionlib.action_server, filled in by minirospy."""
 
-from minirospy.actionlib import ActionServer, nop_cb
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
-__all__ = ["ActionServer", "nop_cb"]
+from minirospy.actionlib import (
+    ActionException,
+    ActionServer,
+    GoalIDGenerator,
+    HandleTrackerDeleter,
+    ServerGoalHandle,
+    StatusTracker,
+    nop_cb,
+)
+
+__all__ = [
+    "ActionException",
+    "ActionServer",
+    "GoalID",
+    "GoalIDGenerator",
+    "GoalStatus",
+    "GoalStatusArray",
+    "HandleTrackerDeleter",
+    "ServerGoalHandle",
+    "StatusTracker",
+    "nop_cb",
+]

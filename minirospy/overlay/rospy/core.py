@@ -42,11 +42,23 @@ from minirospy.client.log import logwarn_once as logwarn_once
 from minirospy.client.log import logwarn_throttle as logwarn_throttle
 from minirospy.client.log import logwarn_throttle_identical as logwarn_throttle_identical
 from minirospy.client.msproxy import xmlrpcapi as xmlrpcapi
+from minirospy.client.process import process as _process
 from rospy import names as _names
+from rospy.impl.live import live_names as _live_names
 from rospy.impl.passing import passing_on
 
 MASTER_NAME = "master"
 ROSRPC = "rosrpc://"
 logerror = logerr
 
+# Programs that want another node after the first has shut down say so by setting the flags to False.
+_live_names(
+    __name__,
+    _shutdown_flag=(_process.is_shutdown, lambda value: value or _process.begin_again()),
+    _in_shutdown=(lambda: _process.is_shutdown_requested, lambda value: value or _process.begin_again()),
+    _client_shutdown_hooks=(
+        lambda: _process.hooks,
+        lambda value: _process.hooks.__setitem__(slice(None), value),
+    ),
+)
 __getattr__, __dir__ = passing_on(__name__, _names)

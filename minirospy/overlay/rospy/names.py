@@ -29,6 +29,7 @@ from minirospy.client.naming import (
     valid_name_validator_resolved,
     valid_name_validator_unresolved,
 )
+from minirospy.client.process import process as _process
 from minirospy.errors import ROSException, ROSInitException
 
 __all__ = [
@@ -39,3 +40,5 @@ __all__ = [
     "resolve_name", "resolve_name_without_node_name", "scoped_name", "valid_name", "valid_name_validator_resolved",
     "valid_name_validator_unresolved",
 ]  # fmt: skip
+
+_set_caller_id = _process.be_called

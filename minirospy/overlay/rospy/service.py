@@ -1,5 +1,8 @@
 """rospy.service, filled in by minirospy."""
 
+import logging
+
+from minirospy.client.manager import ServiceManager as ServiceManager
 from minirospy.client.services import Service as Service
 from minirospy.client.services import ServiceProxy as ServiceProxy
 from minirospy.errors import ServiceException as ServiceException
@@ -10,4 +13,5 @@ from rospy.impl.transport import BIDIRECTIONAL as BIDIRECTIONAL
 from rospy.impl.transport import INBOUND as INBOUND
 from rospy.impl.transport import OUTBOUND as OUTBOUND
 
+logger = logging.getLogger("rospy.service")
 __getattr__, __dir__ = passing_on(__name__, _core)

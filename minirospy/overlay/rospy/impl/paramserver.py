@@ -1,0 +1,6 @@
+"""rospy.impl.paramserver, filled in by minirospy."""
+
+from minirospy.client.params import KeptParameters as ParamServerCache
+from minirospy.client.params import get_param_server_cache
+
+__all__ = ["ParamServerCache", "get_param_server_cache"]

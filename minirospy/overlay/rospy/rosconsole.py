@@ -1,0 +1,8 @@
+"""rospy.rosconsole, filled in by minirospy: the command rosconsole."""
+
+from minirospy.cli.rosconsole import main
+from rospy.logger_level_service_caller import LoggerLevelServiceCaller, ROSConsoleException
+
+NAME = "rosconsole"
+
+__all__ = ["NAME", "LoggerLevelServiceCaller", "ROSConsoleException", "main"]
