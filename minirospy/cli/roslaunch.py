@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from minirospy.cli.command import Parser, run
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
-from minirospy.launch.command import node_command, shell_line
-from minirospy.launch.load import STDIN, Problems, Source, describe_args, find_files, load_sources
+from minirospy.launch.command import shell_line
+from minirospy.launch.load import STDIN, Source, find_files, load_sources, resolved_arg_docs
 from minirospy.launch.spec import ArgDoc, LaunchSpec, NodeSpec
 from minirospy.workspace.packages import Packages
 
@@ -52,7 +52,7 @@ def _roslaunch(words: list[str]) -> int:
     if options.ros_args:
         if text is not None:
             parser.error("--ros-args takes a file")
-        _print_args(describe_args(files[-1]))
+        _print_args(resolved_arg_docs(files[-1], args, packages))
         return 0
     sources = [Source(file, None if text is None else text.encode(), args) for file in files]
     if options.check:
@@ -219,20 +219,14 @@ def _print_args(args: list[ArgDoc]) -> None:
 
 def _check(sources: list[Source], packages: Packages) -> int:
     """Print every fault and warning of the files, in the order of their lines."""
-    problems: Problems = []
-    spec = load_sources(sources, packages, problems=problems)
-    for node in spec.runnables():
-        for test in (lambda node: node_command(node, packages), spec.machine_of):
-            try:
-                test(node)
-            except LaunchError as problem:
-                problems.append(problem)
+    from minirospy.launch.check import find_problems, told
+
+    spec, problems = find_problems(sources, packages)
     file, _, args = sources[0]
     problems += [LaunchError(file, 0, _unknown(name, spec)) for name in args if name not in spec.args]
-    told = [(error, "error") for error in problems] + [(error, "warning") for error in spec.warnings]
-    for error, kind in sorted(told, key=lambda each: (each[0].file, each[0].line)):
-        line = f"{error.file}:{error.line}" if error.line else error.file
-        print(f"{line}: {kind}: {error.text}")
+    found = [(error, "error") for error in problems] + [(error, "warning") for error in spec.warnings]
+    for error, kind in sorted(found, key=lambda each: (each[0].file, each[0].line)):
+        print(told(error, kind))
     counts = f"{len(spec.files)} files, {len(spec.nodes)} nodes, {len(spec.params)} parameters"
     print(f"{counts}: {len(problems)} errors, {len(spec.warnings)} warnings")
     return 1 if problems else 0

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from minirospy.environment import Environment
-from minirospy.errors import LaunchError, NotFoundError
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import NotExecutableError, Packages
 
@@ -16,25 +16,22 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
-    """What runs a node's program, its path last. Raises LaunchError."""
+    """What runs a node's program, its path last. Raises MinirospyError."""
     try:
         return packages.find_executable(node.package, node.type)
     except (NotFoundError, NotExecutableError) as error:
-        raise LaunchError(node.file, node.line, f"node [{node.base_name}]: {error}") from error
+        raise _fault(node, str(error)) from error
 
 
 def node_command(node: NodeSpec, packages: Packages) -> list[str]:
-    """The command that runs a node, with its name and remappings. Raises LaunchError."""
+    """The command that runs a node, with its name and remappings. Raises MinirospyError."""
     program = node_program(node, packages)
     try:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
     except ValueError as error:
-        text = f"node [{node.base_name}]: args or launch-prefix: {error}"
-        raise LaunchError(node.file, node.line, text) from None
+        raise _fault(node, f"args or launch-prefix: {error}") from None
     remaps = [f"{a}:={b}" for a, b in node.remaps]
-    # A program that launches nodes may leave them the name that they have.
-    name = [f"__name:={node.base_name}"] if node.base_name else []
-    return [*prefix, *program, *args, *remaps, *name]
+    return [*prefix, *program, *args, *remaps, f"__name:={node.base_name}"]
 
 
 def node_environment(
@@ -52,13 +49,19 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """The folder that a node's process starts in. Raises LaunchError."""
+    """The folder that a node's process starts in. Raises MinirospyError."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """A node's command as `roslaunch --args` prints it, with the variables that it sets. Raises LaunchError."""
+    """A node's command as `roslaunch --args` prints it, with the variables that it sets. Raises MinirospyError."""
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
     words = [f'{name}="{value}"' for name, value in (*variables, *node.env)]
     return " ".join([*words, *node_command(node, packages)])
+
+
+def _fault(node: NodeSpec, text: str) -> MinirospyError:
+    """A fault of a node, told with its line where a launch file says it."""
+    told = f"node [{node.base_name}]: {text}"
+    return LaunchError(node.file, node.line, told) if node.file else MinirospyError(told)

@@ -7,22 +7,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from minirospy.environment import DISTRO, ROS_VERSION
-from minirospy.errors import MinirospyError, NotFoundError
+from minirospy import names
+from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
+from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.launch.load import STDIN, Source, load_sources
 from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
 from minirospy.launch.substitution import Substitution, SubstitutionError
+from minirospy.launch.summary import summary
+from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
+if TYPE_CHECKING:
+    from xmlrpc.client import MultiCall, ServerProxy
+
 __all__ = [
-    "ArgException", "LaunchFile", "Machine", "Node", "Param", "RLException", "ROSLaunchConfig", "SubstitutionException",
-    "Test", "XmlLoader", "XmlParseException", "load_config_default", "resolve_args",
+    "TEST_TIME_LIMIT_DEFAULT", "ArgException", "LaunchFile", "Machine", "Master", "Node", "NodeParamsException", "Param",
+    "RLException", "ROSLaunchConfig", "SubstitutionException", "Test", "XmlLoader", "XmlParseException",
+    "assignments", "is_machine_local", "load_config_default", "local_machine", "resolve_args",
 ]  # fmt: skip
 
 LaunchFile = str | tuple[str, Sequence[str]]
 """A launch file, or one with its arguments ``["name:=value", ...]``."""
+
+
+TEST_TIME_LIMIT_DEFAULT = 60
+"""Seconds that a <test> has."""
 
 
 class RLException(Exception):
@@ -39,6 +50,57 @@ class SubstitutionException(Exception):
 
 class ArgException(SubstitutionException):
     """An arg that is not set."""
+
+
+class NodeParamsException(Exception):
+    """The command of a node cannot be made."""
+
+
+class Master:
+    """The master that nodes are started with; ``uri`` is that of the environment where none is given."""
+
+    ROSMASTER = "rosmaster"
+
+    def __init__(self, type_: str | None = None, uri: str | None = None, auto: bool | None = None) -> None:
+        self.type = type_ or self.ROSMASTER
+        self.uri = uri or Environment.read().master_uri
+        self.auto = auto
+
+    @property
+    def environment(self) -> Environment:
+        """The environment with this master."""
+        return Environment.read()._replace(master_uri=self.uri)
+
+    def get_host(self) -> str:
+        """The host of its URI."""
+        return self.environment.master_address[0]
+
+    def get_port(self) -> int:
+        """The port of its URI."""
+        return self.environment.master_address[1]
+
+    def get(self) -> ServerProxy:
+        """A proxy of Python's own for its calls."""
+        from xmlrpc.client import ServerProxy
+
+        return ServerProxy(self.uri)
+
+    def get_multi(self) -> MultiCall:
+        """The same, which sends several calls at once."""
+        from xmlrpc.client import MultiCall
+
+        return MultiCall(self.get())
+
+    def is_running(self) -> bool:
+        """Whether it answers."""
+        proxy = MasterProxy(self.uri, "/roslaunch")
+        try:
+            proxy.get_pid()
+        except MasterUnreachableError:
+            return False
+        finally:
+            proxy.close()
+        return True
 
 
 class Param:
@@ -90,9 +152,25 @@ class Machine:
             self.timeout,
         )  # fmt: skip
 
+    def __str__(self) -> str:
+        return (
+            f"Machine(name[{self.name}] env_loader[{self.env_loader}] address[{self.address}] ssh_port[{self.ssh_port}] "
+            f"user[{self.user}] assignable[{self.assignable}] timeout[{self.timeout}])"
+        )
+
+
+def local_machine() -> Machine:
+    """This machine."""
+    return Machine("", "localhost")
+
+
+def is_machine_local(machine: Machine) -> bool:
+    """Whether a machine is this one."""
+    return not machine.user and is_own_host(machine.address)
+
 
 class Node:
-    """A node to be launched. Without a ``name`` it keeps that of its own init_node."""
+    """A node to be launched. One without a ``name`` gets a new one when it is."""
 
     def __init__(
         self,
@@ -132,6 +210,8 @@ class Node:
         self.args = args
         self.respawn = respawn
         self.respawn_delay = respawn_delay
+        self.machine: Machine | None = None
+        self.process_name: str | None = None
         self.remap_args = [list(pair) for pair in remap_args or ()]
         self.env_args = [tuple(pair) for pair in env_args or ()]
         self.output = output
@@ -148,6 +228,15 @@ class Node:
             spec.respawn_delay, spec.remaps, spec.env, spec.output, spec.cwd, spec.launch_prefix, spec.required,
             spec.file,
         )  # fmt: skip
+
+    def give_name(self) -> None:
+        """Give it a name that no other node has, where it has none."""
+        if not self.name:
+            self.name = names.anonymous_name("".join(c if c.isalnum() else "_" for c in self.type))
+
+    def to_xml(self) -> str:
+        """As the text of a launch file."""
+        return self.spec.to_xml()
 
     @property
     def spec(self) -> NodeSpec:
@@ -166,7 +255,7 @@ class Node:
             machine=self.machine_name or "",
             remaps=tuple((a, b) for a, b in self.remap_args),
             env=tuple((a, b) for a, b in self.env_args),
-            file=self.filename,
+            file="" if self.filename == "<unknown>" else self.filename,
         )
 
 
@@ -174,22 +263,42 @@ class Test(Node):
     """A ``<test>``."""
 
     def __init__(
-        self, test_name: str, *args: Any, time_limit: float = 60.0, retry: int = 0, **kwargs: Any
+        self,
+        test_name: str,
+        package: str,
+        node_type: str,
+        name: str | None = None,
+        namespace: str = "/",
+        machine_name: str | None = None,
+        args: str = "",
+        remap_args: Iterable[tuple[str, str]] | None = None,
+        env_args: Iterable[tuple[str, str]] | None = None,
+        time_limit: float | None = None,
+        cwd: str | None = None,
+        launch_prefix: str | None = None,
+        retry: int | None = None,
+        filename: str = "<unknown>",
     ) -> None:
-        super().__init__(*args, **kwargs)
+        super().__init__(
+            package, node_type, name, namespace, machine_name, args, remap_args=remap_args, env_args=env_args, cwd=cwd,
+            launch_prefix=launch_prefix, filename=filename,
+        )  # fmt: skip
         self.test_name = test_name
-        self.time_limit = time_limit
-        self.retry = retry
+        self.time_limit = float(TEST_TIME_LIMIT_DEFAULT if time_limit is None else time_limit)
+        self.retry = retry or 0
 
 
 class ROSLaunchConfig:
     """What launch files say: ``nodes``, ``params`` (by global name), ``machines``, ``tests``, ``clear_params``."""
 
     def __init__(self) -> None:
+        self.master = Master()
         self.nodes: list[Node] = []
+        self.nodes_core: list[Node] = []
+        self.executables: list[object] = []
         self.tests: list[Test] = []
         self.params: dict[str, Param] = {}
-        self.machines: dict[str, Machine] = {}
+        self.machines: dict[str, Machine] = {"": local_machine()}
         self.clear_params: list[str] = []
         self.roslaunch_files: list[str] = []
         self.config_errors: list[str] = []
@@ -198,13 +307,51 @@ class ROSLaunchConfig:
     @property
     def resolved_node_names(self) -> list[str]:
         """The global names of the nodes."""
-        return [f"{node.namespace}{node.name}" for node in (*self.nodes, *self.tests)]
+        return [node.spec.name for node in (*self.nodes, *self.nodes_core, *self.tests) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
         """Add a node. Raises RLException where there is one of its name."""
-        if node.name and f"{node.namespace}{node.name}" in self.resolved_node_names:
-            raise RLException(f"roslaunch file contains multiple nodes named [{node.namespace}{node.name}].")
-        self.nodes.append(node)
+        if node.name and node.spec.name in self.resolved_node_names:
+            raise RLException(
+                f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
+                "Please check all <node> 'name' attributes to make sure they are unique.\n"
+                "Also check that $(anon id) use different ids."
+            )
+        (self.nodes_core if core else self.nodes).append(node)
+
+    def add_test(self, test: Test, verbose: bool = True) -> None:
+        """Add a test."""
+        self.tests.append(test)
+
+    def add_roslaunch_file(self, f: str) -> None:
+        """Add a file to those that were read."""
+        if f not in self.roslaunch_files:
+            self.roslaunch_files.append(f)
+
+    def set_master(self, m: Master) -> None:
+        """Set the master that nodes are started with."""
+        self.master = m
+
+    def assign_machines(self) -> None:
+        """Set ``machine`` of each node to the one of its ``machine_name``. Raises RLException."""
+        spec = self.spec
+        for node in (*self.nodes, *self.tests):
+            try:
+                found = spec.machine_of(node.spec)
+            except LaunchError as error:
+                raise RLException(str(error)) from error
+            node.machine = self.machines[found.name if found else ""]
+
+    def has_remote_nodes(self) -> bool:
+        """Whether a node runs on another machine, as assign_machines() found."""
+        nodes = (*self.nodes, *self.tests)
+        return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
+
+    def summary(self, local: bool = False) -> str:
+        """What roslaunch shows before it starts anything."""
+        return summary(
+            self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.clear_params
+        )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
         """Add a parameter."""
@@ -264,7 +411,7 @@ class ROSLaunchConfig:
             clear=self.clear_params,
             commands=self._spec.commands,
             files=self.roslaunch_files,
-            machines={name: machine.spec for name, machine in self.machines.items()},
+            machines={name: machine.spec for name, machine in self.machines.items() if name},
             default_machine=self._spec.default_machine,
             warnings=self._spec.warnings,
         )
@@ -274,6 +421,9 @@ class XmlLoader:
     """Loads launch files into a configuration."""
 
     def __init__(self, resolve_anon: bool = True, args_only: bool = False) -> None:
+        self.resolve_anon = resolve_anon
+        self.args_only = args_only
+        self.ignore_unset_args = False
         self._packages = Packages()
 
     def load(
@@ -285,7 +435,7 @@ class XmlLoader:
         verbose: bool = True,
     ) -> None:
         """Load a file, its args given as ``["name:=value", ...]``. Raises XmlParseException."""
-        self._load(Source(filename, None, _assignments(argv or ())), ros_config)
+        self._load(Source(filename, None, assignments(argv or ())), ros_config)
 
     def load_string(
         self, xml_text: str, ros_config: ROSLaunchConfig, core: bool = False, verbose: bool = True
@@ -311,6 +461,9 @@ def load_config_default(
 ) -> ROSLaunchConfig:
     """The configuration that launch files and texts say together. Raises RLException."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
+    if port:
+        environment = Environment.read()
+        config.set_master(Master(uri=f"http://{environment.uri_host}:{port}/"))
     for name, value in (("/rosversion", ROS_VERSION), ("/rosdistro", DISTRO)):
         config.add_param(Param(name, value))
     for each in roslaunch_files:
@@ -318,6 +471,8 @@ def load_config_default(
         loader.load(file, config, argv=argv)
     for text in roslaunch_strs or ():
         loader.load_string(text, config)
+    if assign_machines:
+        config.assign_machines()
     return config
 
 
@@ -345,5 +500,6 @@ def resolve_args(
         raise (ArgException(min(unset)) if unset else SubstitutionException(str(error))) from error
 
 
-def _assignments(argv: Sequence[str]) -> dict[str, str]:
+def assignments(argv: Sequence[str]) -> dict[str, str]:
+    """What ``["name:=value", ...]`` gives: name -> value."""
     return {name: value for name, sep, value in (word.partition(":=") for word in argv) if sep}

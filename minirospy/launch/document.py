@@ -38,6 +38,7 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 """Each tag, and the attributes that it may have."""
 
 _TRUTH = {"true": True, "false": False}
+_CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
 
 @dataclass
@@ -75,11 +76,13 @@ def parse_document(text: bytes, file: str) -> Element:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         why = expat.ErrorString(error.code)
-        raise LaunchError(file, error.lineno, f"Invalid roslaunch XML syntax: {why}") from None
+        why = f"Invalid roslaunch XML syntax: {why} (column {error.offset})"
+        raise LaunchError(file, error.lineno, why) from None
     except (LookupError, ValueError) as error:
         raise LaunchError(file, 0, f"Invalid roslaunch XML syntax: {error}") from None
     if roots[0].tag != "launch":
-        raise LaunchError(file, roots[0].line, f"the outermost tag is <{roots[0].tag}>, it must be <launch>")
+        why = f"Invalid roslaunch XML syntax: no root <launch> tag, but <{roots[0].tag}>"
+        raise LaunchError(file, roots[0].line, why)
     return roots[0]
 
 
@@ -135,7 +138,10 @@ class Tag:
         text = self.optional(key)
         if text is None:
             return False
-        return self._truth(key, text, _TRUTH)
+        value = _TRUTH.get(text.strip().lower())
+        if value is None:
+            raise self.error(f"invalid bool value for {key}: {text} (it is 'true' or 'false')")
+        return value
 
     def number(self, key: str, default: float) -> float:
         """An attribute that is a number. Raises LaunchError."""
@@ -143,13 +149,13 @@ class Tag:
         try:
             return default if text is None else float(text)
         except ValueError:
-            raise self.error(f"'{key}' must be a number: [{text}]") from None
+            raise self.error(f"invalid float value for {key}: {text}") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """An attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
         text = self.optional(key)
         if text is not None and text not in choices:
-            raise self.error(f"{key} is {' or '.join(map(repr, choices))}, not '{text}'")
+            raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
         return text or choices[0]
 
     def applies(self) -> bool:
@@ -159,7 +165,12 @@ class Tag:
         for key in ("if", "unless"):
             text = self.optional(key)
             if text is not None:
-                return self._truth(key, text, {**_TRUTH, "1": True, "0": False}) == (key == "if")
+                value = _CONDITIONS.get(text.strip().lower())
+                if value is None:
+                    raise self.error(
+                        f"{key}: {text} is not a 'bool' type (it is 'true', 'false', '1' or '0')"
+                    )
+                return value == (key == "if")
         return True
 
     def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
@@ -174,9 +185,3 @@ class Tag:
     def error(self, text: str) -> LaunchError:
         """A fault of this tag, to be raised."""
         return LaunchError(self.file, self.line, text)
-
-    def _truth(self, key: str, text: str, words: dict[str, bool]) -> bool:
-        value = words.get(text.strip().lower())
-        if value is None:
-            raise self.error(f"{key} is 'true' or 'false', not '{text}'")
-        return value

@@ -28,6 +28,7 @@ __all__ = [
     "load_files",
     "load_sources",
     "load_text",
+    "resolved_arg_docs",
 ]
 
 STDIN = "<stdin>"
@@ -105,17 +106,19 @@ def load_sources(
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
     """The launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
+    for word in what:
+        name, equals, value = word.partition("=")
+        if equals and name.isidentifier() and not Path(word).exists():
+            raise MinirospyError(f"[{word}] is no launch file: an argument is written {name}:={value}")
     if len(what) == 2 and not Path(what[0]).is_file():
         package, file = what
         try:
             return [str(packages.find_resource(package, file))]
         except NotFoundError as error:
-            if error.kind == "package":
-                raise MinirospyError(
-                    f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
-                    f"file name: {error}"
-                ) from error
-            raise
+            raise MinirospyError(
+                f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
+                f"file name: {error}"
+            ) from error
     for file in what:
         if not Path(file).is_file():
             raise MinirospyError(
@@ -132,6 +135,30 @@ def describe_args(file: str) -> list[ArgDoc]:
         for attributes in (element.attributes for element in root.children if element.tag == "arg")
         if "name" in attributes and "value" not in attributes
     ]
+
+
+def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
+    """As describe_args(), with the values that the defaults have where ``args`` are given, and without what does not
+    apply. What cannot be resolved stays as it is written. Raises LaunchError."""
+    substitution = Substitution(packages, os.environ, file, dict(args))
+    found: dict[str, ArgDoc] = {}
+    for tag in Tag(parse_document(_read(file), file), file, substitution).children():
+        attributes = tag.element.attributes
+        name, default = attributes.get("name"), attributes.get("default")
+        if tag.name != "arg" or name is None:
+            continue
+        try:
+            if not tag.applies():
+                continue
+            value, default = tag.optional("value"), tag.optional("default")
+        except LaunchError:
+            value = attributes.get("value")
+        if value is None:
+            found.setdefault(name, ArgDoc(name, default, attributes.get("doc")))
+            value = default
+        if value is not None:
+            substitution.args.setdefault(name, value)
+    return list(found.values())
 
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
@@ -201,9 +228,6 @@ class _File:
             self._spec.warnings.append(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
         for tag in root.children():
             scope = self._read(tag, scope)
-        unused = set(self._args.given) - self._args.declared
-        if unused and self._depth and not self._args.hands_on_all:
-            raise root.error(f"unused args [{', '.join(sorted(unused))}] for include of [{self._file}]")
 
     def tell(self, error: LaunchError) -> None:
         """Raise a fault, or collect it where all are wanted."""
@@ -252,9 +276,9 @@ class _File:
         elif default is not None:
             values[name] = default
         elif self._depth:
-            self._substitution.unset[name] = f"required arg '{name}' is not set: give it in the <include>"
+            self._substitution.unset[name] = f"requires the '{name}' arg to be set: give it in the <include>"
         else:
-            self._substitution.unset[name] = f"required arg '{name}' is not set: add {name}:=VALUE"
+            self._substitution.unset[name] = f"requires the '{name}' arg to be set: add {name}:=VALUE"
         return scope
 
     def _group(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -290,6 +314,7 @@ class _File:
                 if name in given:
                     raise child.error(f"arg '{name}' has already been declared")
                 given[name] = value
+        self._spec.includes.append((self._file, file))
         try:
             text = Path(file).read_bytes()
         except (OSError, ValueError) as error:
@@ -298,6 +323,9 @@ class _File:
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)
         _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
+        unused = set(given) - args.declared
+        if unused and not hands_on_all:
+            raise tag.error(f"unused args [{', '.join(sorted(unused))}] for include of [{file}]")
         return scope
 
     def _remap(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -402,7 +430,7 @@ class _File:
         name = tag.required("name")
         if not names.is_legal_base_name(name):
             if "/" in name:
-                raise tag.error(f"<node> name [{name}] cannot contain a namespace: use ns")
+                raise tag.error(f"node name cannot contain a namespace: [{name}]: use ns")
             self._spec.warnings.append(
                 tag.error(f"illegal <node> name '{name}': letters, digits and _ alone")
             )
@@ -428,7 +456,7 @@ class _File:
         """What a ``<node>`` and a ``<test>`` have in common."""
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
-            raise tag.error(f"node [{name}]: respawn and required cannot both be set")
+            raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
         scope = self._below(tag, scope)
         full_name = names.canonicalize(f"{scope.namespace}/{name}")
         if tag.flag("clear_params"):
@@ -485,5 +513,5 @@ class _File:
         if not tag.flag("clear_params"):
             return
         if not tag.has("ns") or inner.namespace.strip("/") == "":
-            raise tag.error("'ns' must be set for 'clear_params' to be used")
+            raise tag.error("'ns' attribute must be set in order to use 'clear_params'")
         self._spec.clear.append(names.canonicalize(inner.namespace))

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import ClassVar
 
 __all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
 
@@ -25,6 +26,9 @@ class Output:
     ``listener`` hears (level, text) of each line, too: a roslaunch on another machine passes them to the one that
     started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when something is said.
     """
+
+    handlers: ClassVar[list[Callable[[int, str], None]]] = []
+    """What programs want to hear of all that is said: (level, text) of each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -66,8 +70,8 @@ class Output:
             stream.flush()
         if text:
             self._to_log(text, level)
-            if self._listener:
-                self._listener(level, text)
+            for hear in filter(None, (self._listener, *self.handlers)):
+                hear(level, text)
 
     def _to_log(self, text: str, level: int) -> None:
         stamp = time.strftime("%Y-%m-%d %H:%M:%S")

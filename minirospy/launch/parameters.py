@@ -27,7 +27,7 @@ def param_value(tag: Tag) -> Any:
     """The value of a ``<param>``. Raises LaunchError."""
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
-        raise tag.error(f"<param> tag must have one and only one of {', '.join(_WAYS)}")
+        raise tag.error(f"<param> tag must have one and only one of {'/'.join(_WAYS)}")
     text = tag.required(ways[0], may_be_empty=True)
     if ways[0] == "binfile":
         return _read(tag, text)
@@ -60,7 +60,7 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
         if value is None:
             return
         if not param and not isinstance(value, dict):
-            raise tag.error(f"<rosparam> {where}: without a param attribute it must hold a YAML dictionary")
+            raise tag.error(f"<rosparam> {where}: 'param' attribute must be set for non-dictionary values")
         name = names.join(namespace, param) if param else namespace
         check_parameter(value, name)
     except ValueTextError as error:
@@ -73,6 +73,8 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
 def _read(tag: Tag, file: str) -> bytes:
     try:
         return Path(file).read_bytes()
+    except FileNotFoundError:
+        raise tag.error(f"file does not exist [{file}]") from None
     except (OSError, ValueError) as error:
         raise tag.error(f"cannot read [{file}]: {getattr(error, 'strerror', None) or error}") from None
 

@@ -1,20 +1,20 @@
-"""Launching from a program: the classes of roslaunch.parent, roslaunch.scriptapi and roslaunch.pmon.
+"""Launching from a program: the classes of roslaunch.parent, roslaunch.scriptapi and roslaunch.launch.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
 
 from __future__ import annotations
 
-import signal
-import threading
+import atexit
+import logging
+import os
+import sys
 import uuid
-from collections.abc import Sequence
-from types import FrameType
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
-from minirospy.launch import process as processes
 from minirospy.launch.config import (
     LaunchFile,
     Node,
@@ -24,142 +24,156 @@ from minirospy.launch.config import (
     load_config_default,
 )
 from minirospy.launch.load import find_files
+from minirospy.launch.monitor import (
+    ApiLauncher,
+    Process,
+    ProcessListener,
+    ProcessMonitor,
+    init_signal_handlers,
+)
 from minirospy.launch.output import Output
 from minirospy.launch.process import Timeouts
-from minirospy.launch.runner import Launcher, RunOptions
-from minirospy.launch.spec import LaunchSpec
+from minirospy.launch.runner import RunOptions
 from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "Process",
-    "ProcessListener",
-    "ProcessMonitor",
     "ROSLaunch",
     "ROSLaunchParent",
+    "ROSLaunchRunner",
     "get_or_generate_uuid",
     "resolve_launch_arguments",
 ]
 
-
-class ProcessListener:
-    """Hears of the end of processes."""
-
-    def process_died(self, process_name: str, exit_code: int) -> None:
-        """A process has ended; called in a thread of roslaunch's own."""
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-class Process:
-    """A launched process."""
+class ROSLaunchRunner:
+    """Runs a configuration beside the program. Errors are RLException."""
 
-    def __init__(self, launcher: _Launcher, process: processes.Process) -> None:
-        self._launcher = launcher
-        self._process = process
-        self.name = process.name
-        self.package = process.node.package if process.node else "rosmaster"
-        self.respawn = bool(process.node and process.node.respawn)
-        self.required = bool(process.node and process.node.required)
+    def __init__(
+        self,
+        run_id: str,
+        config: ROSLaunchConfig,
+        server_uri: str | None = None,
+        pmon: ProcessMonitor | None = None,
+        is_core: bool = False,
+        remote_runner: object = None,
+        is_child: bool = False,
+        is_rostest: bool = False,
+        num_workers: int = 3,
+        timeout: float | None = None,
+        master_logger_level: str | bool = False,
+        sigint_timeout: float = 15.0,
+        sigterm_timeout: float = 2.0,
+        *,
+        options: RunOptions | None = None,
+    ) -> None:
+        if not run_id:
+            raise RLException("run_id is empty")
+        if sigint_timeout <= 0 or sigterm_timeout <= 0:
+            raise RLException("sigint_timeout and sigterm_timeout must be positive numbers")
+        self.run_id = run_id
+        self.config = config
+        self._pid = os.getpid()
+        self._environment = config.master.environment
+        if is_core and config.master.is_running():
+            raise RLException("roscore cannot run as another roscore/master is already running.")
+        self._options = options or RunOptions(
+            summary=False,
+            timeouts=Timeouts(sigint_timeout, sigterm_timeout),
+            master_arguments=_master_words(timeout, master_logger_level),
+        )
+        for node in config.nodes:
+            node.give_name()
+        self._launcher = ApiLauncher(config.spec, self._environment, self._options, run_id)
+        self.pm: ProcessMonitor | None = ProcessMonitor(self._launcher)
 
-    @property
-    def pid(self) -> int:
-        """The process id."""
-        return self._now.pid
+    def launch(self) -> tuple[list[str], list[str]]:
+        """Start everything; the names of the processes that were started, and those of the nodes that were not.
 
-    @property
-    def args(self) -> list[str]:
-        """The command."""
-        return list(self._now.command)
+        Raises RLException.
+        """
+        monitor = self._monitor()
+        _replaced("roslaunch.pmon", "_init_signal_handlers", init_signal_handlers)()
+        try:
+            self._launcher.start()
+        except (MinirospyError, RpcError) as error:
+            monitor.close()
+            raise RLException(str(error)) from error
+        except KeyboardInterrupt:
+            monitor.close()
+            raise
+        monitor.watch()
+        # Where the program ends without stop(), what it launched ends in order.
+        atexit.register(self._end_with_program)
+        return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
-    @property
-    def spawn_count(self) -> int:
-        """How often it was started."""
-        return self._now.starts
+    def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
+        """Start one more node: (its process, True), or (its name, False) where that cannot be. Raises RLException."""
+        if self._monitor().done:
+            raise RLException(f"cannot add process [{node.name}] after process monitor has been shut down")
+        node.give_name()
+        process = self._launcher.start_node(node.spec)
+        return (self._launcher.known[process.name], True) if process else (node.name or "", False)
 
-    @property
-    def exit_code(self) -> int | None:
-        """Its exit status; None while it runs."""
-        return self._now.exit_code
-
-    def is_alive(self) -> bool:
-        """Whether it runs."""
-        return self._now.is_running
-
-    def stop(self, errors: list[str] | None = None) -> None:
-        """End it, and wait for that; it is not started again."""
-        self._launcher.end_process(self._now)
-
-    def get_info(self) -> dict[str, Any]:
-        """What is known of it."""
-        return {
-            "package": self.package, "name": self.name, "alive": self.is_alive(), "respawn": self.respawn,
-            "required": self.required, "spawn_count": self.spawn_count, "args": self.args, "pid": self.pid,
-            "exit_code": self.exit_code,
-        }  # fmt: skip
-
-    def get_exit_description(self) -> str:
-        """How it ended."""
-        if not self.exit_code:
-            return f"process has finished cleanly\nlog file: {self._now.log_files}"
-        command = " ".join(self.args)
-        how = f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}]."
-        return f"{how}\nlog file: {self._now.log_files}"
-
-    @property
-    def _now(self) -> processes.Process:
-        """The process as it was last started."""
-        for process in tuple(self._launcher.processes):
-            if process.name == self.name:
-                self._process = process
-        return self._process
-
-
-class _Launcher(Launcher):
-    """A launcher that tells listeners."""
-
-    listeners: list[ProcessListener]
-
-    def _on_end(self, process: processes.Process) -> None:
-        for listener in self.listeners:
-            listener.process_died(process.name, process.exit_code or 0)
-
-
-class ProcessMonitor:
-    """The processes of a launch."""
-
-    def __init__(self, launcher: _Launcher) -> None:
-        self._launcher = launcher
-
-    @property
-    def procs(self) -> list[Process]:
-        """Those that are watched."""
-        return [Process(self._launcher, process) for process in tuple(self._launcher.processes)]
-
-    def get_active_names(self) -> list[str]:
-        """The names of those that are watched."""
-        return [process.name for process in self.procs]
-
-    def has_process(self, name: str) -> bool:
-        """Whether one of this name is watched."""
-        return name in self.get_active_names()
-
-    def get_process(self, name: str) -> Process | None:
-        """The one of this name."""
-        return next((process for process in self.procs if process.name == name), None)
-
-    def kill_process(self, name: str) -> bool:
-        """End the one of this name; whether there was one."""
-        process = self.get_process(name)
-        if process:
-            process.stop()
-        return process is not None
+    def is_node_running(self, node: Node) -> bool:
+        """Whether a node was started here, and runs."""
+        name = node.spec.name
+        return any(
+            each.node and each.node.name == name and each.is_running for each in self._launcher.processes
+        )
 
     def add_process_listener(self, l: ProcessListener) -> None:  # noqa: E741 - ROS's name
         """Have it told of each end."""
         self._launcher.listeners.append(l)
 
-    def shutdown(self) -> None:
-        """End all."""
-        self._launcher.stop("shutdown")
+    def spin(self) -> None:
+        """Wait until all nodes have ended, or a signal came; then end what is left. Without a node it does not wait."""
+        monitor = self._monitor()
+        try:
+            if self._launcher.is_anything_left():
+                monitor.mainthread_spin()
+            elif not monitor.done:
+                Output(title=False).say("No processes to monitor", bold=True)
+        except KeyboardInterrupt:
+            # As in ROS, where it ends the nodes, and not the program.
+            pass
+        finally:
+            self.stop()
+
+    def spin_once(self) -> bool:
+        """Whether it runs on; signals are heard meanwhile."""
+        return self.pm is not None and self.pm.mainthread_spin_once()
+
+    def stop(self) -> None:
+        """End all, and wait for that. Idempotent."""
+        monitor, self.pm = self.pm, None
+        if monitor is None:
+            return
+        atexit.unregister(self._end_with_program)
+        if monitor.is_watching:
+            monitor.shutdown()
+            monitor.join()
+        else:
+            monitor.close()
+
+    def _end_with_program(self) -> None:
+        # A child that the program has forked ends alone.
+        if os.getpid() == self._pid:
+            self.stop()
+
+    def _monitor(self) -> ProcessMonitor:
+        if self.pm is None:
+            raise RLException("the process monitor was shut down")
+        return self.pm
+
+    def _load_parameters(self) -> None:
+        """Set the parameters, and nothing else. Raises RLException."""
+        try:
+            self._launcher.set_parameters()
+        except (MinirospyError, RpcError) as error:
+            raise RLException(str(error)) from error
 
 
 class ROSLaunchParent:
@@ -188,115 +202,90 @@ class ROSLaunchParent:
     ) -> None:
         if sigint_timeout <= 0 or sigterm_timeout <= 0:
             raise RLException("sigint_timeout and sigterm_timeout must be positive numbers")
+        self.logger = logging.getLogger("roslaunch.parent")
         self.run_id = run_id
+        self.roslaunch_files = roslaunch_files
+        self.roslaunch_strs = roslaunch_strs
+        self.is_core = is_core
+        self.port = port
+        self.local_only = local_only
+        self.process_listeners = process_listeners
+        self.verbose = verbose
+        self.force_screen = force_screen
+        self.force_log = force_log
+        self.force_required = force_required
+        self.show_summary = show_summary
         self.config: ROSLaunchConfig | None = None
+        self.runner: ROSLaunchRunner | None = None
         self.pm: ProcessMonitor | None = None
-        self._files = list(roslaunch_files)
-        self._texts = list(roslaunch_strs or ())
-        self._is_core = is_core
-        self._port = port
-        self._listeners = list(process_listeners or ())
-        words: list[str] = ["--timeout", str(timeout)] if timeout is not None else []
-        words += ["--master-logger-level", str(master_logger_level)] if master_logger_level else []
-        self._options = RunOptions(
-            screen=force_screen,
-            log=force_log,
-            required=force_required,
-            local=local_only,
-            summary=show_summary,
-            timeouts=Timeouts(sigint_timeout, sigterm_timeout),
-            master_arguments=tuple(words),
-        )
-        self._launcher: _Launcher | None = None
-        self._ended = threading.Event()
+        self.server = self.remote_runner = None
+        self._master_words = _master_words(timeout, master_logger_level)
+        self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything; it comes back when all was started. Raises RLException."""
-        self.config = load_config_default(self._files, self._port, self._texts)
-        self._start(self.config.spec)
+        """Start everything; it comes back when all was started. Raises RLException.
+
+        Where ``auto_terminate`` is not set, it does not end with the last node.
+        """
+        if self.runner is not None:
+            raise RLException("this roslaunch instance has been started before: make another one")
+        if self.config is None:
+            self._load_config()
+        assert self.config
+        runner = ROSLaunchRunner(self.run_id, self.config, is_core=self.is_core, options=self._options())
+        for listener in self.process_listeners or ():
+            runner.add_process_listener(listener)
+        self.runner, self.pm = runner, runner.pm
+        try:
+            runner.launch()
+        except RLException:
+            # So that it may be tried again.
+            self.runner = None
+            raise
+        if auto_terminate and self.pm:
+            self.pm.registrations_complete()
 
     def spin(self) -> None:
         """Wait until all nodes have ended, or a signal came; then end what is left."""
-        if self._launcher is None:
-            raise RLException("this roslaunch instance has not been started")
-        try:
-            # In slices: on Windows a wait without end hears no signal.
-            while not self._ended.wait(0.5):
-                pass
-        finally:
-            self.shutdown()
+        if self.runner is None:
+            raise RLException("parent not started yet")
+        if self.runner.pm:
+            self.runner.spin()
 
     def spin_once(self) -> bool:
         """Whether it runs on; signals are heard meanwhile."""
-        return self._launcher is not None and not self._ended.wait(0.01)
+        return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:
         """End all, and wait for that. Idempotent."""
-        if self._launcher:
-            self._launcher.stop("shutdown")
-            self._ended.wait()
+        if self.runner:
+            self.runner.stop()
 
-    def launch(self, node: Node) -> Process:
-        """Start one more node. Raises RLException."""
-        if self._launcher is None or self._ended.is_set():
-            raise RLException("roslaunch has not been started, or was stopped")
-        process = self._launcher.start_node(node.spec)
-        if process is None:
-            raise RLException(f"cannot launch node of type [{node.package}/{node.type}]")
-        return Process(self._launcher, process)
+    def _load_config(self) -> None:
+        """Fill ``config``; programs overwrite this to fill it otherwise."""
+        load = _replaced("roslaunch.config", "load_config_default", load_config_default)
+        self.config = load(
+            self.roslaunch_files, self.port, roslaunch_strs=self.roslaunch_strs, verbose=self.verbose
+        )
 
-    def _start(self, spec: LaunchSpec, *, forever: bool = False) -> None:
-        if self._launcher is not None:
-            raise RLException("this roslaunch instance has been started before")
-        environment = Environment.read()
-        if self._port:
-            environment = environment._replace(master_uri=f"http://{environment.uri_host}:{self._port}")
-        if self._is_core and _master_answers(environment):
-            raise RLException("roscore cannot run as another roscore/master is already running.")
-        launcher = _Launcher(spec, environment, Packages(environment), self._options, Output(title=False))
-        launcher.listeners, launcher.run_id = self._listeners, self.run_id
-        self._launcher, self.pm = launcher, ProcessMonitor(launcher)
-        try:
-            launcher.start()
-        except (MinirospyError, RpcError) as error:
-            launcher.close()
-            self._ended.set()
-            raise RLException(str(error)) from error
-
-        def watch() -> None:
-            try:
-                launcher.watch(forever=forever)
-            finally:
-                launcher.close()
-                self._ended.set()
-
-        # Where the program ends without shutdown(), this thread does, and the guardian ends the nodes.
-        threading.Thread(target=watch, name="roslaunch", daemon=True).start()
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._end_at(number)
-
-    def _end_at(self, number: signal.Signals) -> None:
-        """End all at a signal, too; whoever handled it before does so still."""
-        before = signal.getsignal(number)
-
-        def on_signal(signum: int, frame: FrameType | None) -> None:
-            if self._launcher:
-                self._launcher.stop(signal.Signals(signum).name)
-            signal.signal(signum, before)
-            if callable(before):
-                before(signum, frame)
-
-        signal.signal(number, on_signal)
+    def _options(self) -> RunOptions:
+        return RunOptions(
+            screen=self.force_screen,
+            log=self.force_log,
+            required=self.force_required,
+            local=self.local_only,
+            summary=self.show_summary,
+            timeouts=self._timeouts,
+            master_arguments=self._master_words,
+        )
 
 
 class ROSLaunch:
     """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Errors are RLException."""
 
     def __init__(self) -> None:
-        self.parent = ROSLaunchParent(get_or_generate_uuid(None, True), [], show_summary=False)
+        self.parent = ROSLaunchParent(get_or_generate_uuid(None, True), [])
         self.started = False
-        self._config = ROSLaunchConfig()
 
     def load(self, f: str) -> None:
         """Have start() run a launch file, too."""
@@ -308,16 +297,19 @@ class ROSLaunch:
 
     def start(self) -> None:
         """Begin; nodes can now be launched."""
-        self.parent._start(self._config.spec, forever=True)
+        self.parent.start(auto_terminate=False)
         self.started = True
 
     def launch(self, node: Node) -> Process:
         """Start a node."""
-        if not self.started:
+        if not self.started or self.parent.runner is None:
             raise RLException("please start ROSLaunch first")
         if not isinstance(node, Node):
             raise ValueError("arg must be of type Node")
-        return self.parent.launch(node)
+        process, _ = self.parent.runner.launch_node(node)
+        if isinstance(process, str):
+            raise RLException(f"failed to launch {node.package}/{node.type}")
+        return process
 
     def spin(self) -> None:
         """Wait for the end."""
@@ -330,6 +322,12 @@ class ROSLaunch:
     def stop(self) -> None:
         """End all."""
         self.parent.shutdown()
+
+    @property
+    def _config(self) -> ROSLaunchConfig:
+        if self.parent.config is None:
+            self.parent.config = ROSLaunchConfig()
+        return self.parent.config
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
@@ -347,11 +345,8 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
     """The paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
-    words = [word for word in args if ":=" not in word]
-    if not words:
-        raise RLException("no launch file is named")
     try:
-        return find_files(words, Packages())
+        return find_files([word for word in args if ":=" not in word], Packages())
     except MinirospyError as error:
         raise RLException(str(error)) from error
 
@@ -365,3 +360,19 @@ def _master_answers(environment: Environment) -> bool:
     finally:
         master.close()
     return True
+
+
+def _master_words(timeout: float | None, logger_level: str | bool) -> tuple[str, ...]:
+    """The options of a master that is started."""
+    words: list[str] = ["--timeout", str(timeout)] if timeout is not None else []
+    words += ["--master-logger-level", str(logger_level)] if logger_level else []
+    return tuple(words)
+
+
+def _replaced(module: str, name: str, ours: _Function) -> _Function:
+    """A function of roslaunch's modules: what the program has put in its place, if it has.
+
+    Programs silence roslaunch's signal handlers that way (``roslaunch.pmon._init_signal_handlers = ...``).
+    """
+    function: _Function = getattr(sys.modules.get(module), name, ours)
+    return function

@@ -17,7 +17,6 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
-from xml.sax.saxutils import quoteattr
 
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, RpcError, RpcFault
@@ -262,24 +261,4 @@ class RemoteMachines:
 
 def launch_text(nodes: Sequence[NodeSpec]) -> str:
     """A launch file with these nodes, for the roslaunch that runs them."""
-    lines = ["<launch>"]
-    for node in nodes:
-        attributes = {
-            "pkg": node.package,
-            "type": node.type,
-            "name": node.base_name,
-            "ns": node.namespace,
-            "args": node.args,
-            "output": node.output,
-            "cwd": node.cwd,
-            "respawn": str(node.respawn).lower(),
-            "respawn_delay": f"{node.respawn_delay:g}",
-            "required": str(node.required).lower(),
-            "launch-prefix": node.launch_prefix,
-        }
-        words = " ".join(f"{key}={quoteattr(value)}" for key, value in attributes.items())
-        lines.append(f"  <node {words}>")
-        lines += [f"    <env name={quoteattr(a)} value={quoteattr(b)}/>" for a, b in node.env]
-        lines += [f"    <remap from={quoteattr(a)} to={quoteattr(b)}/>" for a, b in node.remaps]
-        lines.append("  </node>")
-    return "\n".join([*lines, "</launch>", ""])
+    return "\n".join(["<launch>", *(node.to_xml() for node in nodes), "</launch>", ""])

@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/r
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import queue
 import signal
@@ -17,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
@@ -86,11 +87,18 @@ class _Stop(NamedTuple):
     why: str
 
 
-_Event = _Ended | _RemoteEnded | _Stop
+class _NoMoreNodes(NamedTuple):
+    """No further node will be asked for: the run ends with those that there are."""
+
+
+_Event = _Ended | _RemoteEnded | _Stop | _NoMoreNodes
 
 
 class Launcher:
     """Runs what a spec says until all nodes have ended or somebody asks it to stop."""
+
+    _numbers: ClassVar[Iterator[int]] = itertools.count(1)
+    """Of the processes, so that no two that one program launches have a name, and log files, in common."""
 
     def __init__(
         self,
@@ -110,16 +118,18 @@ class Launcher:
         self._master = MasterProxy(environment.master_uri, "/roslaunch")
         self._guardian: Guardian | None = None
         self._remote: RemoteMachines | None = None
-        self._counter = 0
         self._files = FileWatch(packages)
         self._master_process: Process | None = None
         self._has_begun = False
+        self._has_run = False
         self.run_id = ""
         """The folder of the log files, and /run_id at the master."""
         self.processes: list[Process] = []
         """The nodes that were started and are watched, those that wait to be started again included."""
         self.stopped_by = ""
         """The signal, or who called stop(), that ended the run; empty where the nodes ended it."""
+        self.failed: list[NodeSpec] = []
+        """The nodes that could not be started."""
 
     def run(self, *, wait: bool = False) -> int:
         """Run until the end; the exit status: 0, or 1 where a required node died of a fault.
@@ -138,6 +148,10 @@ class Launcher:
     def stop(self, why: str) -> None:
         """End the run; from any thread."""
         self._events.put(_Stop(why))
+
+    def end_with_nodes(self) -> None:
+        """Have a watch(forever=True) end with the last node after all; from any thread."""
+        self._events.put(_NoMoreNodes())
 
     # --- beginning
 
@@ -173,11 +187,12 @@ class Launcher:
             self._output.say(f"setting /run_id to {self.run_id}", bold=True)
             self._output.say("started core service [/rosout]")
             # As in ROS, where /rosout is the first process of a master that roslaunch started.
-            self._counter = 1
-        self._set_parameters()
+            next(self._numbers)
+        self.set_parameters()
         if elsewhere:
             from minirospy.launch.remote import RemoteMachines
 
+            self._has_run = True
             timeouts = self._options.timeouts
             self._remote = RemoteMachines(self._environment, self.run_id, self._output, timeouts, self)
             self._remote.start(
@@ -186,20 +201,23 @@ class Launcher:
         for node in here:
             self.start_node(node)
 
-    def start_node(self, node: NodeSpec) -> Process | None:
-        """Start a node; None where that cannot be (it is told why)."""
-        self._counter += 1
+    def process_name(self, node: NodeSpec) -> str:
+        """A new name for a process of a node: that of the node, and a number."""
+        return f"{node.name.lstrip('/')}-{next(self._numbers)}"
+
+    def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
+        """Start a node, as the process ``name`` (a new one, if empty); None where that cannot be (it is told why)."""
+        self._has_run = True
         try:
-            command = node_command(node, self._packages)
-            folder = node_folder(node, self._packages, self._environment)
-            process = self._start_process(node, command, folder, self._counter)
-            self.processes.append(process)
-            self._attend(process)
+            process = self._start_process(node, name or self.process_name(node))
         except MinirospyError as error:
             if self._options.strict:
                 raise
+            self.failed.append(node)
             self._output.warn(f"ERROR: cannot launch node of type [{node.package}/{node.type}]: {error}")
             return None
+        self.processes.append(process)
+        self._attend(process)
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
@@ -238,6 +256,8 @@ class Launcher:
         self._output.say("auto-starting new master")
         port = self._environment.master_address[1]
         arguments = ["-q", "-p", str(port), *self._options.master_arguments]
+        self._has_run = True
+        self._ready_guardian()
         process = start_process(
             "master", [sys.executable, "-m", "minirospy.cli.master", *arguments], environ=os.environ
         )
@@ -251,6 +271,9 @@ class Launcher:
             if time.monotonic() > end:
                 raise MinirospyError(f"the master does not answer at {self._environment.master_uri}")
             self._pause(0.02)
+        if self.run_id:
+            # That of a program that launches: the folder of its log files is named by it.
+            self._master.set_param("/run_id", self.run_id)
         self._find_run_id()
 
     def _master_answers(self) -> bool:
@@ -260,7 +283,8 @@ class Launcher:
             return False
         return True
 
-    def _set_parameters(self) -> None:
+    def set_parameters(self) -> None:
+        """Set the parameters, after what <rosparam> commands and clear_params delete. Raises MinirospyError."""
         for namespace in self._spec.clear:
             with contextlib.suppress(RpcError):
                 self._master.delete_param(namespace)
@@ -292,9 +316,9 @@ class Launcher:
     def _log_folder(self) -> Path:
         return self._environment.log_dir / self.run_id
 
-    def _start_process(self, node: NodeSpec, command: list[str], folder: Path, number: int) -> Process:
-        called = node.name if node.base_name else f"{node.name}{Path(node.type).stem}"
-        name = f"{called.lstrip('/')}-{number}"
+    def _start_process(self, node: NodeSpec, name: str) -> Process:
+        command = node_command(node, self._packages)
+        folder = node_folder(node, self._packages, self._environment)
         stem = name.replace("/", "-")
         environ = node_environment(node, self._environment)
         screen = (self._options.screen or node.output == "screen") and not self._options.log
@@ -303,6 +327,7 @@ class Launcher:
             # writes whole lines, which those of another node do not cut in two.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder.mkdir(parents=True, exist_ok=True)
+        self._ready_guardian()
         process = start_process(
             name,
             [*command, f"__log:={self._log_folder / stem}.log"],
@@ -329,9 +354,13 @@ class Launcher:
 
     def guard(self, process: Process) -> None:
         """Have a process ended where we are killed."""
+        self._ready_guardian().add(process)
+
+    def _ready_guardian(self) -> Guardian:
+        """The guardian; asked for before a process starts, too, so that it is there from the first moment on."""
         if self._guardian is None:
             self._guardian = Guardian(self._options.timeouts)
-        self._guardian.add(process)
+        return self._guardian
 
     # --- watching
 
@@ -340,25 +369,29 @@ class Launcher:
 
         ``forever``: also where no node is left.
         """
-        if not forever and not self._is_anything_left():
+        if not forever and not self.is_anything_left():
             self._output.say("No processes to monitor", bold=True)
-        while forever or self._is_anything_left():
+        while forever or self.is_anything_left():
             event = self._next_event()
             if isinstance(event, _Stop):
                 self.stopped_by = event.why
                 return 0
             status = None
+            if isinstance(event, _NoMoreNodes):
+                forever = False
+                continue
             if isinstance(event, _Ended):
                 status = self._ended(event.process)
             elif event:
                 status = self._remote_ended(event)
             if status is not None:
                 return status
-        if self._counter:
+        if self._has_run:
             self._output.say("all processes on machine have died, roslaunch will exit")
         return 0
 
-    def _is_anything_left(self) -> bool:
+    def is_anything_left(self) -> bool:
+        """Whether a process runs, or waits to be started again."""
         remote = self._remote is not None and self._remote.is_running
         return bool(self.processes) or self._master_process is not None or remote
 
@@ -442,13 +475,13 @@ class Launcher:
         """Start an ended node again, in its place among the others."""
         node = process.node
         assert node
+        if process.is_ending and not process.is_restarting:
+            self.processes.remove(process)
+            return
         place = self.processes.index(process)
         self._output.say(f"[{process.name}] restarting process")
-        number = int(process.name.rpartition("-")[2])
         try:
-            command = node_command(node, self._packages)
-            folder = node_folder(node, self._packages, self._environment)
-            again = self._start_process(node, command, folder, number)
+            again = self._start_process(node, process.name)
         except MinirospyError as error:
             self._output.warn(f"ERROR: cannot launch node of type [{node.package}/{node.type}]: {error}")
             del self.processes[place]
@@ -466,7 +499,8 @@ class Launcher:
                     threading.Thread(target=self.end_process, args=(process,), daemon=True).start()
 
     def end_process(self, process: Process) -> None:
-        """End one process, and wait for that."""
+        """End one process, and wait for that; it is not started again, unless its file has changed."""
+        process.is_ending = True
         end_processes([process], self._options.timeouts, self._output.warn)
 
     def _pause(self, seconds: float) -> None:
@@ -484,7 +518,6 @@ class Launcher:
 
     def close(self) -> None:
         """End all processes: the nodes, the last one first, then the master. Idempotent."""
-        had_any = bool(self.processes or self._master_process or self._remote)
         killed: list[Process] = []
         if self._remote:
             self._remote.close()
@@ -512,8 +545,9 @@ class Launcher:
             self._output.say("shutting down processing monitor...")
             self._output.say("... shutting down processing monitor complete")
             self._has_begun = False
-        if had_any or self._counter:
+        if self._has_run:
             self._output.say("done", bold=True)
+            self._has_run = False
         self._master.close()
 
     @contextlib.contextmanager

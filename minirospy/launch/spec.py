@@ -41,6 +41,30 @@ class NodeSpec:
         """The namespace, with a slash at its end."""
         return self.name.rpartition("/")[0] + "/"
 
+    def to_xml(self) -> str:
+        """The ``<node>`` of a launch file that says the same; its machine is left out."""
+        # Not above: it costs more than all else that this room imports.
+        from xml.sax.saxutils import quoteattr
+
+        attributes = {
+            "pkg": self.package,
+            "type": self.type,
+            "name": self.base_name,
+            "ns": self.namespace,
+            "args": self.args,
+            "output": self.output,
+            "cwd": self.cwd,
+            "respawn": str(self.respawn).lower(),
+            "respawn_delay": f"{self.respawn_delay:g}",
+            "required": str(self.required).lower(),
+            "launch-prefix": self.launch_prefix,
+        }
+        words = " ".join(f"{key}={quoteattr(value)}" for key, value in attributes.items())
+        lines = [f"<node {words}>"]
+        lines += [f"  <env name={quoteattr(a)} value={quoteattr(b)}/>" for a, b in self.env]
+        lines += [f"  <remap from={quoteattr(a)} to={quoteattr(b)}/>" for a, b in self.remaps]
+        return "\n".join([*lines, "</node>"])
+
 
 @dataclass(frozen=True)
 class TestSpec:
@@ -89,8 +113,8 @@ class LaunchSpec:
     """Everything that the files say together.
 
     ``params``: name -> value; ``clear``: namespaces to delete; ``commands``: what is done at the parameter server
-    before the parameters are set; ``files``: those that were read, each once; ``args``: what the first file
-    declares; ``machines``: by name; ``warnings``: what was passed over.
+    before the parameters are set; ``files``: those that were read, each once; ``includes``: (file, file that it
+    includes); ``args``: what the first file declares; ``machines``: by name; ``warnings``: what was passed over.
     """
 
     nodes: list[NodeSpec] = field(default_factory=list)
@@ -99,6 +123,7 @@ class LaunchSpec:
     clear: list[str] = field(default_factory=list)
     commands: list[ParameterCommand] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
+    includes: list[tuple[str, str]] = field(default_factory=list)
     args: dict[str, ArgDoc] = field(default_factory=dict)
     machines: dict[str, MachineSpec] = field(default_factory=dict)
     default_machine: str = ""

@@ -76,7 +76,7 @@ class Substitution:
         if verb == "eval":
             raise SubstitutionError(f"[$({text})]: $(eval ...) must stand alone, and holds an expression")
         if verb not in rules:
-            raise SubstitutionError(f"unknown substitution [$({text})]; there are {', '.join(_VERBS)}")
+            raise SubstitutionError(f"Unknown substitution command [{text}]: there are {', '.join(_VERBS)}")
         return rules[verb]()
 
     def _arg(self, name: str) -> str:
@@ -162,8 +162,8 @@ def convert(text: str, type_: str) -> Any:
         try:
             return yaml.safe_load(text)
         except yaml.YAMLError as error:
-            raise ValueError(f"not YAML: {' '.join(str(error).split())}") from None
-    raise ValueError(f"unknown type '{type_}': there are str, int, double, bool, yaml and auto")
+            raise ValueError(f"not YAML: {getattr(error, 'problem', None) or error}") from None
+    raise ValueError(f"Unknown type '{type_}': there are str, int, double, bool, yaml and auto")
 
 
 def _guess(text: str) -> Any:

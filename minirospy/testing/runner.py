@@ -213,7 +213,8 @@ class RosTest:
     def _last_lines(self, test: TestSpec) -> str:
         """The end of what a test printed."""
         stem = test.node.name.lstrip("/").replace("/", "-")
-        files = sorted((self.environment.log_dir / self.run_id).glob(f"{stem}-*-stdout.log"))
+        folder = self.environment.log_dir / self.run_id
+        files = sorted(folder.glob(f"{stem}-*-stdout.log"), key=os.path.getmtime)
         if not files:
             return ""
         lines = files[-1].read_text(encoding="utf-8", errors="replace").splitlines()[-_SHOWN_LINES:]

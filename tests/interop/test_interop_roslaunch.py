@@ -18,7 +18,8 @@ from tests.interop.conftest import OUR_BIN, REAL_BIN, environment, free_port
 
 INNER = '<launch><arg name="k" default="d" doc="a key"/><param name="p" value="$(arg k)"/><node name="in" pkg="pkg" type="wait.py"/></launch>'
 OUTER = """<launch>
-  <arg name="need" doc="needed"/><arg name="free" default="1"/>
+  <arg name="need" doc="needed"/><arg name="free" default="$(arg need)1"/>
+  <arg name="c" default="no" if="0"/><arg name="c" default="$(eval need + 1)" unless="0"/><group><arg name="inner" default="2"/></group>
   <env name="E" value="a b"/><remap from="r" to="s"/>
   <rosparam>{a: {b: [1, x]}, t: 'yes'}</rosparam>
   <group ns="g"><node name="n" pkg="pkg" type="wait.py" args="$(arg need) 'x y'" launch-prefix="nice"><env name="F" value="2"/></node></group>

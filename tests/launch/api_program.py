@@ -112,10 +112,10 @@ file = os.path.join(ROOT, "robot", "a.launch")
 parent = roslaunch.parent.ROSLaunchParent(uuid, [(file, ["n:=b"])], process_listeners=[listener])
 parent.start()
 tell("parent", mark(), parent.pm.get_active_names(), master.getParam("/p"))
-tell("spins", parent.spin_once(), parent.pm.has_process("b-1"), parent.pm.has_process("c-1"))
+tell("spins", parent.spin_once(), parent.pm.has_process("b-4"), parent.pm.has_process("c-1"))
 tell(
     "killed",
-    parent.pm.kill_process("b-1") in (True, None),
+    parent.pm.kill_process("b-4") in (True, None),
     listener.died.wait(10),
     listener.what and listener.what[0],
 )

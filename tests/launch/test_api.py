@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 import pytest
+import roslaunch
+import roslaunch.roslaunch_logs
 
 from minirospy.runtime.master_proxy import MasterProxy
+
+
+def eventually(condition: Callable[[], object]) -> bool:
+    """Whether a condition holds within ten seconds."""
+    end = time.monotonic() + 10
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.01)
+    return bool(condition())
+
 
 SAID = """\
 the master's run id True given
@@ -18,9 +33,9 @@ stopped False True
 no such program: RLException
 ended True 3
 after stop False
-parent __name:=b ['b-1'] b
+parent __name:=b ['b-4'] b
 spins True True False
-killed True True b-1
+killed True True b-4
 a text __name:=t
 no file RLException
 no launch file RLException
@@ -51,6 +66,136 @@ def test_a_program_launches_nodes(master: str) -> None:
         [sys.executable, str(program)], capture_output=True, text=True, timeout=50, check=False
     )
     assert done.stdout == SAID, done.stderr
+
+
+LAUNCH = """
+import os, roslaunch, signal, sys, time
+launch = roslaunch.scriptapi.ROSLaunch()
+launch.start()
+process = launch.launch(roslaunch.core.Node('pkg', 'wait.py', 'a'))
+print('pid', process.pid, flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        "os.kill(os.getpid(), 9)",
+        "os._exit(3)",
+        "raise SystemExit(2)",
+        "launch.parent.pm.shutdown()",
+        "signal.raise_signal(15); launch.spin()",
+        "signal.raise_signal(2)",
+        "os.kill(launch.parent.runner._launcher._guardian._popen.pid, 9)",
+    ],
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals between processes")
+def test_no_node_outlives_its_program(master: str, package: Path, end: str) -> None:
+    program = subprocess.Popen(
+        [sys.executable, "-c", LAUNCH + end], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    assert program.stdout
+    line = next(line for line in program.stdout if line.startswith("pid "))
+    try:
+        left = [psutil.Process(int(line.split()[1]))]
+    except psutil.NoSuchProcess:
+        left = []
+    program.communicate(timeout=20)
+    _, left = psutil.wait_procs(left, timeout=20)
+    assert not left
+
+
+def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path) -> None:
+    """Though it had ended by itself before, and waited to be started again."""
+    launch = roslaunch.scriptapi.ROSLaunch()
+    launch.start()
+    try:
+        node = roslaunch.core.Node("pkg", "stop.py", "a", args="3", respawn=True, respawn_delay=0.2)
+        process = launch.launch(node)
+        process.popen.wait(10)
+        process.stop()
+        monitor = launch.parent.pm
+        assert eventually(lambda: not monitor.get_active_names())
+        assert (process.spawn_count, process.exit_code) == (1, 3)
+        assert [each.name for each in monitor.dead_list] == [process.name]
+    finally:
+        launch.stop()
+
+
+def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also at a master that the launch starts."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        uri = f"http://localhost:{probe.getsockname()[1]}"
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
+    launch = roslaunch.parent.ROSLaunchParent(run_id, [])
+    launch.start(auto_terminate=False)
+    try:
+        proxy = MasterProxy(uri, "/t")
+        assert proxy.get_param("/run_id") == run_id
+        proxy.close()
+    finally:
+        launch.shutdown()
+    assert roslaunch.roslaunch_logs.get_run_id() is None
+
+
+def test_a_listener_may_fail_and_may_end_all(
+    master: str, package: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    died: list[str] = []
+
+    class Listener(roslaunch.pmon.ProcessListener):  # type: ignore[misc,unused-ignore]
+        def process_died(self, name: str, code: int) -> None:
+            died.append(name.rpartition("-")[0])
+            if len(died) == 1:
+                raise RuntimeError("the first")
+            launch.shutdown()
+
+    text = '<launch><node name="a" pkg="pkg" type="wait.py"/><node name="b" pkg="pkg" type="stop.py" args="1"/></launch>'
+    launch = roslaunch.parent.ROSLaunchParent(
+        "run", [], roslaunch_strs=[text], process_listeners=[Listener()]
+    )
+    run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
+    launch.run_id = run_id
+    launch.start()
+    monitor = launch.pm
+    try:
+        assert eventually(lambda: died == ["b"])
+        assert not monitor.done
+        launch.runner.launch_node(roslaunch.core.Node("pkg", "stop.py", "c", args="0"))
+        assert eventually(lambda: monitor.done)
+        assert (died[1], monitor.get_active_names()) == ("c", [])
+        assert "a process listener failed\nTraceback" in capfd.readouterr().err
+    finally:
+        launch.shutdown()
+
+
+def test_a_start_that_failed_may_be_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://no-such-host.invalid:11399")
+    launch = roslaunch.parent.ROSLaunchParent("run", [])
+    for _ in range(2):
+        with pytest.raises(roslaunch.RLException, match="no ROS master answers at"):
+            launch.start()
+    launch.shutdown()
+
+
+def test_a_monitor_of_ones_own(master: str, package: Path) -> None:
+    monitor = roslaunch.pmon.start_process_monitor()
+    died = roslaunch.pmon.ProcessListener()
+    codes: list[int] = []
+    died.process_died = lambda name, code: codes.append(code)
+    monitor.add_process_listener(died)
+    node = roslaunch.core.Node("pkg", "stop.py", "a", args="4")
+    process = roslaunch.nodeprocess.create_node_process("run", node, master)
+    monitor.register(process)
+    assert process.start()
+    assert eventually(lambda: codes == [4])
+    assert not monitor.done
+    monitor.registrations_complete()
+    monitor.join(10)
+    assert monitor.done
+    assert roslaunch.pmon.shutdown_process_monitor(monitor)
 
 
 def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, package: Path) -> None:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.launch.load import describe_args
+from minirospy.launch.config import LaunchFile, assignments
+from minirospy.launch.load import resolved_arg_docs
+from minirospy.workspace.packages import Packages
 
 __all__ = ["get_args"]
 
 
-def get_args(roslaunch_files: Sequence[str]) -> dict[str, tuple[str | None, str | None]]:
+def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
     """The args that launch files declare: name -> (doc, default)."""
-    return {arg.name: (arg.doc, arg.default) for file in roslaunch_files for arg in describe_args(file)}
+    packages, found = Packages(), {}
+    for each in roslaunch_files:
+        file, argv = (each, []) if isinstance(each, str) else each
+        for arg in resolved_arg_docs(file, assignments(argv), packages):
+            found[arg.name] = (arg.doc, arg.default)
+    return found

@@ -1,5 +1,19 @@
 """roslaunch.launch, filled in by minirospy."""
 
-from minirospy.launch.parent import ProcessListener as ROSLaunchListener
+from minirospy.launch.config import Machine, Master, Node, Param, RLException, Test
+from minirospy.launch.monitor import ProcessListener, start_process_monitor
+from minirospy.launch.monitor import ProcessListener as ROSLaunchListener
+from minirospy.launch.parent import ROSLaunchRunner
 
-__all__ = ["ROSLaunchListener"]
+__all__ = [
+    "Machine",
+    "Master",
+    "Node",
+    "Param",
+    "ProcessListener",
+    "RLException",
+    "ROSLaunchListener",
+    "ROSLaunchRunner",
+    "Test",
+    "start_process_monitor",
+]

@@ -7,14 +7,26 @@ from collections.abc import Sequence
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError
 from minirospy.launch.command import node_command, node_environment
-from minirospy.launch.config import LaunchFile, Node, ROSLaunchConfig, load_config_default
+from minirospy.launch.config import (
+    LaunchFile,
+    Machine,
+    Node,
+    NodeParamsException,
+    ROSLaunchConfig,
+    load_config_default,
+)
+from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import Packages
 
-__all__ = ["NodeParamsException", "get_node_args", "get_node_list", "print_node_args", "print_node_list"]
-
-
-class NodeParamsException(Exception):
-    """The command of a node cannot be made."""
+__all__ = [
+    "NodeParamsException",
+    "create_local_process_args",
+    "get_node_args",
+    "get_node_list",
+    "print_node_args",
+    "print_node_filename",
+    "print_node_list",
+]
 
 
 def get_node_list(config: ROSLaunchConfig) -> list[str]:
@@ -27,11 +39,13 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list
     spec = _find(node_name, roslaunch_files).spec
     environment = node_environment(spec, Environment.read(), {})
     environment.pop("ROS_MASTER_URI")
-    try:
-        command = node_command(spec, Packages())
-    except MinirospyError as error:
-        raise NodeParamsException(str(error)) from error
-    return [*(f'{name}="{value}"' for name, value in environment.items()), *command]
+    return [*(f'{name}="{value}"' for name, value in environment.items()), *_command(spec)]
+
+
+def create_local_process_args(node: Node, machine: Machine | None, env: object = None) -> list[str]:
+    """The command of a node. Raises NodeParamsException."""
+    node.give_name()
+    return _command(node.spec)
 
 
 def print_node_list(roslaunch_files: Sequence[LaunchFile]) -> None:
@@ -42,6 +56,18 @@ def print_node_list(roslaunch_files: Sequence[LaunchFile]) -> None:
 def print_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> None:
     """Print the command of a node."""
     print(" ".join(get_node_args(node_name, roslaunch_files)))
+
+
+def print_node_filename(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> None:
+    """Print the launch file that a node is in."""
+    print(_find(node_name, roslaunch_files).filename)
+
+
+def _command(spec: NodeSpec) -> list[str]:
+    try:
+        return node_command(spec, Packages())
+    except MinirospyError as error:
+        raise NodeParamsException(str(error)) from error
 
 
 def _find(name: str, files: Sequence[LaunchFile]) -> Node:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from minirospy.environment import Environment
-from minirospy.errors import MinirospyError
-from minirospy.launch.command import node_command
+from minirospy.launch.check import faults_of
 from minirospy.launch.config import LaunchFile, load_config_default
-from minirospy.launch.load import Problems, Source, load_sources
 from minirospy.launch.output import Output, warn_of_large_logs
 from minirospy.launch.parent import get_or_generate_uuid, resolve_launch_arguments
 from minirospy.workspace.packages import Packages
@@ -31,16 +29,7 @@ def check_log_disk_usage() -> None:
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
     """What is wrong with a launch file: all faults and programs that are missing, a line for each; None: nothing."""
-    problems: Problems = []
-    packages = Packages()
-    spec = load_sources([Source(f, None, {})], packages, problems=problems)
-    lines = [str(problem) for problem in problems]
-    for node in spec.runnables():
-        try:
-            node_command(node, packages)
-        except MinirospyError as error:
-            lines.append(str(error))
-    return "\n".join(lines) or None
+    return "\n".join(map(str, faults_of(f, Packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
 def print_file_list(roslaunch_files: Sequence[LaunchFile]) -> None:

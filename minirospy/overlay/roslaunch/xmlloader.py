@@ -1,5 +1,25 @@
 """roslaunch.xmlloader, filled in by minirospy."""
 
-from minirospy.launch.config import XmlLoader, XmlParseException
+from minirospy.launch.config import (
+    ArgException,
+    Machine,
+    Node,
+    Param,
+    RLException,
+    SubstitutionException,
+    Test,
+    XmlLoader,
+    XmlParseException,
+)
 
-__all__ = ["XmlLoader", "XmlParseException"]
+__all__ = [
+    "ArgException",
+    "Machine",
+    "Node",
+    "Param",
+    "RLException",
+    "SubstitutionException",
+    "Test",
+    "XmlLoader",
+    "XmlParseException",
+]

@@ -1,0 +1,42 @@
+"""What is wrong with launch files, found without running them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from minirospy.errors import LaunchError
+from minirospy.launch.command import node_command
+from minirospy.launch.load import Problems, Source, load_sources
+from minirospy.launch.spec import LaunchSpec
+from minirospy.workspace.packages import Packages
+
+__all__ = ["faults_of", "find_problems", "told"]
+
+
+def find_problems(sources: Sequence[Source], packages: Packages) -> tuple[LaunchSpec, Problems]:
+    """What the files say, and every fault: theirs, programs that are missing, machines that nobody declares."""
+    problems: Problems = []
+    spec = load_sources(sources, packages, problems=problems)
+    for node in spec.runnables():
+        for test in (lambda node: node_command(node, packages), spec.machine_of):
+            try:
+                test(node)
+            except LaunchError as problem:
+                problems.append(problem)
+    return spec, problems
+
+
+def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
+    """The faults of a launch file.
+
+    With ``ignore_unset_args`` there are none where an arg has no value: what else is wrong may follow from that.
+    """
+    _, problems = find_problems([Source(file, None, {})], packages)
+    is_unset = any(problem.text.startswith("requires the '") for problem in problems)
+    return [] if is_unset and ignore_unset_args else problems
+
+
+def told(problem: LaunchError, kind: str = "error") -> str:
+    """A fault as a line that editors know: FILE:LINE: KIND: TEXT."""
+    where = f"{problem.file}:{problem.line}" if problem.line else problem.file
+    return f"{where}: {kind}: {problem.text}"

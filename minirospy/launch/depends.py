@@ -1,0 +1,79 @@
+"""What launch files need: nodes, files and packages, and what their package.xml does not name of it.
+
+Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.errors import LaunchError
+from minirospy.launch.load import Problems, Source, describe_args, load_sources
+from minirospy.workspace.manifest import Kind, read_manifest
+from minirospy.workspace.packages import Packages, package_name
+
+__all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
+
+
+class FileNeeds(NamedTuple):
+    """What one launch file needs: the (package, program) of its nodes, the files that it includes, all packages."""
+
+    nodes: tuple[tuple[str, str], ...]
+    includes: tuple[str, ...]
+    packages: tuple[str, ...]
+
+
+def file_needs(
+    files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
+) -> dict[str, FileNeeds]:
+    """What each launch file needs, those that they include among them. Raises LaunchError.
+
+    It is no fault where an arg has no value or a file of parameters is missing: that need not be there yet. ``warn``
+    hears of each file that cannot be included.
+    """
+    sources = []
+    for file in files:
+        unset = {arg.name: "" for arg in describe_args(file) if arg.default is None}
+        sources.append(Source(file, None, unset))
+    problems: Problems = []
+    spec = load_sources(sources, packages, problems=problems)
+    for problem in problems:
+        if problem.text.startswith("cannot include"):
+            warn(problem)
+    needs: dict[str, FileNeeds] = {}
+    for file in dict.fromkeys([*files, *(inner for _, inner in spec.includes)]):
+        nodes = tuple(
+            dict.fromkeys((node.package, node.type) for node in spec.runnables() if node.file == file)
+        )
+        includes = tuple(dict.fromkeys(inner for outer, inner in spec.includes if outer == file))
+        called = [*(package for package, _ in nodes), *(package_of(inner) or "" for inner in includes)]
+        needs[file] = FileNeeds(nodes, includes, tuple(dict.fromkeys(filter(None, called))))
+    return needs
+
+
+def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
+    """The packages that launch files need and the package.xml of their package does not name, by package, sorted.
+
+    ``tests``: what it names for tests counts, too. Raises ManifestError.
+    """
+    found: dict[str, set[str]] = {}
+    for file, what in needs.items():
+        folder = _package_folder(file)
+        if folder is None:
+            continue
+        manifest = read_manifest(folder / "package.xml")
+        declared = {manifest.name, *manifest.depends(Kind.EXEC, *([Kind.TEST] if tests else []))}
+        found.setdefault(manifest.name, set()).update(set(what.packages) - declared)
+    return {package: sorted(missing) for package, missing in found.items() if missing}
+
+
+def package_of(file: str) -> str | None:
+    """The package that a file lies in."""
+    folder = _package_folder(file)
+    return package_name(folder) if folder else None
+
+
+def _package_folder(file: str) -> Path | None:
+    return next((folder for folder in Path(file).resolve().parents if package_name(folder)), None)

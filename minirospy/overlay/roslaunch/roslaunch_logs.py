@@ -1,0 +1,8 @@
+"""roslaunch.roslaunch_logs, filled in by minirospy: where the log files of the present run lie."""
+
+from minirospy.cli.roslaunch_logs import get_run_id
+from minirospy.cli.roslaunch_logs import main as logs_main
+
+__all__ = ["NAME", "get_run_id", "logs_main"]
+
+NAME = "roslaunch-logs"
