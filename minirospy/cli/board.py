@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, ClassVar
 
@@ -19,7 +20,7 @@ from minirospy.gpio.place import Place
 from minirospy.scanner import FIELDS, Circle
 
 if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderResult
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
     from rich.text import Text
 
 __all__ = ["Picture", "main", "render"]
@@ -147,7 +148,6 @@ def _show() -> int:
             _print_pins(board.state())
             return 0
         from rich.console import Console, Group
-        from rich.live import Live
         from rich.text import Text
 
         keys = " and ".join(str(number) for number in range(1, len(BUTTONS) + 1))
@@ -156,15 +156,28 @@ def _show() -> int:
             "p: send them away; q: quit",
             style="dim",
         )
-        shown = board.state()
-        live = Live(Group(render(shown), hint), console=Console(), auto_refresh=False)
-        with _Keys() as pressed, live:
-            while (key := pressed.next()) not in {"q", "\x04"}:
+        shown = None
+        with _Keys() as pressed, _drawing(Console()) as draw:
+            key = ""
+            while key not in {"q", "\x04"}:
                 _act(board, key)
                 if (state := board.state()) != shown:
                     shown = state
-                    live.update(Group(render(shown), hint), refresh=True)
+                    draw(Group(render(shown), hint))
+                key = pressed.next()
     return 0
+
+
+@contextlib.contextmanager
+def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
+    """What draws: over what was drawn before; below it where the terminal's cursor cannot go back (TERM=dumb)."""
+    from rich.live import Live
+
+    if console.is_dumb_terminal:
+        yield console.print
+        return
+    with Live(console=console, auto_refresh=False) as live:
+        yield lambda drawn: live.update(drawn, refresh=True)
 
 
 def _act(board: Board, key: str) -> None:
@@ -311,6 +324,15 @@ def _watch(argv: Sequence[str]) -> None:
                 break
 
 
+def _reset(argv: Sequence[str]) -> None:
+    Parser(
+        "minirospy board reset",
+        description="Make all pins inputs at 0, release all buttons, send the person away.",
+    ).parse_args(argv)
+    with Board() as board:
+        board.reset()
+
+
 def _list(argv: Sequence[str]) -> None:
     Parser("minirospy board list", description="Print the wired pins and those in use.").parse_args(argv)
     with Board() as board:
@@ -350,6 +372,7 @@ _FAMILY = Family(
         Verb("set", "put a level on a pin: set 7 1", _set),
         Verb("watch", "print a line for each edge: watch 7", _watch),
         Verb("list", "print the pins", _list),
+        Verb("reset", "make the board as new", _reset),
         Verb("boards", "print the names of the boards", _boards),
     ),
     "Several boards, one for each robot: `minirospy board -b NAME ...`, and MINIROSPY_BOARD=NAME for its nodes.",

@@ -1,4 +1,4 @@
-"""What every command does the same way: how it ends.
+"""What every command does the same way: how it reads its words, is a node of the graph, and ends.
 
 A command is a typed function that raises; `main(argv)` hands it to :func:`run`, which turns what was
 raised into one line on stderr and an exit status:
@@ -6,7 +6,7 @@ raised into one line on stderr and an exit status:
 ====== =====================================================================
 status when
 ====== =====================================================================
-0      done; a stream (`rostopic echo`) ended by Ctrl-C or by a closed pipe
+0      done; a stream, a wait or a question ended by Ctrl-C or a closed pipe
 1      it could not be done: no master, an unknown name, a peer that fails
 2      typed wrong: unknown option, missing argument
 ====== =====================================================================
@@ -15,14 +15,31 @@ status when
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
+import itertools
 import os
 import sys
-from collections.abc import Callable
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.errors import MessageException, MinirospyError, ROSException, ServiceException, UsageError
 
-__all__ = ["Parser", "complain", "refuse_bag", "run"]
+if TYPE_CHECKING:
+    from minirospy.introspect.streams import ToolNode
+    from minirospy.names import Arguments
+
+__all__ = [
+    "Parser",
+    "complain",
+    "did_you_mean",
+    "one_argument",
+    "refuse_bag",
+    "run",
+    "tool_node",
+    "warn",
+    "warn_unpublished",
+]
 
 
 class _Help(argparse.HelpFormatter):
@@ -42,17 +59,44 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **{"formatter_class": _Help, **kwargs})
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._check_options(args)
+        return super().parse_known_args(args, namespace)
+
+    def parse_known_intermixed_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._check_options(args)
+        return super().parse_known_intermixed_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message}{self._nearest(message)} (`{self.prog} -h` shows what there is)")
+        raise UsageError(f"{message} (`{self.prog} -h` shows what there is)")
 
-    def _nearest(self, message: str) -> str:
-        """The option that may have been meant, where ``message`` complains of one that does not exist."""
-        import difflib
+    def _check_options(self, args: Sequence[str] | None) -> None:
+        """Tell of a long option that does not exist before a missing argument: that may be what it has swallowed."""
+        if any(action.nargs == argparse.REMAINDER for action in self._actions):
+            return  # some of the options are another program's
+        for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
+            option = word.partition("=")[0]
+            if option.startswith("--") and not any(
+                known.startswith(option) for known in self._option_string_actions
+            ):
+                self.error(
+                    f"unrecognized arguments: {word}{did_you_mean(option, self._option_string_actions, 1)}"
+                )
 
-        _, found, words = message.partition("unrecognized arguments: ")
-        option = words.split()[0].partition("=")[0] if found else ""
-        near = difflib.get_close_matches(option, self._option_string_actions, n=1)
-        return f"; did you mean {near[0]}?" if near and option.startswith("--") else ""
+
+def did_you_mean(word: str, known: Iterable[str], most: int = 2) -> str:
+    """What is said behind a word that does not exist: the nearest that do, "" where none is near."""
+    import difflib
+
+    near = difflib.get_close_matches(word, list(known), n=most)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
+
+
+def one_argument(prog: str, description: str, name: str, help_: str, argv: Sequence[str]) -> str:
+    """The one word, as typed, that a command takes."""
+    parser = Parser(prog, description=description)
+    parser.add_argument(name, help=help_)
+    return str(getattr(parser.parse_args(argv), name))
 
 
 def refuse_bag(command: str) -> NoReturn:
@@ -62,6 +106,7 @@ def refuse_bag(command: str) -> NoReturn:
 
 def run(name: str, body: Callable[[], int | None]) -> int:
     """The exit status of ``body``; a named error becomes ``name: ERROR: text`` on stderr."""
+    _open_streams()
     try:
         status = body() or 0
         sys.stdout.flush()
@@ -70,9 +115,12 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         return complain(name, error, 2)
     except (MinirospyError, ROSException, ServiceException, MessageException) as error:
         return complain(name, error)
+    except UnicodeEncodeError as error:
+        wrong = error.object[error.start : error.end]
+        return complain(name, UsageError(f"{wrong!r} was typed, which is no UTF-8 text"), 2)
     except BrokenPipeError:
-        # The reader (`| head`) has gone: quiet, also for the interpreter's own flush at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader (`| head`) has gone.
+        _flush()
         return 0
     except OSError as error:
         # A disk that is full, a folder that may not be written: the file's name, and the system's words.
@@ -82,8 +130,72 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         return 0
 
 
+def _open_streams() -> None:
+    """Standard streams that are there, and print everything.
+
+    One that was closed (`rostopic list >&-`, a Windows program without a console) would be None; an output that
+    cannot encode what a robot says (a pipe in Windows' code page) gets it as escapes.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 it stays for the process
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def warn(what: str, name: str = "") -> None:
+    """One line on stderr, after all that was printed before; that ``name`` is not legal stands there, too."""
+    from minirospy.introspect.graph import why_illegal
+
+    why = why_illegal(name) if name else ""
+    sys.stdout.flush()
+    print(f"WARNING: {what}{why and f'; {why}'}", file=sys.stderr)
+
+
+def warn_unpublished(topic: str) -> None:
+    """What a command that waits for the messages of a topic says, where it does not know it."""
+    warn(f"topic [{topic}] does not appear to be published yet", topic)
+
+
+@contextlib.contextmanager
+def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
+    """The node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
+
+    ``arguments``: what a launch file gives it as a node: `__name:=`, `__ns:=`, `__master:=`.
+    """
+    import signal
+
+    from minirospy.environment import Environment
+    from minirospy.introspect.streams import ToolNode
+
+    special = arguments.special if arguments else {}
+    environment = Environment.read(
+        master_uri=special.get("__master", ""),
+        host=special.get("__hostname") or special.get("__ip", ""),
+        namespace=special.get("__ns", ""),
+    )
+    # As by Ctrl-C.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with ToolNode(environment, tool, name=special.get("__name", ""), ros_time=ros_time) as node:
+            if node.simulated:
+                warn("may be using simulated time")
+            yield node
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def complain(name: str, error: Exception, status: int = 1) -> int:
     """One line on stderr, after all that was printed before; ``status`` comes back."""
-    sys.stdout.flush()
+    _flush()
     print(f"{name}: ERROR: {error}", file=sys.stderr)
     return status
+
+
+def _flush() -> None:
+    """Print what waits; where that cannot be, it is dropped, also from the interpreter's own flush at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

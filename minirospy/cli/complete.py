@@ -1,13 +1,13 @@
-"""`minirospy complete INDEX WORD...`: what can stand where the cursor is; one candidate a line. For TAB.
+"""`minirospy complete INDEX WORD...`: what can stand where the cursor is; a line feed between two. For TAB.
 
 The words of a command line come in as the shell holds them (quotes included), INDEX is the place of the word under
 the cursor; candidates go out as the shell is to insert them: quoted where they need it, with a vertical tab for
 each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none). One that ends in ``/`` or ``=``
 goes on; after any other comes a space.
 
-What an option or an argument is called in its command's parser says what it is completed with: there is no second
-table of verbs and options. Nothing here ends in an error, and a master is waited for no longer than a person does.
-Source: http://wiki.ros.org/rosbash#Tab_completion.
+Verbs and options are asked of the command's own parser: there is no second list of them. What an argument, or an
+option's value, is completed with, its name in that parser says: see :data:`COMPLETED_WITH`. Nothing here ends in an
+error, and a master is waited for no longer than a person does. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from minirospy.cli import sources
 from minirospy.cli.command import Parser
-from minirospy.cli.sources import BY_HAND, PLAIN, SOURCES, Place, on_one_line
+from minirospy.cli.sources import Place, Source, Text
 from minirospy.cli.verbs import Family
 from minirospy.errors import MinirospyError
 
@@ -29,45 +31,100 @@ if TYPE_CHECKING:
     import argparse
 
 
-__all__ = ["candidates", "main"]
+__all__ = ["BY_HAND", "COMPLETED_WITH", "ENTRANCES", "candidates", "main"]
 
-_NUMBER = re.compile(r"-\d|-\.\d")
+ENTRANCES = {
+    "roscore": "master:roscore", "rosmaster": "master:rosmaster", "roslaunch": "roslaunch:main",
+    "roslaunch-deps": "roslaunch_deps:main", "roslaunch-logs": "roslaunch_logs:main", "rosdep": "rosdep:main",
+    "rostopic": "rostopic:main", "rosnode": "rosnode:main", "rosservice": "rosservice:main",
+    "rosparam": "rosparam:main", "rosmsg": "rosmsg:main", "rossrv": "rosmsg:main_srv",
+    "rosmsg-proto": "rosmsg_proto:main", "rosconsole": "rosconsole:main", "rosgraph": "rosgraph:main",
+    "rosclean": "rosclean:main", "rosversion": "rosversion:main", "roswtf": "doctor:roswtf",
+    "rostest": "rostest:rostest", "rosunit": "rostest:rosunit", "catkin": "catkin:catkin",
+    "catkin_make": "catkin:catkin_make", "catkin_make_isolated": "catkin:catkin_make_isolated",
+    "catkin_create_pkg": "catkin:catkin_create_pkg", "catkin_init_workspace": "catkin:catkin_init_workspace",
+    "catkin_find": "catkin_tools:catkin_find", "catkin_find_pkg": "catkin_tools:catkin_find_pkg",
+    "catkin_topological_order": "catkin_tools:catkin_topological_order",
+    "catkin_test_results": "catkin_test_results:main",
+}  # fmt: skip
+"""Command -> where its parser is made: ``module:function`` of this folder, as in pyproject.toml."""
+
+BY_HAND: dict[str, Source] = {
+    "roscd": sources.package_folders,
+    "rospd": sources.package_folders,
+    "rosls": sources.package_folders,
+    "rosed": sources.package_file,
+    "roscat": sources.package_file,
+    "roscp": sources.package_file_and_target,
+    "rosmv": sources.package_file_and_target,
+    "rosrun": sources.rosrun_words,
+    "rospack": sources.rospack_words,
+    "rosstack": sources.rosstack_words,
+}
+"""Commands that read their words without a parser."""
+
+COMPLETED_WITH: dict[Source, str] = {
+    # of the graph, as it is now
+    sources.topics: "topic topics rostopic.namespace",
+    sources.topic_type: "rostopic.type",
+    sources.message_text: "rostopic.args",
+    sources.nodes: "node nodes rosnode.namespace",
+    sources.machines: "machine",
+    sources.services: "service rosservice.namespace",
+    sources.request_text: "rosservice.args",
+    sources.parameters: "parameter rosparam.namespace",
+    sources.parameter_value: "rosparam.value",
+    sources.loggers: "logger",
+    # of the packages
+    sources.message_types: "type",
+    sources.service_types: "rosservice.type rossrv.type",
+    sources.prototype_types: "rosmsg-proto.type",
+    sources.package_names: "package packages pkg only_pkg_with_deps dependencies catkin_deps "
+    "blacklist whitelist start_with",
+    sources.package_path: "catkin_find.path",
+    sources.build_targets: "targets",
+    sources.launch_words: "roslaunch.what rostest.what",
+    sources.launch_nodes: "roslaunch.args roslaunch.find_node",
+    sources.launch_files: "others roslaunch-deps.files",
+    # of this computer
+    sources.files: "file files textfile binfile bag pid arguments",
+    sources.folders: "build devel directory extend folder from_paths install_space pkgdir results_base_dir source "
+    "test_results_dir workspace",
+    # what there is to choose from
+    sources.pins: "pin",
+    sources.shells: "shell",
+    sources.kinds: "mode",
+    # numbers, names to be made up, expressions
+    sources.nothing: "ahead allow author boost_comps catkin_make_args child cmake_args count dependency_types description "
+    "exclude_slots filter j jobs keys left license load_average maintainer make_args mem_limit name numworkers os p "
+    "parallel_packages pkg_version port prefix presses rate results_filename rosdistro run_id server_uri sigint_timeout "
+    "sigterm_timeout size skip_keys sys_deps time_limit timeout width window",
+}
+"""Source -> what arguments and options are called (argparse's ``dest``) that it completes; ``command.name``: of that one."""
+
+_SOURCES = {name: source for source, names in COMPLETED_WITH.items() for name in names.split()}
+
+_NUMBER = re.compile(r"-\.?\d")
+_VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 _LINE_FEED = "\v"
 _ONE_LINE = "--one-line"
 _OPTIONS = ["-h", "--help", "-V", "--version"]
+_PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
+"""What no shell reads as more than a word."""
 
-_MODULES = {
-    **{
-        name: (name, "main")
-        for name in (
-            "roslaunch", "rostopic", "rosnode", "rosservice", "rosparam", "rosmsg", "rosconsole", "rosgraph", "rosclean",
-            "rosversion",
-        )
-    },
-    "roscore": ("master", "roscore"),
-    "rosmaster": ("master", "rosmaster"),
-    "rossrv": ("rosmsg", "main_srv"),
-    "rosmsg-proto": ("rosmsg_proto", "main"),
-    "roswtf": ("doctor", "roswtf"),
-    "rostest": ("rostest", "rostest"),
-    "rosunit": ("rostest", "rosunit"),
-    "catkin_test_results": ("catkin_test_results", "main"),
-    **{
-        name: ("catkin", name)
-        for name in ("catkin_make", "catkin", "catkin_create_pkg", "catkin_init_workspace")
-    },
-    **{
-        name: ("catkin_tools", name)
-        for name in ("catkin_find", "catkin_find_pkg", "catkin_topological_order")
-    },
-}  # fmt: skip
-"""Command -> where its parser is made: a module of this folder, and its entrance."""
+
+class _Word(NamedTuple):
+    """A word without its quotes; the one that is still open at its end was opened at ``text[at:]``."""
+
+    text: str
+    quote: str
+    at: int
 
 
 class _Asked(Exception):
     """Raised in place of running a command: its family of verbs, or its parser."""
 
-    def __init__(self, answer: Any) -> None:
+    def __init__(self, answer: Family | Parser) -> None:
         super().__init__()
         self.answer = answer
 
@@ -81,7 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         index, *line = words[1:] if one_line else words
         found = candidates(int(index), line, one_line=one_line)
         sys.stdout.reconfigure(errors="surrogateescape")  # type: ignore[union-attr]
-        print("".join(f"{text}\n" for text in found), end="", flush=True)
+        print("\n".join(found), end="", flush=True)
     return 0
 
 
@@ -89,13 +146,13 @@ def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> l
     """What can stand at ``words[index]``, as the shell is to insert it; if so asked, never more than one line."""
     if not 0 < index <= len(words):
         return []
-    word, quote = _unquoted(words[index]) if index < len(words) else ("", "")
-    before = [_unquoted(each)[0] for each in words[:index]]
-    command = re.split(r"[/\\]", before[0])[-1].removesuffix(".exe")
+    word = _unquoted(words[index] if index < len(words) else "")
+    command, *before = (_at_home(_unquoted(each).text) for each in words[:index])
+    command = re.split(r"[/\\]", command)[-1].removesuffix(".exe")
     try:
-        found = _of_command(command, before[1:], word)
-        fitting = (on_one_line(text) if one_line else text for text in found)
-        return [_quoted(text, quote) for text in dict.fromkeys(fitting) if text.startswith(word)]
+        found = _of_command(command, before, word.text)
+        fitting = (sources.on_one_line(text) if one_line else text for text in found)
+        return [_quoted(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
         # An unknown package or type: the command itself will say so.
         return []
@@ -109,9 +166,9 @@ def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
         return _of_minirospy(before, word)
     if command in BY_HAND:
         return BY_HAND[command](Place("", tuple(before), word))
-    if command not in _MODULES:
+    if command not in ENTRANCES:
         return ()
-    module, function = _MODULES[command]
+    module, _, function = ENTRANCES[command].partition(":")
     return _of_module(command, module, function, before, word)
 
 
@@ -132,21 +189,19 @@ def _of_module(command: str, module: str, function: str, before: list[str], word
     """The candidates for a command whose parser, or verbs, its own module makes."""
     takes = _takes(getattr(importlib.import_module(f"minirospy.cli.{module}"), function))
     verb = ""
-    if isinstance(takes, Family):
+    while isinstance(takes, Family):
         if not before:
-            return ["-h", "--help"] if word.startswith("-") else [each.name for each in takes.verbs]
-        command, verb = takes.name, before[0]
+            return _OPTIONS[:2] if word.startswith("-") else [each.name for each in takes.verbs]
+        command, verb, *before = takes.name, *before
         bodies = [each.body for each in takes.verbs if each.name == verb]
-        takes, before = (_takes(bodies[0]) if bodies else None), before[1:]
-    if isinstance(takes, Parser):
-        return _of_parser(takes, command, verb, before, word)
-    return ()
+        takes = _takes(bodies[0]) if bodies else None
+    return _of_parser(takes, command, verb, before, word) if takes else ()
 
 
 def _takes(entrance: Callable[[Sequence[str]], object]) -> Family | Parser | None:
     """What a command takes, from itself: it is stopped where it would read its words."""
 
-    def stop(self: object, *_: object, **__: object) -> None:
+    def stop(self: Any, *_: object, **__: object) -> None:
         raise _Asked(self)
 
     doors: tuple[tuple[Any, str], ...] = ((Family, "main"), (Parser, "parse_known_args"))
@@ -159,8 +214,7 @@ def _takes(entrance: Callable[[Sequence[str]], object]) -> Family | Parser | Non
             # Of a command that reads its words another way, -h does no harm.
             entrance(["-h"])
     except _Asked as asked:
-        answer: Family | Parser = asked.answer
-        return answer
+        return asked.answer
     except SystemExit:
         pass
     finally:
@@ -179,19 +233,24 @@ def _of_parser(parser: Parser, command: str, verb: str, before: list[str], word:
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            pending = options[each] if options[each].nargs != 0 else None
+            # An option that may stand alone has a number: no candidate of what follows.
+            pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None
         elif (not each.startswith("-") or _NUMBER.match(each)) and ":=" not in each:
             given.append(each)
     place = Place(verb, tuple(given), word)
-    if pending is not None and not word.startswith("-"):
-        return _of_action(pending, command, place)
     if word.startswith("-") and not _NUMBER.match(word):
+        name, assigned, value = word.partition("=")
+        if assigned and name in options:
+            found = _of_action(options[name], command, place._replace(word=value))
+            return [f"{name}={each}" for each in found]
         return [name for name in options if name not in before]
+    if pending is not None:
+        return _of_action(pending, command, place)
     positionals = [action for action in parser._actions if not action.option_strings]
     at = len(given)
-    if positionals and at >= len(positionals) and positionals[-1].nargs in ("+", "*"):
+    if positionals and at >= len(positionals) and positionals[-1].nargs in ("+", "*", "..."):
         at = len(positionals) - 1
     return _of_action(positionals[at], command, place) if at < len(positionals) else ()
 
@@ -199,40 +258,63 @@ def _of_parser(parser: Parser, command: str, verb: str, before: list[str], word:
 def _of_action(action: argparse.Action, command: str, place: Place) -> Iterable[str]:
     if action.choices is not None:
         return [str(choice) for choice in action.choices]
-    source = SOURCES.get(f"{command} {action.dest}") or SOURCES.get(action.dest)
+    source = _SOURCES.get(f"{command}.{action.dest}") or _SOURCES.get(action.dest)
     return source(place) if source else ()
 
 
 # --- words as shells write them
 
 
-def _unquoted(word: str) -> tuple[str, str]:
-    """A word without its quotes, and the quote that is still open at its end."""
-    text: list[str] = []
+def _unquoted(word: str) -> _Word:
+    """A word without its quotes; $NAME outside of single ones stands for its value."""
+    text = ""
     quote = ""
-    letters = iter(word)
-    for letter in letters:
+    at = read = 0
+    while read < len(word):
+        letter = word[read]
+        variable = _VARIABLE.match(word, read) if quote != "'" else None
+        value = os.environ.get(variable[1] or variable[2]) if variable else None
+        read += 1
         if letter == "\\" and quote != "'":
-            text.append(next(letters, ""))
+            text += word[read : read + 1]
+            read += 1
+        elif variable and value is not None:
+            text += value
+            read = variable.end()
         elif letter == quote:
             quote = ""
         elif letter in "'\"" and not quote:
-            quote = letter
+            quote, at = letter, len(text)
         else:
-            text.append(letter)
-    return "".join(text), quote
+            text += letter
+    return _Word(text, quote, at)
 
 
-def _quoted(text: str, quote: str) -> str:
-    """``text`` in the quotes that were opened, or in double ones where it needs any."""
-    if PLAIN.match(text) and not quote:
-        return text
-    inner = text.replace("\n", _LINE_FEED)
-    if quote != "'":
-        inner = re.sub(r'(["$`\\])', r"\\\1", inner)
-    quote = quote or '"'
-    # A folder's quotes stay open: what lies in it comes next.
-    return f"{quote}{inner}" if text.endswith("/") else f"{quote}{inner}{quote}"
+def _at_home(text: str) -> str:
+    return os.path.expanduser(text) if text.startswith("~/") else text
+
+
+def _quoted(text: str, word: _Word) -> str:
+    """``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
+    if word.quote:
+        # A folder's quotes stay open: what lies in it comes next.
+        end = "" if text.endswith("/") else word.quote
+        return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
+    if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
+        return f'"{_inside(text, chr(34))}"'
+    return _escaped(text)
+
+
+def _inside(text: str, quote: str) -> str:
+    text = text.replace("\n", _LINE_FEED)
+    if quote == "'":
+        return text.replace("'", r"'\''")
+    # A shell for people puts old commands in place of an exclamation mark, in double quotes too.
+    return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
+
+
+def _escaped(text: str) -> str:
+    return re.sub(r"([^\w@%+=:,./~-])", r"\\\1", text)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import minirospy
-from minirospy.cli.command import run
+from minirospy.cli.command import did_you_mean, run
 from minirospy.errors import UsageError
 
 __all__ = ["main"]
@@ -68,10 +68,7 @@ def _dispatch(words: list[str]) -> int:
         return 0
     entry = _VERBS.get(words[0])
     if entry is None:
-        import difflib
-
-        near = difflib.get_close_matches(words[0], _VERBS, n=2)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        hint = did_you_mean(words[0], _VERBS)
         raise UsageError(f"there is no `minirospy {words[0]}`{hint} (`minirospy -h` shows what there is)")
     function = getattr(importlib.import_module(f"minirospy.cli.{entry.module}"), entry.function)
     return int(function(words[1:]))

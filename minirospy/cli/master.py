@@ -283,6 +283,20 @@ def _quiet(line: str) -> None:
     """Where nobody reads what is registered."""
 
 
+class _Shown(logging.Handler):
+    """Prints what is logged."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """One record."""
+        _show(self.format(record))
+
+
+def _show(line: str) -> None:
+    """Print; a reader that has gone (`roscore -v | head`) is no reason for the master to fail."""
+    with contextlib.suppress(OSError):
+        print(line, flush=True)
+
+
 def _log_to_file(folder: Path, *, verbose: bool, level: str | None) -> tuple[Path, Callable[[str], object]]:
     """Log to ``folder``/master.log; ``latest`` beside the folder points to it where links are allowed.
 
@@ -295,15 +309,17 @@ def _log_to_file(folder: Path, *, verbose: bool, level: str | None) -> tuple[Pat
         folder.mkdir(parents=True, exist_ok=True)
         handler = LogFile(path, _LOG_BYTES, "minirospy.master")
     except OSError as error:
-        raise MinirospyError(f"cannot write logs to {folder}: {error}; set ROS_LOG_DIR") from error
+        raise MinirospyError(
+            f"cannot write logs to {folder}: {error.strerror or error}; set ROS_LOG_DIR"
+        ) from error
     logger.addHandler(handler)
     say: Callable[[str], object] = handler.line if logger.isEnabledFor(logging.INFO) else _quiet
     if verbose:
-        logger.addHandler(logging.StreamHandler(sys.stdout))
+        logger.addHandler(_Shown())
 
         def say_twice(line: str, note: Callable[[str], object] = say) -> None:
             note(line)
-            print(line, flush=True)
+            _show(line)
 
         say = say_twice
     latest = folder.parent / "latest"

@@ -10,15 +10,18 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, one_argument, tool_node, warn, warn_unpublished
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import MinirospyError, NotFoundError, UsageError
+from minirospy.errors import MinirospyError, UsageError
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.nodes import find_node
-from minirospy.introspect.services import call_service, fill_request
+from minirospy.introspect.loggers import logger_level, logger_levels, set_logger_level
+from minirospy.introspect.nodes import list_nodes
+from minirospy.introspect.topics import find_topic
 
 if TYPE_CHECKING:
     from re import Pattern
+
+    from minirospy.names import Arguments
 
 __all__ = ["main"]
 
@@ -33,38 +36,32 @@ def main(argv: Sequence[str] | None = None) -> int:
     return _FAMILY.main(argv)
 
 
-def _list(argv: Sequence[str]) -> None:
-    parser = Parser("rosconsole list", description="List the loggers of a node.")
-    parser.add_argument("node", help="the node's name")
-    options = parser.parse_args(argv)
-    with Graph.open("rosconsole") as graph:
-        print("\n".join(_loggers(graph, options.node)))
+def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
+    node = one_argument("rosconsole list", "List the loggers of a node.", "node", "the node's name", argv)
+    with Graph.open("rosconsole", arguments=arguments) as graph:
+        print("\n".join(logger_levels(graph, graph.resolve(node))))
 
 
-def _get(argv: Sequence[str]) -> None:
+def _get(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rosconsole get", description="Print the level of a node's logger.")
     parser.add_argument("node", help="the node's name")
     parser.add_argument("logger", help="the logger, as rosout")
     options = parser.parse_args(argv)
-    with Graph.open("rosconsole") as graph:
-        print(_level(graph, options.node, options.logger).upper())
+    with Graph.open("rosconsole", arguments=arguments) as graph:
+        print(logger_level(graph, graph.resolve(options.node), options.logger).upper())
 
 
-def _set(argv: Sequence[str]) -> None:
+def _set(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rosconsole set", description="Set the level of a node's logger.")
     parser.add_argument("node", help="the node's name")
     parser.add_argument("logger", help="the logger, as rosout")
     parser.add_argument("level", type=str.lower, choices=list(_LEVELS), help="what it says at least")
     options = parser.parse_args(argv)
-    with Graph.open("rosconsole") as graph:
-        # A node takes any name; asked first, one that it does not have is told of.
-        _level(graph, options.node, options.logger)
-        _ask(
-            graph, options.node, "set_logger_level", "roscpp/SetLoggerLevel", [options.logger, options.level]
-        )
+    with Graph.open("rosconsole", arguments=arguments) as graph:
+        set_logger_level(graph, graph.resolve(options.node), options.logger, options.level)
 
 
-def _echo(argv: Sequence[str]) -> int:
+def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> int:
     parser = Parser("rosconsole echo", description="Print what nodes log, until Ctrl-C.")
     parser.add_argument("filter", metavar="FILTER", nargs="?", default=".*",
                         help="a regular expression: only nodes whose name begins so (default: .*)")  # fmt: skip
@@ -81,16 +78,19 @@ def _echo(argv: Sequence[str]) -> int:
         wanted = re.compile(options.filter)
     except re.error as error:
         raise UsageError(f"[{options.filter}] is not a regular expression: {error}") from error
-    return _print_lines(wanted, options)
+    return _print_lines(wanted, options, arguments)
 
 
-def _print_lines(wanted: Pattern[str], options: Any) -> int:
-    from minirospy.environment import Environment
-    from minirospy.introspect.streams import ToolNode
-
-    environment = Environment.read()
-    with ToolNode(environment, "rosconsole") as node, Graph.open("rosconsole") as graph:
-        for received in node.inbox(graph.resolve(options.topic)):
+def _print_lines(wanted: Pattern[str], options: Any, arguments: Arguments | None) -> int:
+    with Graph.open("rosconsole", arguments=arguments) as graph:
+        topic = graph.resolve(options.topic)
+        field = find_topic(graph, topic)
+        if not field or field.path:
+            warn_unpublished(topic)
+        if not any(map(wanted.match, list_nodes(graph))):
+            warn(f"no node's name begins as [{wanted.pattern}] yet")
+    with tool_node("rosconsole", arguments) as node:
+        for received in node.inbox(topic):
             log = node.classes.read(received)
             if log._type != "rosgraph_msgs/Log":
                 raise MinirospyError(f"[{options.topic}] carries {log._type}, not rosgraph_msgs/Log")
@@ -115,30 +115,6 @@ def _shown(log: Any, *, colour: bool, verbose: bool) -> str:
     return text
 
 
-def _loggers(graph: Graph, node: str) -> dict[str, str]:
-    """Logger -> level (in small letters), as the node tells them."""
-    response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
-    return {logger.name: logger.level for logger in response.loggers}
-
-
-def _level(graph: Graph, node: str, logger: str) -> str:
-    loggers = _loggers(graph, node)
-    if logger not in loggers:
-        raise NotFoundError(f"logger of node {node}", logger, loggers)
-    return loggers[logger]
-
-
-def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Any:
-    """The response of a node's own service."""
-    name = find_node(graph, graph.resolve(node)).name
-    try:
-        return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))
-    except NotFoundError as error:
-        raise MinirospyError(
-            f"node [{name}] tells nothing of its loggers: it has no service {service}"
-        ) from error
-
-
 _FAMILY = Family(
     "rosconsole",
     "rosconsole is a command-line tool for configuring the logger level of ROS nodes.",
@@ -149,4 +125,5 @@ _FAMILY = Family(
         Verb("echo", "print logger messages", _echo),
     ),
     "Type rosconsole <command> -h for more detailed usage, e.g. 'rosconsole list -h'",
+    is_node=True,
 )

@@ -5,18 +5,16 @@ Source: http://wiki.ros.org/roslaunch/roslaunch-check, http://wiki.ros.org/rosla
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli import roslaunch
 from minirospy.cli.command import Parser, run
 from minirospy.errors import MinirospyError
+from minirospy.launch.check import faults_of, told
 from minirospy.testing.junit import failure_junit_xml, success_junit_xml
-from minirospy.workspace.packages import package_name
+from minirospy.workspace.packages import Packages, package_name
 
 __all__ = ["main"]
 
@@ -68,13 +66,7 @@ def _check(argv: Sequence[str]) -> int:
 
 def _faults(file: Path, *, ignore_unset_args: bool) -> list[str]:
     print(f"checking {file}")
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        roslaunch.main(["--check", str(file)])
-    lines = [line for line in said.getvalue().splitlines() if ": error: " in line or "ERROR: " in line]
-    unset = [line for line in lines if ": error: required arg " in line]
-    # What follows from it is no fault either.
-    return [] if unset and ignore_unset_args else lines
+    return [told(each) for each in faults_of(str(file), Packages(), ignore_unset_args=ignore_unset_args)]
 
 
 def _test_name(path: Path) -> str:

@@ -12,19 +12,21 @@ from collections.abc import Sequence
 from minirospy.cli.command import Parser, complain
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import NodeUnreachableError, NotFoundError, UsageError
-from minirospy.introspect.graph import Graph, NodeAddress, node_host
+from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import (
     NodeDetail,
-    TypedName,
     find_node,
     forget_node,
     kill_node,
     list_nodes,
     node_connections,
     node_detail,
+    node_hosts,
+    nodes_on,
     ping_node,
     unreachable_nodes,
 )
+from minirospy.introspect.texts import connections_text, node_text
 
 __all__ = ["main"]
 
@@ -123,27 +125,10 @@ def _info(argv: Sequence[str]) -> int:
                 complain("rosnode", error)
                 failed += 1
                 continue
-            print(f"{_RULE}\nNode [{detail.name}]")
-            print(_described(detail))
+            print(f"{_RULE}\n{node_text(detail)}")
             if not options.quiet:
                 failed += not _print_connections(graph, detail)
         return 1 if failed else 0
-
-
-def _described(detail: NodeDetail) -> str:
-    def section(title: str, rows: list[str]) -> str:
-        return f"{title}: " + ("\n" + "\n".join(f" * {row}" for row in rows) if rows else "None") + "\n"
-
-    def typed(topics: list[TypedName]) -> list[str]:
-        return [f"{topic.name} [{topic.type}]" for topic in topics]
-
-    return "\n".join(
-        (
-            section("Publications", typed(detail.publications)),
-            section("Subscriptions", typed(detail.subscriptions)),
-            section("Services", detail.services),
-        )
-    )
 
 
 def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
@@ -153,29 +138,8 @@ def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
     except NodeUnreachableError as error:
         complain("rosnode", error)
         return False
-    print(f"Pid: {connections.pid}")
-    if connections.links:
-        names = {graph.node_uri(node): node for node in list_nodes(graph)}
-        print("Connections:")
-        for link in connections.links:
-            to = link.destination
-            # An inbound connection names its publisher by URI.
-            shown = f"{names[to]} ({to})" if to in names else to
-            print(f" * topic: {link.topic}\n    * to: {shown}")
-            print(f"    * direction: {_direction(link.direction, link.info)}")
-            print(f"    * transport: {link.transport}")
-    print()
+    print(connections_text(graph, connections))
     return True
-
-
-def _direction(direction: str, info: str) -> str:
-    """``outbound (port - host:port) [socket]``: the numbers are in the text that nodes send along."""
-    import re
-
-    words = {"i": "inbound", "o": "outbound", "b": "bidirectional"}
-    match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)
-    numbers = f" ({match[1]} - {match[2]}) [{match[3]}]" if match else ""
-    return words.get(direction, direction) + numbers
 
 
 def _machine(argv: Sequence[str]) -> None:
@@ -185,26 +149,8 @@ def _machine(argv: Sequence[str]) -> None:
     parser.add_argument("machine", nargs="?", help="a machine's name or address")
     options = parser.parse_args(argv)
     with Graph.open("rosnode") as graph:
-        hosts = {node: node_host(graph.node_uri(node)) for node in list_nodes(graph)}
-        known = sorted({host for host in hosts.values() if host})
-        if options.machine is None:
-            print("\n".join(known))
-            return
-        nodes = [node for node, host in hosts.items() if host and _same_host(host, options.machine)]
-        if not nodes:
-            raise NotFoundError("machine", options.machine, known, "no node runs on it")
-        print("\n".join(nodes))
-
-
-def _same_host(one: str, other: str) -> bool:
-    import socket
-
-    if one == other:
-        return True
-    try:
-        return socket.gethostbyname(one) == socket.gethostbyname(other)
-    except OSError:
-        return False
+        found = nodes_on(graph, options.machine) if options.machine else sorted({*node_hosts(graph).values()})
+        print("\n".join(found))
 
 
 def _kill(argv: Sequence[str]) -> int:
@@ -212,6 +158,8 @@ def _kill(argv: Sequence[str]) -> int:
     parser.add_argument("nodes", nargs="*", metavar="node", help="names of nodes")
     parser.add_argument("-a", "--all", action="store_true", help="kill all nodes")
     options = parser.parse_args(argv)
+    if options.all and options.nodes:
+        parser.error("-a kills all nodes: it takes no names")
     with Graph.open("rosnode") as graph:
         if options.all:
             nodes = graph.addresses(list_nodes(graph))
@@ -228,10 +176,16 @@ def _kill(argv: Sequence[str]) -> int:
         else:
             print("killing:\n" + "\n".join(f" * {node.name}" for node in nodes))
         sys.stdout.flush()
+        hung = 0
         for node in nodes:
-            kill_node(graph, node)
-        print("killed")
-        return 0
+            try:
+                kill_node(graph, node)
+            except NodeUnreachableError as error:
+                complain("rosnode", error)
+                hung += 1
+        if hung < len(nodes):
+            print("killed")
+        return 1 if hung else 0
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser, complain
+from minirospy.cli.command import Parser, complain, one_argument, warn
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
+
+if TYPE_CHECKING:
+    from minirospy.names import Arguments
 
 __all__ = ["main"]
 
@@ -23,66 +26,73 @@ def main(argv: Sequence[str] | None = None) -> int:
     return _FAMILY.main(argv)
 
 
-def _args(argv: Sequence[str]) -> None:
+def _args(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_service("args", "Print the names of the fields of a service's request.", argv)
-    with Graph.open("rosservice") as graph:
+    with Graph.open("rosservice", arguments=arguments) as graph:
         print(" ".join(services.service_arguments(services.service_type(graph, graph.resolve(name)))))
 
 
-def _info(argv: Sequence[str]) -> None:
+def _info(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_service("info", "Print a service's node, URI, type and arguments.", argv)
-    with Graph.open("rosservice") as graph:
-        detail = services.service_detail(graph, graph.resolve(name))
-    print(f"Node: {detail.node}\nURI: {detail.uri}\nType: {detail.type}\nArgs: {' '.join(detail.arguments)}")
+    with Graph.open("rosservice", arguments=arguments) as graph:
+        service = graph.resolve(name)
+        offer = services.service_offer(graph, service)
+        # What the master knows, before its node is asked, which may have ended.
+        print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
+        type_ = services.service_type(graph, service)
+    print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
 
 
-def _type(argv: Sequence[str]) -> None:
+def _type(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_service("type", "Print a service's type.", argv)
-    with Graph.open("rosservice") as graph:
+    with Graph.open("rosservice", arguments=arguments) as graph:
         print(services.service_type(graph, graph.resolve(name)))
 
 
-def _uri(argv: Sequence[str]) -> None:
+def _uri(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_service("uri", "Print where a service is called.", argv)
-    with Graph.open("rosservice") as graph:
+    with Graph.open("rosservice", arguments=arguments) as graph:
         print(services.service_uri(graph, graph.resolve(name)))
 
 
-def _find(argv: Sequence[str]) -> None:
-    parser = Parser("rosservice find", description="Print the services of a type.")
-    parser.add_argument("type", help="a service type, as std_srvs/SetBool")
-    options = parser.parse_args(argv)
-    with Graph.open("rosservice") as graph:
-        print("\n".join(services.find_services_of_type(graph, options.type)))
+def _find(argv: Sequence[str], arguments: Arguments | None = None) -> None:
+    help_ = "a service type, as std_srvs/SetBool"
+    type_ = one_argument("rosservice find", "Print the services of a type.", "type", help_, argv)
+    with Graph.open("rosservice", arguments=arguments) as graph:
+        print("\n".join(services.find_services_of_type(graph, type_)))
 
 
-def _list(argv: Sequence[str]) -> None:
+def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rosservice list", description="List the services, or those in a namespace.")
     parser.add_argument("namespace", nargs="?", help="only services at or below this name")
     parser.add_argument("-n", "--nodes", action="store_true", help="print the nodes that provide them, too")
     options = parser.parse_args(argv)
-    with Graph.open("rosservice") as graph:
+    with Graph.open("rosservice", arguments=arguments) as graph:
         for service in services.list_services(
             graph, graph.resolve(options.namespace) if options.namespace else "/"
         ):
             print(f"{service.name} {','.join(service.nodes)}" if options.nodes else service.name)
 
 
-def _call(argv: Sequence[str]) -> None:
+def _call(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser(
         "rosservice call",
         description="Call a service and print its response.",
         epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order.',
     )
     parser.add_argument("service", help="the service's name")
-    parser.add_argument("args", nargs="*", help="the request's values; a terminal asks for missing ones")
+    parser.add_argument(
+        "args", nargs="*", default=[], help="the request's values; a terminal asks for missing ones"
+    )
     parser.add_argument("-v", dest="verbose", action="store_true", help="print the request, too")
     parser.add_argument("--wait", action="store_true", help="wait until the service is there")
     options = parser.parse_intermixed_args(argv)
-    with Graph.open("rosservice") as graph:
+    with Graph.open("rosservice", arguments=arguments) as graph:
         service = graph.resolve(options.service)
         if options.wait:
-            services.wait_for_service(graph, service)
+            services.wait_for_service(
+                graph, service, lambda: warn(f"service [{service}] is not there yet", service)
+            )
         type_ = services.service_type(graph, service)
         for request in _requests(type_, options.args):
             if options.verbose:
@@ -128,10 +138,7 @@ def _asked_for(request: Any, known: Sequence[str]) -> Any:
 
 
 def _one_service(verb: str, description: str, argv: Sequence[str]) -> str:
-    """The name, as typed, of the one service that a verb is about."""
-    parser = Parser(f"rosservice {verb}", description=description)
-    parser.add_argument("service", help="the service's name")
-    return str(parser.parse_args(argv).service)
+    return one_argument(f"rosservice {verb}", description, "service", "the service's name", argv)
 
 
 _FAMILY = Family(
@@ -147,4 +154,5 @@ _FAMILY = Family(
         Verb("uri", "print service ROSRPC uri", _uri),
     ),
     "Type rosservice <command> -h for more detailed usage, e.g. 'rosservice call -h'",
+    is_node=True,
 )

@@ -5,11 +5,10 @@ Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
 
 from __future__ import annotations
 
-import contextlib
 import sys
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import Parser, refuse_bag
+from minirospy.cli.command import Parser, one_argument, refuse_bag, tool_node, warn_unpublished
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import NotFoundError
 from minirospy.introspect import topics
@@ -17,10 +16,10 @@ from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
-    from minirospy.introspect.graph import NodeAddress
     from minirospy.introspect.streams import Received, ToolNode
+    from minirospy.names import Arguments
 
 __all__ = ["main"]
 
@@ -35,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 # --- what the master knows
 
 
-def _list(argv: Sequence[str]) -> None:
+def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rostopic list", description="List the topics, or those in a namespace.")
     parser.add_argument("namespace", nargs="?", help="only topics at or below this name")
     _add_bag(parser, "list topics in .bag file")
@@ -47,7 +46,7 @@ def _list(argv: Sequence[str]) -> None:
     options = parser.parse_args(argv)
     if options.bag:
         refuse_bag("rostopic list")
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         namespace = graph.resolve(options.namespace) if options.namespace else "/"
         if not options.verbose and not options.host:
             print("\n".join(_names(graph, namespace, options)))
@@ -91,48 +90,37 @@ def _print_rows(rows: list[topics.TopicNodes], word: str, indent: str) -> None:
         print(f"{indent} * {topic.name} [{topic.type}] {len(topic.nodes)} {word}{plural}")
 
 
-def _info(argv: Sequence[str]) -> None:
+def _info(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_topic("info", "Print a topic's type, publishers and subscribers.", argv)
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         detail = topics.topic_detail(graph, graph.resolve(name))
+    from minirospy.introspect.texts import topic_text
 
-    def side(title: str, nodes: list[NodeAddress]) -> str:
-        if not nodes:
-            return f"{title}: None"
-        rows = (f" * {node.name} ({node.uri or f'unknown address {node.name}'})" for node in nodes)
-        return f"{title}: \n" + "\n".join(rows)
-
-    print(f"Type: {detail.type}\n")
-    print(side("Publishers", detail.publishers) + "\n")
-    print(side("Subscribers", detail.subscribers) + "\n\n")
+    print(topic_text(detail))
 
 
-def _type(argv: Sequence[str]) -> None:
+def _type(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     name = _one_topic("type", "Print the type of a topic, or of a field of its messages.", argv)
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         field = topics.require_topic(graph, graph.resolve(name))
     print(f"{field.type} {field.path} {topics.topic_field_type(field)}" if field.path else field.type)
 
 
-def _find(argv: Sequence[str]) -> None:
-    parser = Parser("rostopic find", description="List the topics of a type.")
-    parser.add_argument("type", help="a message type, as std_msgs/Bool")
-    options = parser.parse_args(argv)
-    with Graph.open("rostopic") as graph:
-        print("\n".join(topics.find_topics_of_type(graph, options.type)))
+def _find(argv: Sequence[str], arguments: Arguments | None = None) -> None:
+    help_ = "a message type, as std_msgs/Bool"
+    type_ = one_argument("rostopic find", "List the topics of a type.", "type", help_, argv)
+    with Graph.open("rostopic", arguments=arguments) as graph:
+        print("\n".join(topics.find_topics_of_type(graph, type_)))
 
 
 def _one_topic(verb: str, description: str, argv: Sequence[str]) -> str:
-    """The name, as typed, of the one topic that a verb is about."""
-    parser = Parser(f"rostopic {verb}", description=description)
-    parser.add_argument("topic", help="the topic's name")
-    return str(parser.parse_args(argv).topic)
+    return one_argument(f"rostopic {verb}", description, "topic", "the topic's name", argv)
 
 
 # --- what goes over a topic
 
 
-def _echo(argv: Sequence[str]) -> None:
+def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rostopic echo", description="Print the messages of a topic, or one field of them.")
     add = parser.add_argument
     add("topic", nargs="?", help="the topic, with a field's path behind it where wanted: /pose/position/x")
@@ -159,13 +147,13 @@ def _echo(argv: Sequence[str]) -> None:
     from minirospy.introspect.streams import wait_for_topic
 
     keep = Filter(options.filter) if options.filter else None
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         if options.count is not None and options.count <= 0:
             return
-        field = wait_for_topic(graph, topic, lambda: _warn_unpublished(topic))
+        field = wait_for_topic(graph, topic, lambda: warn_unpublished(topic))
     printed = 0
-    with _tool_node(ros_time=True) as node:
+    with tool_node("rostopic", arguments, ros_time=True) as node:
         echo = Echo(
             field,
             plot=options.plot,
@@ -191,7 +179,7 @@ def _echo(argv: Sequence[str]) -> None:
                 return
 
 
-def _hz(argv: Sequence[str]) -> None:
+def _hz(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rostopic hz", description="Print the rate at which messages come, once a second.")
     parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics")
     _add_window(parser, default=0)
@@ -210,8 +198,8 @@ def _hz(argv: Sequence[str]) -> None:
 
     keep = Filter(options.filter) if options.filter else None
     windows: dict[str, RateWindow] = {}
-    with _tool_node(ros_time=not options.wall_time) as node:
-        for name in _published_topics(options.topics):
+    with tool_node("rostopic", arguments, ros_time=not options.wall_time) as node:
+        for name in _published_topics(options.topics, arguments):
             window = windows[name] = RateWindow(options.window)
 
             def count(received: Received, topic: str = name, window: RateWindow = window) -> None:
@@ -223,7 +211,7 @@ def _hz(argv: Sequence[str]) -> None:
             print(rate_text({name: window.report() for name, window in windows.items()}), flush=True)
 
 
-def _bw(argv: Sequence[str]) -> None:
+def _bw(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser("rostopic bw", description="Print the bandwidth that topics take, once a second.")
     parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics")
     _add_window(parser, default=100)
@@ -233,8 +221,8 @@ def _bw(argv: Sequence[str]) -> None:
     from minirospy.introspect.rates import BandwidthWindow, bandwidth_text
 
     windows: dict[str, BandwidthWindow] = {}
-    with _tool_node() as node:
-        for name in _published_topics(options.topics):
+    with tool_node("rostopic", arguments) as node:
+        for name in _published_topics(options.topics, arguments):
             window = windows[name] = BandwidthWindow(options.window)
 
             def add(received: Received, window: BandwidthWindow = window) -> None:
@@ -248,7 +236,7 @@ def _bw(argv: Sequence[str]) -> None:
                 print(text, flush=True)
 
 
-def _delay(argv: Sequence[str]) -> None:
+def _delay(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     parser = Parser(
         "rostopic delay", description="Print how late messages come after the stamps in their headers."
     )
@@ -259,8 +247,8 @@ def _delay(argv: Sequence[str]) -> None:
     from minirospy.introspect.rates import DelayWindow, delay_text
 
     window = DelayWindow(options.window)
-    with _tool_node(ros_time=True) as node:
-        (topic,) = _published_topics([options.topic])
+    with tool_node("rostopic", arguments, ros_time=True) as node:
+        (topic,) = _published_topics([options.topic], arguments)
         unstamped: list[str] = []
 
         def add(received: Received) -> None:
@@ -297,45 +285,22 @@ def _add_bag(parser: Parser, what: str) -> None:
     parser.add_argument("-b", "--bag", metavar="BAGFILE", help=f"{what} (not yet: bags come later)")
 
 
-def _published_topics(names: Sequence[str]) -> list[str]:
+def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
     """The global names of topics, also where a field of one is named; one that nobody publishes yet is warned of."""
     found = []
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):
             field = topics.find_topic(graph, name)
             found.append(field.topic if field else name)
             if not field:
-                _warn_unpublished(name)
-    return found
+                warn_unpublished(name)
+    return list(dict.fromkeys(found))
 
 
-def _warn_unpublished(topic: str) -> None:
-    sys.stdout.flush()
-    print(f"WARNING: topic [{topic}] does not appear to be published yet", file=sys.stderr)
-
-
-def _pub(argv: Sequence[str]) -> None:
+def _pub(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     from minirospy.cli.rostopic_pub import publish
 
-    publish(argv, lambda ros_time: _tool_node(ros_time=ros_time))
-
-
-@contextlib.contextmanager
-def _tool_node(*, ros_time: bool = False) -> Iterator[ToolNode]:
-    import signal
-
-    from minirospy.environment import Environment
-    from minirospy.introspect.streams import ToolNode
-
-    # Ended as by Ctrl-C: a tool that is killed in passing must not stay registered.
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with ToolNode(Environment.read(), "rostopic", ros_time=ros_time) as node:
-            if node.simulated:
-                print("WARNING: may be using simulated time", file=sys.stderr)
-            yield node
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    publish(argv, arguments)
 
 
 _FAMILY = Family(
@@ -353,4 +318,5 @@ _FAMILY = Family(
         Verb("type", "print topic or field type", _type),
     ),
     "Type rostopic <command> -h for more detailed usage, e.g. 'rostopic echo -h'",
+    is_node=True,
 )

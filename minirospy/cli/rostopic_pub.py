@@ -6,23 +6,21 @@ Source: http://wiki.ros.org/rostopic#rostopic_pub. What is printed is what ROS p
 from __future__ import annotations
 
 import itertools
-import sys
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser
+from minirospy.cli.command import Parser, tool_node, warn
 from minirospy.errors import UsageError
 from minirospy.idl.load import message_class
 from minirospy.introspect.echo import fill_message
-from minirospy.introspect.graph import Graph
-from minirospy.introspect.publishing import other_type, publish_all, values_to_publish
-from minirospy.names import is_legal_name
+from minirospy.introspect.graph import Graph, why_illegal
+from minirospy.introspect.publishing import publish_all, values_to_publish
 
 if TYPE_CHECKING:
     import argparse
-    import contextlib
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from minirospy.introspect.streams import ToolNode, TopicPublisher
+    from minirospy.names import Arguments
 
 __all__ = ["publish"]
 
@@ -34,30 +32,26 @@ _CLOCK_SECONDS = 1.0
 _SHIELD = "\0"
 
 
-def publish(
-    argv: Sequence[str], start_node: Callable[[bool], contextlib.AbstractContextManager[ToolNode]]
-) -> None:
-    """The verb. ``start_node(ros_time)`` gives the node that publishes."""
+def publish(argv: Sequence[str], arguments: Arguments | None) -> None:
+    """The verb, with the remapping arguments that were among its words."""
     options = _parse(argv)
     cls = message_class(options.type)
-    with Graph.open("rostopic") as graph:
+    with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
-        if not is_legal_name(topic):
-            raise UsageError(f"[{options.topic}] is not a legal name of a topic: letters, digits, _ and /")
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
         values = next(all_values)
         # Before the node is there, so that a typing error shows at once.
         message = fill_message(cls, values)
-        other = other_type(graph, topic, cls._type)
-        if other:
-            print(
-                f"WARNING: topic [{topic}] is of type [{other}] already, not [{cls._type}]", file=sys.stderr
-            )
-        awaited = topic in graph.state().subscribers
+        state = graph.state()
+        awaited = topic in state.subscribers
+        if awaited or topic in state.publishers:
+            _warn_of_other_type(graph, topic, cls._type)
+        elif why := why_illegal(topic):
+            raise UsageError(f"topic [{topic}]: {why}")
     # One message stays for late subscribers; a stream of them does not, unless asked to.
     from_documents = bool(not options.args and (cls.__slots__ or options.file))
     lasting = options.once or options.latch or (options.rate is None and not from_documents)
-    with start_node(options.use_rostime) as node:
+    with tool_node("rostopic", arguments, ros_time=options.use_rostime) as node:
         publisher = node.publisher(topic, cls, latch=lasting)
 
         def filled(values: list[Any]) -> Any:
@@ -85,6 +79,12 @@ def publish(
         publish_all(node, publisher, messages, options.rate or _FILE_RATE, show)
 
 
+def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
+    other = graph.master.get_topic_types().get(topic, "*")
+    if other not in ("*", type_):
+        warn(f"topic [{topic}] is of type [{other}] already, not [{type_}]")
+
+
 def _latch(node: ToolNode, publisher: TopicPublisher, message: Any, options: argparse.Namespace) -> None:
     how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
@@ -105,7 +105,9 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     add = parser.add_argument
     add("topic", help="the topic's name")
     add("type", help="the message type, as std_msgs/Bool")
-    add("args", nargs="*", help="the message's values; `now` is the time, header: auto is stamped")
+    add(
+        "args", nargs="*", default=[], help="the message's values; `now` is the time, header: auto is stamped"
+    )
     add("-v", dest="verbose", action="store_true", help="print verbose output")
     add(
         "-r",

@@ -8,24 +8,32 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
+    from minirospy.cli.rospack import _Verb as PackVerb
     from minirospy.idl.load import Catalogue
+    from minirospy.idl.spec import MessageSpec
     from minirospy.introspect.graph import Graph
     from minirospy.workspace.packages import Packages
 
-__all__ = ["BY_HAND", "PLAIN", "SOURCES", "Place", "Source", "on_one_line"]
+__all__ = [
+    "LIVE_SECONDS", "Place", "Source", "Text", "build_targets", "files", "folders", "kinds", "launch_files",
+    "launch_nodes", "launch_words", "loggers", "machines", "message_text", "message_types", "nodes",
+    "nothing", "on_one_line", "package_file", "package_file_and_target", "package_folders", "package_names",
+    "package_path", "parameter_value", "parameters", "pins", "prototype_types", "request_text",
+    "rospack_words", "rosrun_words", "rosstack_words", "service_types", "services", "shells", "topic_type",
+    "topics",
+]  # fmt: skip
 
 LIVE_SECONDS = 0.8
 """How long a master, or a node, may take."""
 
-PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
-"""What no shell reads as more than a word."""
+_MOST_LETTERS = 1000
+"""Of a parameter's value on a command line."""
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
@@ -38,7 +46,18 @@ class Place(NamedTuple):
     word: str
 
 
+class Text(str):
+    """A candidate to be changed where it stands: better to read in quotes than with a backslash at each blank."""
+
+    __slots__ = ()
+
+
 Source = Callable[[Place], Iterable[str]]
+
+
+def nothing(_: Place) -> Iterable[str]:
+    """A number, an expression, a name that is new: nobody but the person knows it."""
+    return ()
 
 
 # --- packages and their files
@@ -50,47 +69,69 @@ def _packages() -> Packages:
     return Packages()
 
 
-def _package_names(_: Place) -> Iterable[str]:
+def package_names(_: Place) -> Iterable[str]:
+    """Every package."""
     return _packages().names()
 
 
-def _build_targets(place: Place) -> Iterable[str]:
+def build_targets(place: Place) -> Iterable[str]:
     """What catkin_make makes."""
-    return ("install", "run_tests", "clean", *_package_names(place))
+    names = _packages().names()
+    tests = [f"run_tests_{name}" for name in names] if place.word.startswith("run_tests_") else []
+    return ("install", "run_tests", "test", "clean", *tests, *names)
 
 
-def _package_folders(place: Place) -> Iterable[str]:
-    """``pkg/``, then ``pkg/folder/``."""
+def package_folders(place: Place) -> Iterable[str]:
+    """``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of results of tests."""
     if any(not word.startswith("-") for word in place.given):
         return []
     package, slash, _ = place.word.partition("/")
     if not slash:
-        return [f"{name}/" for name in _packages().names()]
-    root = _packages().find(package)
+        return [f"{name}/" for name in (*_packages().names(), *_OWN_FOLDERS)]
+    root = _OWN_FOLDERS[package]() if package in _OWN_FOLDERS else _packages().find(package)
     return [name for name in _below(root, package, place.word) if name.endswith("/")]
 
 
-def _package_file(place: Place) -> Iterable[str]:
+def _logs() -> Path:
+    from minirospy.environment import Environment
+
+    return Environment.read(host="localhost", master_uri="http://localhost:1").log_dir
+
+
+def _results() -> Path:
+    from minirospy.workspace.rospkg import get_test_results_dir
+
+    return Path(get_test_results_dir())
+
+
+_OWN_FOLDERS = {"log": _logs, "test_results": _results}
+
+
+def package_file(place: Place) -> Iterable[str]:
     """A package, then the name of a file anywhere in it, or its path."""
     if not place.given:
         return _packages().names()
     if len(place.given) > 1:
         return []
+    return package_path(place) if "/" in place.word else _names_below(_packages().find(place.given[0]))
+
+
+def package_path(place: Place) -> Iterable[str]:
+    """The path of a file in the package that is given."""
     root = _packages().find(place.given[0])
-    if "/" in place.word:
-        return [name.removeprefix("./") for name in _below(root, ".", "./" + place.word)]
-    return _names_below(root)
+    return [name.removeprefix("./") for name in _below(root, ".", "./" + place.word)]
 
 
-def _package_file_target(place: Place) -> Iterable[str]:
-    return _files(place) if len(place.given) > 1 else _package_file(place)
+def package_file_and_target(place: Place) -> Iterable[str]:
+    """A package, a file of it, and where to."""
+    return files(place) if len(place.given) > 1 else package_file(place)
 
 
 def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
     """The names of all files in a package, hidden ones and compiled ones left out."""
     found: set[str] = set()
-    for _, folders, names in os.walk(root):
-        folders[:] = [name for name in folders if not name.startswith(".") and name != "__pycache__"]
+    for _, inner, names in os.walk(root):
+        inner[:] = [name for name in inner if not name.startswith(".") and name != "__pycache__"]
         found.update(name for name in names if name.endswith(endings) and not name.startswith("."))
     return sorted(found)
 
@@ -103,11 +144,16 @@ def _below(root: Path, shown: str, word: str) -> list[str]:
     return [f"{head}/{name}" for name in _entries(folder, hidden=begun.startswith("."))]
 
 
-def _files(place: Place) -> Iterable[str]:
+def files(place: Place) -> Iterable[str]:
     """Files and folders of this computer, as shells complete them."""
     head, slash, begun = place.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=begun.startswith("."))]
+
+
+def folders(place: Place) -> Iterable[str]:
+    """Folders of this computer."""
+    return [name for name in files(place) if name.endswith("/")]
 
 
 def _entries(folder: Path, *, hidden: bool) -> list[str]:
@@ -115,10 +161,11 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
         entries = [entry for entry in os.scandir(folder) if hidden or not entry.name.startswith(".")]
     except OSError:
         return []
-    return sorted(entry.name + "/" if entry.is_dir() else entry.name for entry in entries)
+    # A link to itself is no folder, and no fault.
+    return sorted(entry.name + "/" if os.path.isdir(entry) else entry.name for entry in entries)
 
 
-def _rosrun(place: Place) -> Iterable[str]:
+def rosrun_words(place: Place) -> Iterable[str]:
     """Options of rosrun, a package, a program of it; then what the program takes: files, remaps."""
     given = list(place.given)
     while given and given[0].startswith("-"):
@@ -127,64 +174,98 @@ def _rosrun(place: Place) -> Iterable[str]:
                 return []
             given.pop(0)
     if not given:
-        return (
-            ["-h", "--help", "-p", "--prefix", "-d", "--debug"]
-            if place.word[:1] == "-"
-            else _package_names(place)
-        )
+        options = ["-h", "--help", "-p", "--prefix", "-d", "--debug"]
+        return options if place.word.startswith("-") else package_names(place)
     if len(given) == 1:
         return _packages().executables(given[0])
-    return ["__name:=", "__ns:=", "__log:="] if place.word.startswith("_") else _files(place)
+    name, remapped, word = place.word.partition(":=")
+    if remapped:
+        private = name.startswith("_")
+        return [] if private else [f"{name}:={topic}" for topic in topics(Place("", (), word))]
+    return ["__name:=", "__ns:=", "__log:="] if place.word.startswith("_") else files(place)
 
 
-def _rospack(place: Place) -> Iterable[str]:
+def rospack_words(place: Place) -> Iterable[str]:
     """A verb of rospack, its options, a package."""
-    from minirospy.cli.rospack import _FLAGS, _VERBS
+    from minirospy.cli.rospack import _VERBS
+
+    return _pack_words(place, _VERBS)
+
+
+def rosstack_words(place: Place) -> Iterable[str]:
+    """A verb of rosstack, its options, a stack."""
+    from minirospy.cli.rospack import _STACK_VERBS
+
+    return _pack_words(place, _STACK_VERBS)
+
+
+def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
+    from minirospy.cli.rospack import _FLAGS
 
     words = [word for word in place.given if not word.startswith("-")]
-    verb = _VERBS.get(words[0]) if words else None
+    verb = verbs.get(words[0]) if words else None
     if place.word.startswith("--target="):
         return [f"--target={name}" for name in _packages().names()]
     if place.word.startswith("-"):
         own = (f"--{name}" if name in _FLAGS else f"--{name}=" for name in sorted(verb.takes if verb else ()))
         return ["-h", "--help", "-q", *own]
     if not words or words == ["help"]:
-        return [*_VERBS, "help"]
+        return [*verbs, "help"]
     return _packages().names() if verb and verb.takes_package and len(words) == 1 else []
 
 
-def _launch_words(place: Place) -> Iterable[str]:
+# --- launch files
+
+
+def launch_words(place: Place) -> Iterable[str]:
     """A package and a launch file of it, or a path of one; then ``arg:=`` of what the file declares."""
     if ":=" not in place.word:
         if not place.given:
             yield from _packages().names()
-            yield from _launch_paths(place)
+            yield from launch_files(place)
             return
         if len(place.given) == 1 and not Path(place.given[0]).is_file():
             yield from _names_below(_packages().find(place.given[0]), _LAUNCH)
             return
     yield from _launch_args(place)
     if Path(place.given[0]).is_file():
-        yield from _launch_paths(place)
+        yield from launch_files(place)
 
 
-def _launch_paths(place: Place) -> Iterable[str]:
-    return [name for name in _files(place) if name.endswith((*_LAUNCH, "/"))]
+def launch_files(place: Place) -> Iterable[str]:
+    """Launch files of this computer, and the folders on the way to them."""
+    return [name for name in files(place) if name.endswith((*_LAUNCH, "/"))]
+
+
+def _launch_file(place: Place) -> str:
+    file = Path(place.given[0])
+    return str(file if file.is_file() else _packages().find_resource(*place.given[:2]))
 
 
 def _launch_args(place: Place) -> Iterator[str]:
     from minirospy.launch.load import describe_args
 
-    file = Path(place.given[0])
-    if not file.is_file():
-        file = _packages().find_resource(*place.given[:2])
     name, assigned, _ = place.word.partition(":=")
-    for arg in describe_args(str(file)):
+    for arg in describe_args(_launch_file(place)):
         if not assigned:
             yield f"{arg.name}:="
-        elif arg.name == name and arg.default and PLAIN.match(arg.default):
+        elif arg.name == name and arg.default and "$(" not in arg.default:
             truth = arg.default.lower() in ("true", "false")
             yield from (f"{name}:={value}" for value in (("true", "false") if truth else (arg.default,)))
+
+
+def launch_nodes(place: Place) -> Iterable[str]:
+    """`roslaunch PACKAGE FILE --args NODE`: the nodes of the launch file."""
+    from minirospy.launch.load import Source as LaunchSource
+    from minirospy.launch.load import describe_args, load_sources
+
+    if not place.given:
+        return []
+    file = _launch_file(place)
+    # A value that is not typed yet is no fault, and faults (told to the list) hide no node.
+    values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
+    spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
+    return _as_typed((node.name for node in spec.runnables()), place.word)
 
 
 # --- the graph
@@ -214,7 +295,8 @@ def _as_typed(names: Iterable[str], word: str) -> list[str]:
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
-def _topics(place: Place) -> Iterable[str]:
+def topics(place: Place) -> Iterable[str]:
+    """Topics; for echo and type also the fields of one."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = place.verb in ("echo", "type") and "/" in place.word[1:]
@@ -230,14 +312,16 @@ def _topics(place: Place) -> Iterable[str]:
     return _live(ask)
 
 
-def _nodes(place: Place) -> Iterable[str]:
+def nodes(place: Place) -> Iterable[str]:
+    """Nodes that are not named yet."""
     from minirospy.introspect.nodes import list_nodes
 
     names = _live(list_nodes)
     return _as_typed((name for name in names if name not in place.given), place.word)
 
 
-def _machines(_: Place) -> Iterable[str]:
+def machines(_: Place) -> Iterable[str]:
+    """The hosts that nodes run on."""
     from minirospy.introspect.graph import node_host
     from minirospy.introspect.nodes import list_nodes
 
@@ -246,19 +330,21 @@ def _machines(_: Place) -> Iterable[str]:
     )
 
 
-def _services(place: Place) -> Iterable[str]:
+def services(place: Place) -> Iterable[str]:
+    """Services."""
     from minirospy.introspect.services import list_services
 
     return _as_typed(_live(lambda graph: [service.name for service in list_services(graph)]), place.word)
 
 
-def _parameters(place: Place) -> Iterable[str]:
+def parameters(place: Place) -> Iterable[str]:
+    """Parameters."""
     from minirospy.introspect.parameters import list_parameters
 
     return _as_typed(_live(list_parameters), place.word)
 
 
-def _parameter_value(place: Place) -> Iterable[str]:
+def parameter_value(place: Place) -> Iterable[str]:
     """`rosparam set PARAMETER`: the value that it has, to be changed."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
@@ -267,11 +353,11 @@ def _parameter_value(place: Place) -> Iterable[str]:
         return []
     ask = place.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # A list or a table is read from one line as well.
-    return [on_one_line(text) for text in found]
+    # A list or a table is read from one line as well; nobody changes a robot's whole description there.
+    return [on_one_line(Text(text)) for text in found if len(text) <= _MOST_LETTERS]
 
 
-def _loggers(place: Place) -> Iterable[str]:
+def loggers(place: Place) -> Iterable[str]:
     """`rosconsole get NODE`: the loggers of the node."""
     from minirospy.introspect.services import call_service, fill_request
 
@@ -297,52 +383,60 @@ def _catalogue() -> Catalogue:
     return Catalogue(_packages().folders())
 
 
-def _types(word: str, kind: str, folders: tuple[str, ...]) -> Iterable[str]:
-    """``pkg/``, then ``pkg/Type``: all types at once would be hundreds."""
+def _types(place: Place, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
+    """``pkg/``, then ``pkg/Type``: all types at once would be hundreds. `rosmsg show` takes the name alone too."""
     from minirospy.introspect.interfaces import Interfaces, Kind
 
-    package, slash, _ = word.partition("/")
+    package, slash, _ = place.word.partition("/")
     packages = _packages()
     if slash:
         return Interfaces(packages, Kind(kind)).in_package(package)
-    return [
+    found = [
         f"{name}/"
         for name, root in sorted(packages.folders().items())
-        if name.startswith(word) and any((root / folder).is_dir() for folder in folders)
+        if name.startswith(package) and any((root / folder).is_dir() for folder in inside)
     ]
+    if found or place.verb not in ("show", "info", "md5"):
+        return found
+    return sorted({type_.partition("/")[2] for type_ in Interfaces(packages, Kind(kind)).all()})
 
 
-def _message_types(place: Place) -> Iterable[str]:
-    return _types(place.word, "msg", ("msg", "action"))
+def message_types(place: Place) -> Iterable[str]:
+    """Types of messages."""
+    return _types(place, "msg", ("msg", "action"))
 
 
-def _service_types(place: Place) -> Iterable[str]:
-    return _types(place.word, "srv", ("srv",))
+def service_types(place: Place) -> Iterable[str]:
+    """Types of services."""
+    return _types(place, "srv", ("srv",))
 
 
-def _topic_type(place: Place) -> Iterable[str]:
+def prototype_types(place: Place) -> Iterable[str]:
+    """`rosmsg-proto msg|srv`: types of that kind."""
+    return service_types(place) if place.given[:1] == ("srv",) else message_types(place)
+
+
+def topic_type(place: Place) -> Iterable[str]:
     """`rostopic pub TOPIC`: the type that the topic has, any where it has none."""
     if not place.given:
-        return _message_types(place)
+        return message_types(place)
 
     def ask(graph: Graph) -> list[str]:
         type_ = graph.master.get_topic_types().get(graph.resolve(place.given[0]), "*")
         return [] if type_ == "*" else [type_]
 
-    return _live(ask) or _message_types(place)
+    return _live(ask) or message_types(place)
 
 
-def _message_text(place: Place) -> Iterable[str]:
+def message_text(place: Place) -> Iterable[str]:
     """`rostopic pub TOPIC TYPE`: a whole message to be changed."""
     if len(place.given) != 2:
         return []
     catalogue = _catalogue()
-    from minirospy.introspect.prototype import prototype
-
-    return [prototype(catalogue.message(place.given[1]), catalogue)]
+    return [_text(catalogue.message(place.given[1]), catalogue)]
 
 
-def _request_text(place: Place) -> Iterable[str]:
+def request_text(place: Place) -> Iterable[str]:
     """`rosservice call SERVICE`: a whole request to be changed."""
     from minirospy.introspect.services import service_type
 
@@ -353,9 +447,14 @@ def _request_text(place: Place) -> Iterable[str]:
         return []
     catalogue = _catalogue()
     specs = catalogue.services(found[0].partition("/")[0])
+    return [_text(spec.request, catalogue) for spec in specs if spec.full_name == found[0]]
+
+
+def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
     from minirospy.introspect.prototype import prototype
 
-    return [prototype(spec.request, catalogue) for spec in specs if spec.full_name == found[0]]
+    # Within double quotes a shell for people would read !! as the command before.
+    return Text(prototype(spec, catalogue).replace('!!binary ""', "[]"))
 
 
 def _fields(type_: str, path: str) -> list[str]:
@@ -368,64 +467,52 @@ def _fields(type_: str, path: str) -> list[str]:
         if inner.base in ("time", "duration"):
             return ["secs", "nsecs"]
         spec = catalogue.message(inner.base)
-    return [field.name for field in spec.fields]
+    return [
+        field.name if field.type.is_primitive or field.type.is_array else f"{field.name}/"
+        for field in spec.fields
+    ]
 
 
 def on_one_line(text: str) -> str:
     """A message's text on one line, as YAML allows it too."""
-    if "\n" not in text:
+    if not isinstance(text, Text) or "\n" not in text:
         return text
     import yaml
 
-    flow = yaml.safe_dump(yaml.safe_load(text), default_flow_style=True, sort_keys=False, width=sys.maxsize)
-    return str(flow).removesuffix("\n")
+    def flow(node: yaml.Node | None) -> None:
+        if isinstance(node, yaml.CollectionNode):
+            node.flow_style = True
+            for child in node.value:
+                for each in child if isinstance(child, tuple) else (child,):
+                    flow(each)
+        elif isinstance(node, yaml.ScalarNode) and "\n" in node.value:
+            node.style = '"'
+
+    # As nodes, for a value would be written in another way: a field that is called `on` would become `true`.
+    root = yaml.compose(text, yaml.SafeLoader)
+    flow(root)
+    return Text(
+        yaml.serialize(root, Dumper=yaml.SafeDumper, width=sys.maxsize, allow_unicode=True).removesuffix("\n")
+    )
 
 
-# --- commands that read their words by hand, and what words are called in parsers
+# --- what there is to choose from
 
-BY_HAND: dict[str, Source] = {
-    "roscd": _package_folders,
-    "rospd": _package_folders,
-    "rosls": _package_folders,
-    "rosed": _package_file,
-    "roscp": _package_file_target,
-    "rosrun": _rosrun,
-    "rospack": _rospack,
-}
 
-SOURCES: dict[str, Source] = {
-    "topic": _topics,
-    "topics": _topics,
-    "node": _nodes,
-    "nodes": _nodes,
-    "machine": _machines,
-    "service": _services,
-    "parameter": _parameters,
-    "package": _package_names,
-    "packages": _package_names,
-    "dependencies": _package_names,
-    "targets": _build_targets,
-    "pkg": _package_names,
-    "pkgs": _package_names,
-    "file": _files,
-    "files": _files,
-    "textfile": _files,
-    "binfile": _files,
-    "directory": _files,
-    "workspace": _files,
-    "type": _message_types,
-    "roslaunch what": _launch_words,
-    "rostest what": _launch_words,
-    "rostopic namespace": _topics,
-    "rostopic type": _topic_type,
-    "rostopic args": _message_text,
-    "rosnode namespace": _nodes,
-    "rosservice namespace": _services,
-    "rosservice type": _service_types,
-    "rosservice args": _request_text,
-    "rosparam namespace": _parameters,
-    "rosparam value": _parameter_value,
-    "logger": _loggers,
-    "rossrv type": _service_types,
-}
-"""The name of an argument or an option's value, alone or after its command's -> what it is completed with."""
+def pins(place: Place) -> Iterable[str]:
+    """Pins of the virtual board that have something on them; those of buttons to press."""
+    from minirospy.gpio.model import BUTTONS, LEDS
+
+    return map(str, BUTTONS if place.verb in ("press", "release") else (*LEDS, *BUTTONS))
+
+
+def shells(_: Place) -> Iterable[str]:
+    """What `minirospy shell` has something for."""
+    from minirospy.workspace.setup_files import SHELLS
+
+    return SHELLS
+
+
+def kinds(_: Place) -> Iterable[str]:
+    """`rosmsg-proto`: of what kind a type is."""
+    return ("msg", "srv")

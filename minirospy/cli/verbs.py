@@ -6,27 +6,36 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from minirospy.cli.command import run
+from minirospy.cli.command import did_you_mean, run
 from minirospy.errors import UsageError
+from minirospy.names import parse_arguments
 
 __all__ = ["Family", "Verb"]
 
 
 class Verb(NamedTuple):
-    """One verb: its name, one line of help, and the function that takes the rest of the command line."""
+    """One verb: its name, one line of help, and the function that takes the rest of the command line.
+
+    Of a family that is a node, the function takes the remapping arguments besides.
+    """
 
     name: str
     summary: str
-    body: Callable[[Sequence[str]], int | None]
+    body: Callable[..., int | None]
 
 
 class Family(NamedTuple):
-    """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is."""
+    """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is.
+
+    ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic" args="pub ..."/>`), with
+    `__name:=` and remappings among its words.
+    """
 
     name: str
     headline: str
     verbs: tuple[Verb, ...]
     footer: str = ""
+    is_node: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the verb that was typed; the exit status as :func:`minirospy.cli.command.run` gives it."""
@@ -46,9 +55,9 @@ class Family(NamedTuple):
             return 0 if words else 2
         for verb in self.verbs:
             if verb.name == words[0]:
-                return verb.body(words[1:])
-        import difflib
-
-        near = difflib.get_close_matches(words[0], [verb.name for verb in self.verbs], n=2)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+                if not self.is_node:
+                    return verb.body(words[1:])
+                arguments = parse_arguments(words[1:])
+                return verb.body(arguments.plain, arguments)
+        hint = did_you_mean(words[0], (verb.name for verb in self.verbs))
         raise UsageError(f"there is no `{self.name} {words[0]}`{hint} (`{self.name} -h` shows what there is)")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from minirospy.introspect.streams import Received
     from minirospy.introspect.topics import TopicField
 
-__all__ = ["Echo", "Filter", "fill_message"]
+__all__ = ["Echo", "Filter", "elided", "fill_message"]
 
 
 class Filter:
@@ -105,7 +105,7 @@ class Echo:
         if isinstance(value, bytes):
             value = list(value)
         if not (self._strings and self._arrays):
-            value = _elided(value, self._type, self._strings, self._arrays)
+            value = elided(value, self._type, self._strings, self._arrays)
         now = Time(*divmod(self._now(), 10**9)) if self._offset else None
         return strify_message(value, time_offset=now, fixed_numeric_width=self._width) + "\n---\n"
 
@@ -127,14 +127,14 @@ def fill_message(cls: type[Any], values: Sequence[Any], nanoseconds: int | None 
     return message
 
 
-def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
+def elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
     """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays."""
     if type_.endswith("]") or isinstance(value, list | tuple):
         element = type_.partition("[")[0]
         if not arrays or (element == "string" and not strings):
             return f"<array type: {element}, length: {len(value)}>"
         if len(value) and hasattr(value[0], "_slot_types"):
-            return [_elided(each, element, strings, arrays) for each in value]
+            return [elided(each, element, strings, arrays) for each in value]
         return value
     if isinstance(value, str):
         return value if strings else f"<string length: {len(value)}>"
@@ -142,7 +142,7 @@ def _elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
         return value
     cls: Any = type(value)
     fields = {
-        name: _elided(getattr(value, name), slot_type, strings, arrays)
+        name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
     # A note is a text, whatever the field was: the printed form of a field depends on its declared type.

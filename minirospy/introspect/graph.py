@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy import names
@@ -16,7 +17,15 @@ if TYPE_CHECKING:
 
     from minirospy.runtime.master_proxy import SystemState
 
-__all__ = ["Graph", "NodeAddress", "in_namespace", "node_host", "unknown_service", "unknown_topic"]
+__all__ = [
+    "Graph",
+    "NodeAddress",
+    "in_namespace",
+    "node_host",
+    "unknown_service",
+    "unknown_topic",
+    "why_illegal",
+]
 
 
 class NodeAddress(NamedTuple):
@@ -27,22 +36,42 @@ class NodeAddress(NamedTuple):
 
 
 class Graph:
-    """A master, asked in the name of ``tool``; names are resolved in ``namespace``. A context manager.
+    """A master, asked in the name of ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
 
     Every call raises MasterUnreachableError where no master answers.
     """
 
-    def __init__(self, master: MasterProxy, tool: str, namespace: str = "/") -> None:
+    def __init__(
+        self,
+        master: MasterProxy,
+        tool: str,
+        namespace: str = "/",
+        remappings: Mapping[str, str] | None = None,
+    ) -> None:
         self.master = master
         self.tool = tool
         self._node_name = namespace.rstrip("/") + "/" + tool
+        self._remappings = {
+            names.resolve(name, self._node_name): names.resolve(to, self._node_name)
+            for name, to in (remappings or {}).items()
+        }
         self._uris: dict[str, str | None] = {}
 
     @classmethod
-    def open(cls, tool: str, environ: Mapping[str, str] | None = None) -> Graph:
-        """The graph that the environment names. Raises UsageError on a bad ROS_MASTER_URI."""
-        master_uri, namespace = master_and_namespace(os.environ if environ is None else environ)
-        return cls(MasterProxy(master_uri, "/" + tool), tool, namespace)
+    def open(
+        cls, tool: str, environ: Mapping[str, str] | None = None, arguments: names.Arguments | None = None
+    ) -> Graph:
+        """The graph that the environment names, and the command line where ``arguments`` were taken out of it.
+
+        Raises UsageError on a bad ROS_MASTER_URI.
+        """
+        given = arguments or names.parse_arguments(())
+        master_uri, namespace = master_and_namespace(
+            os.environ if environ is None else environ,
+            master_uri=given.special.get("__master", ""),
+            namespace=given.special.get("__ns", ""),
+        )
+        return cls(MasterProxy(master_uri, "/" + tool), tool, namespace, given.remappings)
 
     def __enter__(self) -> Graph:
         return self
@@ -56,7 +85,7 @@ class Graph:
 
     def resolve(self, name: str) -> str:
         """The global name of ``name``."""
-        return names.resolve(name, self._node_name)
+        return names.resolve(name, self._node_name, self._remappings)
 
     def state(self) -> SystemState:
         """Who publishes, subscribes and serves what."""
@@ -74,6 +103,15 @@ class Graph:
     def addresses(self, nodes: Iterable[str]) -> list[NodeAddress]:
         """Each node with its URI."""
         return [NodeAddress(node, self.node_uri(node)) for node in nodes]
+
+
+def why_illegal(name: str) -> str:
+    """What is wrong with the global name of a topic or service; "" where nothing is.
+
+    rospy takes such names all the same, roscpp does not. The path of a field may stand behind a topic's: /points[0]/x.
+    """
+    legal = name != "/" and names.is_legal_name(re.sub(r"\[.*?\]", "", name))
+    return "" if legal else "that is not a legal name: letters, digits, _ and /"
 
 
 def in_namespace(name: str, namespace: str) -> bool:

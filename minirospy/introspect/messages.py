@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["MessageClasses", "check", "fill", "serialize"]
 
 
+_HINTS = {
+    # What YAML reads otherwise than it looks.
+    "an ascii string": ", a text that could be a number, a date or a list in quotes of its own: \"'5'\"",
+    "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
+}
+
+
 class MessageClasses:
     """Message classes for what publishers send; each is looked up or made once."""
 
@@ -91,4 +98,6 @@ def _does_not_fit(message: Any, error: Exception) -> MessageException:
     """What is wrong with the values, on one line, and what the fields are."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
-    return MessageException(f"{' '.join(str(error).split())} ([{message._type}] has {shown})")
+    why = " ".join(str(error).split())
+    hint = next((hint for words, hint in _HINTS.items() if words in why), "")
+    return MessageException(f"{why}{hint} ([{message._type}] has {shown})")

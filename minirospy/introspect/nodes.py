@@ -10,7 +10,7 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import NodeUnreachableError, NotFoundError, RpcError, RpcRefused, RpcUnreachable
-from minirospy.introspect.graph import Graph, NodeAddress, in_namespace
+from minirospy.introspect.graph import Graph, NodeAddress, in_namespace, node_host
 from minirospy.introspect.topics import UNKNOWN_TYPE
 from minirospy.runtime.master_proxy import SlaveProxy
 
@@ -31,9 +31,15 @@ __all__ = [
     "neighbours",
     "node_connections",
     "node_detail",
+    "node_hosts",
+    "nodes_on",
     "ping_node",
     "unreachable_nodes",
 ]
+
+
+_SHUTDOWN_SECONDS = 10.0
+"""A node may end its own things before it answers."""
 
 
 class TypedName(NamedTuple):
@@ -75,6 +81,21 @@ def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
         for nodes in table.values():
             found.update(nodes)
     return sorted(node for node in found if in_namespace(node, namespace))
+
+
+def node_hosts(graph: Graph) -> dict[str, str]:
+    """The host name or address of each node whose address the master knows."""
+    hosts = {node.name: node_host(node.uri) for node in graph.addresses(list_nodes(graph))}
+    return {node: host for node, host in hosts.items() if host}
+
+
+def nodes_on(graph: Graph, machine: str) -> list[str]:
+    """The nodes on a machine, by its name or address. Raises NotFoundError where there is none."""
+    hosts = node_hosts(graph)
+    found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
+    if not found:
+        raise NotFoundError("machine", machine, hosts.values(), "no node runs on it")
+    return found
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
@@ -134,9 +155,18 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 
 
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
-    """Ask a node to shut down. A node that is gone already is as good as stopped."""
-    with contextlib.suppress(RpcError), contextlib.closing(_slave(graph, node, timeout=3.0)) as slave:
-        slave.shutdown(reason)
+    """Ask a node to shut down. A node that is gone already is as good as stopped.
+
+    Raises NodeUnreachableError where it is there and says nothing.
+    """
+    with contextlib.closing(_slave(graph, node, _SHUTDOWN_SECONDS)) as slave:
+        try:
+            slave.shutdown(reason)
+        except RpcUnreachable as error:
+            if isinstance(error.__cause__, TimeoutError):
+                raise NodeUnreachableError(node.name, error.uri, error.why) from error
+        except RpcError:
+            pass  # one that ends at once may have had no time for a whole answer
 
 
 def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
@@ -163,6 +193,17 @@ def forget_node(graph: Graph, node: NodeAddress) -> None:
                 master.unregister_service(service, master.lookup_service(service))
     finally:
         master.close()
+
+
+def _is_same_host(one: str, other: str) -> bool:
+    import socket
+
+    if one == other:
+        return True
+    try:
+        return socket.gethostbyname(one) == socket.gethostbyname(other)
+    except OSError:
+        return False
 
 
 def _answers(graph: Graph, node: NodeAddress, timeout: float) -> bool:

@@ -68,7 +68,11 @@ def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
 
 
 def delete_parameter(graph: Graph, name: str) -> None:
-    """Delete a parameter or namespace. Raises NotFoundError."""
+    """Delete a parameter or namespace; the root is emptied. Raises NotFoundError."""
+    if name == "/":
+        # The master's deleteParam refuses it.
+        graph.master.set_param(name, {})
+        return
     try:
         graph.master.delete_param(name)
     except RpcRefused:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from typing import Any, NamedTuple
 
@@ -11,6 +12,9 @@ from minirospy.idl.spec import FieldType, MessageSpec
 __all__ = ["prototype"]
 
 _WIDE = 5
+_COLUMNS = 80
+_NO_BYTES = '!!binary ""'
+"""An empty uint8[], which is bytes and no list of numbers."""
 
 
 def prototype(
@@ -21,7 +25,8 @@ def prototype(
     An array of no fixed length has one element, which shows what its elements are, or with ``empty_arrays``
     none. ``without``: names of fields to leave out, also of inner messages.
     """
-    return "\n".join(_yaml(_Defaults(catalogue, without, empty_arrays).of(spec), tight=False))
+    lines = _Yaml().lines(_Defaults(catalogue, without, empty_arrays).of(spec))
+    return "\n".join(map(_wrapped, lines))
 
 
 class _Defaults(NamedTuple):
@@ -36,6 +41,8 @@ class _Defaults(NamedTuple):
 
     def _value(self, type_: FieldType) -> Any:
         if type_.is_array:
+            if type_.length is None and type_.base in ("uint8", "char"):
+                return b""
             if type_.length is None and self.empty_arrays:
                 return []
             if type_.length is None and type_.base in ("float32", "float64"):
@@ -49,31 +56,61 @@ class _Defaults(NamedTuple):
         return {"string": "", "bool": False, "float32": 0.0, "float64": 0.0}.get(type_.base, 0)
 
 
-def _yaml(value: Any, *, tight: bool) -> list[str]:
-    """The lines of a value. Of a wide one, all that holds no further braces stands on one line: so it fits the screen."""
-    inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
-    tight = tight or (isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE)
-    if not inner or (tight and not any(isinstance(each, dict | list) for each in inner)):
-        return [_yaml_flow(value)]
-    lines: list[str] = []
-    for key, child in value.items() if isinstance(value, dict) else enumerate(value):
-        first, *rest = _yaml(child, tight=tight)
-        if isinstance(value, list):
-            lines += [f"- {first}", *(f"  {line}" for line in rest)]
-        elif rest or (isinstance(child, dict | list) and first[0] not in "{["):
-            indent = "  " if isinstance(child, dict) else ""
-            lines += [f"{key}:", *(indent + line for line in (first, *rest))]
-        else:
-            lines.append(f"{key}: {first}")
-    return lines
+class _Yaml:
+    """Values as lines. From the first wide one on, all that holds no further braces stands on one line: so it fits."""
+
+    def __init__(self) -> None:
+        self._tight = False
+
+    def lines(self, value: Any) -> list[str]:
+        """The lines of a value, those of what it holds indented."""
+        inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
+        if isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE:
+            self._tight = True
+        if not inner or (self._tight and not any(isinstance(each, dict | list) for each in inner)):
+            return [_flow(value)]
+        lines: list[str] = []
+        for key, child in value.items() if isinstance(value, dict) else enumerate(value):
+            first, *rest = self.lines(child)
+            if isinstance(value, list):
+                lines += [f"- {first}", *(f"  {line}" for line in rest)]
+            elif rest or (isinstance(child, dict | list) and first[0] not in "{["):
+                indent = "  " if isinstance(child, dict) else ""
+                lines += [f"{key}:", *(indent + line for line in (first, *rest))]
+            else:
+                lines.append(f"{key}: {first}")
+        return lines
 
 
-def _yaml_flow(value: Any) -> str:
+def _flow(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_yaml_flow(inner)}" for key, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_yaml_flow, value)) + "]"
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if value == b"":
+        return _NO_BYTES
     return "''" if value == "" else str(value).lower()
+
+
+def _wrapped(line: str) -> str:
+    """A line that is too wide goes on below, as YAML libraries write it: its next word after the last column."""
+    if len(line) <= _COLUMNS:
+        return line
+    # A dash before a key counts as indentation, one before a brace does not.
+    start = re.match(r" *(?:- (?=\w))?", line)
+    indent = start.end() if start else 0
+    column, depth, text = 0, 0, []
+    for word in line.split(" "):
+        if column > _COLUMNS:
+            text.append("\n" + " " * (indent + 2 * depth))
+            column = indent + 2 * depth
+        elif text:
+            text.append(" ")
+            column += 1
+        text.append(word)
+        column += len(word)
+        depth += word.count("[") + word.count("{") - word.count("]") - word.count("}")
+    return "".join(text)
 
 
 def _length(value: Any) -> int:

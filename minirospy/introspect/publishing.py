@@ -8,16 +8,15 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
-from minirospy.errors import NotFoundError, UsageError
+from minirospy.errors import NotFoundError, ROSTimeMovedBackwardsException, UsageError
 from minirospy.introspect.values import message_values, parse_arguments, parse_documents, parse_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from minirospy.introspect.graph import Graph
     from minirospy.introspect.streams import ToolNode, TopicPublisher
 
-__all__ = ["other_type", "publish_all", "values_to_publish"]
+__all__ = ["publish_all", "values_to_publish"]
 
 
 def values_to_publish(
@@ -53,24 +52,24 @@ def publish_all(
     rate: float,
     on_message: Callable[[Any], object],
 ) -> None:
-    """Publish ``rate`` messages a second by the node's clock until they end or the node is asked to stop."""
-    start = node.clock.now()
-    for sent, message in enumerate(messages, 1):
+    """Publish ``rate`` messages a second by the node's clock until they end or the node is asked to stop.
+
+    Where time jumps back (a simulation that starts again), it goes on from there.
+    """
+    start, sent = node.clock.now(), 0
+    for message in messages:
         on_message(message)
         publisher.publish(message)
+        sent += 1
         # From the start, not from the last message: pauses that come out too long do not add up.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
-        if not node.clock.sleep(max(0, pause), node.ended):
-            return
-
-
-def other_type(graph: Graph, topic: str, type_: str) -> str | None:
-    """The type of a topic that somebody uses with another than ``type_``."""
-    state = graph.state()
-    # The master remembers the type of a topic that everybody has left: that one is free.
-    used = topic in state.publishers or topic in state.subscribers
-    other = graph.master.get_topic_types().get(topic, "*")
-    return other if used and other not in ("*", type_) else None
+        try:
+            if pause > 2e9 / rate:
+                raise ROSTimeMovedBackwardsException(pause / 1e9)
+            if not node.clock.sleep(max(0, pause), node.ended):
+                return
+        except ROSTimeMovedBackwardsException:
+            start, sent = node.clock.now(), 0
 
 
 def _read_text(file: str) -> str:

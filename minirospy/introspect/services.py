@@ -19,21 +19,21 @@ from minirospy.errors import (
 from minirospy.introspect.graph import Graph, in_namespace, unknown_service
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from minirospy.runtime.service_client import ServiceClient
     from minirospy.wire.header import Header
 
 __all__ = [
-    "ServiceDetail",
     "ServiceNode",
+    "ServiceOffer",
     "call_service",
     "fill_request",
     "find_services_of_type",
     "list_services",
     "service_arguments",
-    "service_detail",
     "service_header",
+    "service_offer",
     "service_type",
     "service_uri",
     "wait_for_service",
@@ -51,14 +51,11 @@ class ServiceNode(NamedTuple):
     nodes: tuple[str, ...]
 
 
-class ServiceDetail(NamedTuple):
-    """A service: who offers it, where, its type, and the fields of its request."""
+class ServiceOffer(NamedTuple):
+    """What the master knows of a service: the node that offers it, and where it is called."""
 
-    name: str
     node: str
     uri: str
-    type: str
-    arguments: list[str]
 
 
 def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
@@ -87,14 +84,12 @@ def service_type(graph: Graph, service: str) -> str:
     return _probe(graph, service, service_uri(graph, service))
 
 
-def service_detail(graph: Graph, service: str) -> ServiceDetail:
-    """All there is to know of a service. Raises NotFoundError, NodeUnreachableError."""
+def service_offer(graph: Graph, service: str) -> ServiceOffer:
+    """Who offers a service, and where. Raises NotFoundError."""
     nodes = graph.state().services.get(service)
     if not nodes:
         raise unknown_service(graph, service)
-    uri = service_uri(graph, service)
-    type_ = _probe(graph, service, uri)
-    return ServiceDetail(service, nodes[0], uri, type_, service_arguments(type_))
+    return ServiceOffer(nodes[0], service_uri(graph, service))
 
 
 def service_arguments(type_: str) -> list[str]:
@@ -109,14 +104,13 @@ def find_services_of_type(graph: Graph, type_: str) -> list[str]:
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
-def wait_for_service(graph: Graph, service: str, timeout: float | None = None) -> bool:
-    """Wait until a service is registered and answers; False where ``timeout`` seconds were not enough."""
-    end = None if timeout is None else time.monotonic() + timeout
-    while end is None or time.monotonic() < end:
-        if _probed_type(graph, service):
-            return True
+def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
+    """Wait until a service is registered and answers; ``on_waiting`` is called once where it does not yet."""
+    if _probed_type(graph, service):
+        return
+    on_waiting()
+    while not _probed_type(graph, service):
         time.sleep(_POLL_SECONDS)
-    return False
 
 
 def fill_request(type_: str, arguments: Sequence[Any]) -> Any:

@@ -57,19 +57,23 @@ class Received(NamedTuple):
 
 
 class ToolNode:
-    """A node ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it is asked to stop.
+    """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it is asked to stop.
 
     ``clock`` tells when messages come: the machine's time; with ``ros_time`` that of /clock where the parameter
     /use_sim_time asks for it, which ``simulated`` says then. Raises MasterUnreachableError where no master answers.
     """
 
-    def __init__(self, environment: Environment, tool: str, *, ros_time: bool = False) -> None:
-        self.name = f"{environment.namespace.rstrip('/')}/{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
+    def __init__(
+        self, environment: Environment, tool: str, *, name: str = "", ros_time: bool = False
+    ) -> None:
+        name = name or f"{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
+        self.name = f"{environment.namespace.rstrip('/')}/{name}"
         self.ended = threading.Event()
         self.classes = MessageClasses()
         self.clock: Clock = WallClock()
         self.simulated = False
         self._fault: Exception | None = None
+        self._listeners: dict[str, list[Callable[[Frame, Header], None]]] = {}
         self._on_end: list[Callable[[], object]] = []
         self._loop = LoopThread(f"{tool}-loop")
         self._node = Node(self.name, environment, on_shutdown=self._asked_to_stop)
@@ -118,10 +122,20 @@ class ToolNode:
     ) -> None:
         """Call ``deliver(bytes, header)`` in a worker with each message of a topic, whatever its type.
 
-        The bytes are valid during the call only.
+        The bytes are valid during the call only. A node subscribes to a topic once: whoever listens to it later,
+        as to the /clock that the node itself goes by, is told by the same worker.
         """
+        if topic in self._listeners:
+            self._listeners[topic].append(deliver)
+            return
+        listeners = self._listeners[topic] = [deliver]
+
+        def tell(body: Frame, header: Header) -> None:
+            for listener in listeners:
+                listener(body, header)
+
         subscription = self._node.make_subscription(
-            topic, InterfaceType(ANY, ANY), deliver, tcp_nodelay=tcp_nodelay
+            topic, InterfaceType(ANY, ANY), tell, tcp_nodelay=tcp_nodelay
         )
         self._loop.run(self._node.subscribe(subscription))
 

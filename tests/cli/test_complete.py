@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import os
 import re
+import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 import yaml
 
 from minirospy.cli import sources
-from minirospy.cli.complete import _MODULES, candidates, main
+from minirospy.cli.command import Parser
+from minirospy.cli.complete import BY_HAND, COMPLETED_WITH, ENTRANCES, _takes, candidates, main
+from minirospy.cli.family import _VERBS
+from minirospy.cli.verbs import Family
 from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
@@ -37,7 +42,9 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (package / "msg" / "Leds.msg").write_text("Led[] leds\nbool on\n")
     (package / "msg" / "Led.msg").write_text("string name\nfloat32[2] place\n")
     (package / "launch" / "all.launch").write_text(
-        '<launch><arg name="rate" default="10"/><arg name="fake" default="true"/><arg name="port"/></launch>'
+        '<launch><arg name="rate" default="10"/><arg name="fake" default="true"/><arg name="port"/>'
+        '<arg name="name" default="a robot"/><arg name="place" default="$(env HOME)"/>'
+        '<node name="talker" pkg="my_robot" type="talker.py" args="$(arg port)"/></launch>'
     )
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
     (tmp_path / "here").mkdir()
@@ -105,13 +112,69 @@ def test_every_command_that_is_installed_is_completed() -> None:
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     section = text.partition("[project.scripts]")[2].partition("\n[")[0]
     installed = dict(re.findall(r'^([\w-]+) = "minirospy\.cli\.(\w+:\w+)"$', section, re.MULTILINE))
-    by_hand = {name: installed.pop(name) for name in ("minirospy", "rosrun", "rospack")}
-    assert {name: ":".join(entry) for name, entry in _MODULES.items()} == installed
-    assert {*by_hand} - {"minirospy"} <= {*sources.BY_HAND}
+    by_hand = {name: installed.pop(name) for name in ("minirospy", "rosrun", "rospack", "rosstack")}
+    assert installed == ENTRANCES
+    assert {*by_hand} - {"minirospy"} <= {*BY_HAND}
+
+
+_WITHOUT_WORDS = {"rosdep init", "rosdep update"}
+
+
+def parsers() -> Iterator[tuple[str, str, Parser]]:
+    """Every parser that a command has: its name in the table, what is typed before its words, itself."""
+    entrances = {**ENTRANCES, "rosrun": "rosrun:main", "rospack": "rospack:main"}
+    by_verb = {
+        f"minirospy {verb}": f"{entry.module}:{entry.function}"
+        for verb, entry in _VERBS.items()
+        if entry.summary
+    }
+    for typed, entrance in (entrances | by_verb).items():
+        module, _, function = entrance.partition(":")
+        if module not in BY_HAND:
+            yield from parsers_of(
+                module if typed in by_verb else typed,
+                typed,
+                getattr(import_module(f"minirospy.cli.{module}"), function),
+            )
+
+
+def parsers_of(
+    name: str, typed: str, entrance: Callable[[Sequence[str]], object]
+) -> Iterator[tuple[str, str, Parser]]:
+    takes = _takes(entrance)
+    if isinstance(takes, Family):
+        for verb in takes.verbs:
+            yield from parsers_of(takes.name, f"{typed} {verb.name}", verb.body)
+    elif typed not in _WITHOUT_WORDS:
+        assert takes, f"{typed}: neither a family of verbs nor a parser"
+        yield name, typed, takes
+
+
+def test_every_verb_and_option_is_completed() -> None:
+    """What the parsers of all commands take, whatever a later command adds: a new name goes into COMPLETED_WITH."""
+    named = [name for names in COMPLETED_WITH.values() for name in names.split()]
+    assert len(named) == len({*named})
+    used: set[str] = set()
+    for name, typed, parser in parsers():
+        options = [option for action in parser._actions for option in action.option_strings]
+        assert tab(f"{typed} -") == options
+        command, _, verb = typed.rpartition(" ")
+        assert not command or tab(typed)[0] == verb
+        for action in parser._actions:
+            if action.nargs == 0 or action.choices is not None:
+                continue
+            known = {f"{name}.{action.dest}", action.dest} & {*named}
+            assert known, (
+                f"{typed}: what completes {action.option_strings or action.dest}? See COMPLETED_WITH"
+            )
+            used |= known
+    assert used == {*named}
 
 
 def test_choices_of_an_argument() -> None:
     assert tab("minirospy board set 7 ") == ["0", "1"]
+    assert tab("minirospy board press ") == ["11", "12"]
+    assert tab("minirospy shell f") == ["fish"]
 
 
 def test_tools_of_a_workspace(workspace: Path) -> None:
@@ -123,6 +186,10 @@ def test_tools_of_a_workspace(workspace: Path) -> None:
     assert "--target=" in tab("rospack depends-why my_robot -")
     assert "build" in tab("catkin b")
     assert tab("catkin build my_") == ["my_robot"]
+    assert tab("catkin build -j 4 my_") == tab("catkin build -j my_") == ["my_robot"]
+    assert tab("catkin create ") == ["pkg"]
+    assert tab("catkin create pkg x my_") == tab("catkin_create_pkg x --catkin-deps my_") == ["my_robot"]
+    assert tab("catkin_make run_tests_my") == ["run_tests_my_robot"]
     assert tab("catkin_make --pkg my_") == ["my_robot"]
 
 
@@ -136,22 +203,26 @@ def test_programs(workspace: Path) -> None:
     assert tab("rosrun --prefix gdb my_robot ") == ["talker.py"]
     assert tab("rosrun my_robot talker.py __n") == ["__name:=", "__ns:="]
     assert tab("rosrun nobody ") == []
+    assert tab("rosrun my_robot talker.py _rate:=") == []
 
 
 def test_launch_files_and_their_args(workspace: Path) -> None:
     assert tab("roslaunch my_robot ") == ["all.launch"]
     assert tab("roslaunch --screen my_robot a") == ["all.launch"]
-    assert tab("roslaunch my_robot all.launch ") == ["rate:=", "fake:=", "port:="]
+    assert tab("roslaunch my_robot all.launch ") == ["rate:=", "fake:=", "port:=", "name:=", "place:="]
     assert tab("roslaunch my_robot all.launch rate:=5 f") == ["fake:="]
     assert tab("roslaunch my_robot all.launch rate:=") == ["rate:=10"]
     assert tab("roslaunch my_robot all.launch fake:=") == ["fake:=true", "fake:=false"]
-    assert tab("roslaunch my_robot all.launch port:=") == []
+    assert tab("roslaunch my_robot all.launch port:=") == tab("roslaunch my_robot all.launch place:=") == []
+    assert tab("roslaunch my_robot all.launch --args ") == ["/talker"]
+    assert tab("roslaunch my_robot all.launch --find-node t") == ["talker"]
+    assert tab("roslaunch --args ") == []
 
 
 def test_launch_files_by_path(workspace: Path) -> None:
     folder = workspace / "src" / "my_robot" / "launch"
     assert tab(f"roslaunch {folder}/") == [f"{folder}/all.launch"]
-    assert tab(f"roslaunch {folder}/all.launch p") == ["port:="]
+    assert tab(f"roslaunch {folder}/all.launch po") == ["port:="]
 
 
 def test_folders_of_packages(workspace: Path) -> None:
@@ -163,12 +234,23 @@ def test_folders_of_packages(workspace: Path) -> None:
     assert tab("roscd my_robot/.") == ["my_robot/.git/"]
 
 
+def test_folders_of_logs_and_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "log" / "latest").mkdir(parents=True)
+    (tmp_path / "test_results" / "my_robot").mkdir(parents=True)
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    monkeypatch.delenv("ROS_LOG_DIR", raising=False)
+    assert tab("roscd lo") == ["log/"]
+    assert tab("roscd log/") == ["log/latest/"]
+    assert tab("rosls test_results/") == ["test_results/my_robot/"]
+
+
 def test_files_of_packages(workspace: Path) -> None:
     assert tab("rosed my_robot t") == ["talker.py"]
     assert tab("rosed my_robot scripts/") == ["scripts/notes.txt", "scripts/talker.py"]
     assert tab("rosed my_robot c") == []
     assert tab("rosed my_robot config/") == ["config/deep/"]
     assert tab("rosed my_robot talker.py ") == []
+    assert tab("catkin_find my_robot l") == ["launch/"]
     Path("copy.txt").touch()
     assert tab("roscp my_robot notes.txt ") == ["copy.txt"]
 
@@ -179,6 +261,9 @@ def test_files_of_this_computer(workspace: Path) -> None:
     assert tab("rosparam load ") == ["folder/", "params.yaml"]
     assert tab("rosparam load ./p") == ["./params.yaml"]
     assert tab("rostopic pub -f ") == ["folder/", "params.yaml"]
+    assert tab("rostopic pub --file=p") == ["--file=params.yaml"]
+    assert tab("rostopic pub --rate=") == []
+    assert tab("catkin_make --source ") == ["folder/"]
 
 
 # --- types and texts
@@ -193,6 +278,12 @@ def test_types(workspace: Path) -> None:
     assert tab("rosservice find std_s") == ["std_srvs/"]
     assert tab("rostopic pub /new std_msgs/Boo") == ["std_msgs/Bool"]
     assert tab("rosmsg show nobody/") == []
+    # The name alone does as well.
+    assert tab("rosmsg show PoseWithCov") == ["PoseWithCovariance", "PoseWithCovarianceStamped"]
+    assert tab("rossrv md5 SetB") == ["SetBool"]
+    assert tab("rostopic find PoseW") == []
+    assert tab("rosmsg-proto ") == ["msg", "srv"]
+    assert tab("rosmsg-proto srv std_srvs/Set") == ["std_srvs/SetBool"]
 
 
 def test_a_message_to_be_changed(workspace: Path) -> None:
@@ -214,10 +305,48 @@ def test_a_message_on_one_line() -> None:
     assert candidates(4, words, one_line=True) == ['"{x: 0.0, y: 0.0, z: 0.0}"']
 
 
+def test_names_stay_on_one_line(workspace: Path) -> None:
+    words = ["rostopic", "pub", "/t", "my_robot/Leds", ""]
+    # YAML reads the name `on` as a truth.
+    assert candidates(4, words, one_line=True) == ["\"{leds: [{name: '', place: [0.0, 0.0]}], on: false}\""]
+
+
 def test_quotes_that_are_open_stay(workspace: Path) -> None:
     assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/Bool", "'da"]) == ["'data: false'"]
     assert candidates(4, ["rostopic", "pub", '"/t"', "std_msgs/Bool", '"']) == ['"data: false"']
-    assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ['"config/deep/my map.yaml"']
+    assert candidates(2, ["rosed", "my_robot", '"my '], one_line=True) == ['"my map.yaml"']
+    assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ["config/deep/my\\ map.yaml"]
+    # In single quotes a shell reads nothing at all: they end for a moment.
+    assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/String", "'"]) == [r"'data: '\'''\'''"]
+    words = ["roslaunch", "my_robot", "all.launch"]
+    assert candidates(3, [*words, "name:="]) == [r"name:=a\ robot"]
+    assert candidates(3, [*words, 'name:="a']) == ['name:="a robot"']
+
+
+def test_folders_in_quotes_go_on(workspace: Path) -> None:
+    Path("my folder").mkdir()
+    assert candidates(1, ["roslaunch", '"my ']) == ['"my folder/']
+    assert candidates(1, ["roslaunch", "my\\ f"]) == ["my\\ folder/"]
+
+
+def test_variables_and_home(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = workspace / "src" / "my_robot" / "launch"
+    monkeypatch.setenv("HOME", str(folder))
+    assert tab("roslaunch $HOME/a") == tab("roslaunch ${HOME}/a") == [f"{folder}/all.launch"]
+    assert tab("roslaunch '$HOME/a") == tab("roslaunch $NOBODY/a") == []
+    assert tab("roslaunch ~/") == ["~/all.launch"]
+    assert tab("roslaunch ~/all.launch po") == ["port:="]
+
+
+def test_nothing_in_a_text_is_history(robot: Robot) -> None:
+    """bash and zsh at a terminal put the last command in place of !! even within double quotes."""
+    from minirospy.cli import rosparam
+
+    assert rosparam.main(["set", "/greeting", "it's you!"]) == 0
+    (text,) = tab("rosparam set /greeting ")
+    assert text == '"it\'s you"\'!\'""'
+    assert shlex.split(text) == ["it's you!"]
+    assert tab("rostopic pub /t std_msgs/UInt8MultiArray ")[0].endswith('data: []"')
 
 
 _FROM_ROS = {
@@ -258,14 +387,17 @@ def test_topics(robot: Robot) -> None:
     assert tab("rostopic info ns/") == ["ns/chatter"]
     assert tab("minirospy topic bw /but") == ["/button_state"]
     assert tab("rostopic echo -n 3 /but") == ["/button_state"]
+    # A remapping's other side.
+    assert tab("rosrun rospy_tutorials talker chatter:=/but") == ["chatter:=/button_state"]
 
 
 def test_fields_of_a_topic(robot: Robot) -> None:
-    assert tab("rostopic echo /poly/") == ["/poly/header", "/poly/polygon"]
+    assert tab("rostopic echo /poly/") == ["/poly/header/", "/poly/polygon/"]
     assert tab("rostopic echo /poly/header/s") == ["/poly/header/seq", "/poly/header/stamp"]
     assert tab("rostopic echo /poly/header/stamp/") == ["/poly/header/stamp/secs", "/poly/header/stamp/nsecs"]
     # Shells read brackets as a pattern.
-    assert tab("rostopic echo /poly/polygon/points[0]/y") == ['"/poly/polygon/points[0]/y"']
+    assert tab("rostopic echo /poly/polygon/points[0]/y") == [r"/poly/polygon/points\[0\]/y"]
+    assert tab("rostopic echo /poly/nothing/") == []
     assert tab("rostopic hz /poly/") == []
 
 
@@ -306,6 +438,13 @@ def test_the_value_that_a_parameter_has(robot: Robot) -> None:
     assert tab("rosparam set speed ") == ["3.5"]
     assert tab("rosparam set /gains ") == ['"{i: [2, 3], p: 1}"']
     assert tab("rosparam set /none ") == []
+    assert rosparam.main(["set", "/text", "'one\n\ntwo: \u00fc'"]) == 0
+    assert [yaml.safe_load(shlex.split(text)[0]) for text in tab("rosparam set /text ")] == [
+        "one\ntwo: \u00fc"
+    ]
+    assert "\v" not in tab("rosparam set /text ")[0]
+    assert rosparam.main(["set", "/robot_description", "x" * 2000]) == 0
+    assert tab("rosparam set /robot_description ") == []
 
 
 def test_a_thousand_topics(master: str) -> None:
@@ -334,6 +473,27 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         start = time.monotonic()
         assert tab("rostopic echo ") == []
         assert time.monotonic() - start < sources.LIVE_SECONDS + 0.5
+
+
+def test_nodes_that_have_died_are_not_waited_for(master: str) -> None:
+    proxy = MasterProxy(master, "/dead")
+    proxy.call("registerService", "/dead/get_loggers", "rosrpc://localhost:1", "http://localhost:1")
+    proxy.close()
+    assert tab("rosservice call /dead/get_") == ["/dead/get_loggers"]
+    assert tab("rosservice call /dead/get_loggers ") == []
+    assert tab("rosconsole get /dead ") == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_folders_that_cannot_be_read(workspace: Path) -> None:
+    Path("itself").symlink_to("itself")
+    Path("gone").symlink_to("nowhere")
+    Path("a.launch").touch()
+    assert tab("rosparam load ") == ["a.launch", "gone", "itself"]
+    assert tab("rosparam load itself/") == tab("rosparam load a.launch/") == []
+    (workspace / "src" / "my_robot" / "scripts" / "itself").symlink_to("itself")
+    assert tab("rosrun my_robot ") == ["talker.py"]
+    assert "itself" in tab("rosed my_robot scripts/i")[0]
 
 
 def test_packages_are_found_with_a_bad_master_uri(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -373,5 +533,5 @@ def test_the_command(workspace: Path) -> None:
     words = [sys.executable, "-m", "minirospy", "complete", "2", "rosrun", "my_robot", "-weird"]
     assert subprocess.run(words, capture_output=True, check=True, timeout=20).stdout == b""
     done = subprocess.run([*words[:-1], ""], capture_output=True, check=True, timeout=20)
-    assert done.stdout == b"talker.py" + os.linesep.encode()
+    assert done.stdout == b"talker.py"
     assert done.stderr == b""

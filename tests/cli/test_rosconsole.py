@@ -55,7 +55,7 @@ def test_what_is_not_there(talker: subprocess.Popen[str], command: Command) -> N
         status, _, err = command("rosconsole", verb, "talker", "rosuot", *level)
         assert status == 1
         assert err.startswith(
-            "rosconsole: ERROR: logger of node talker [rosuot] not found; did you mean rosout"
+            "rosconsole: ERROR: logger of node /talker [rosuot] not found; did you mean rosout"
         )
         assert err.count("\n") == 1
     assert command("rosconsole", "list", "taker").err == (
@@ -78,6 +78,18 @@ def test_without_a_master(command: Command) -> None:
         status, out, err = command("rosconsole", *words)
         assert (status, out) == (1, "")
         assert "no ROS master answers" in err
+
+
+def test_echo_that_waits_in_vain_says_so(
+    master: str, program: Callable[[Sequence[str]], subprocess.Popen[str]]
+) -> None:
+    echo = program(["rosconsole", "echo", "--topic", "!!", "nobody"])
+    assert echo.stderr
+    assert [echo.stderr.readline() for _ in range(2)] == [
+        "WARNING: topic [/!!] does not appear to be published yet; that is not a legal name: letters, digits, "
+        "_ and /\n",
+        "WARNING: no node's name begins as [nobody] yet\n",
+    ]
 
 
 def test_echo(

@@ -208,3 +208,18 @@ def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(
     assert 'name: "ros.runtime.notifier"\n    level: "debug"' in capsys.readouterr().out
     assert rosservice(["call", "/rosout/set_logger_level", "ros", "loud"]) != 0
     assert "[loud] is none of the levels debug, info, warn, error, fatal" in capsys.readouterr().err
+
+
+def test_a_reader_that_has_gone_does_not_hurt_the_master(start: Start) -> None:
+    """`roscore -v | head -3`: what comes later is not printed, and all is registered."""
+    core = start("-v", "--no-journal")
+    assert core.process.stdout
+    core.process.stdout.close()
+    proxy = MasterProxy(os.environ["ROS_MASTER_URI"], "/node")
+    for number in range(3):
+        proxy.register_publisher(f"/t{number}", "std_msgs/Bool", "http://localhost:1/")
+    assert {"/t0", "/t1", "/t2"} <= set(proxy.get_system_state().publishers)
+    proxy.close()
+    core.process.send_signal(signal.SIGTERM)
+    assert core.process.wait(10) == 0
+    core.process.stdout = None

@@ -36,3 +36,16 @@ def test_fields_left_out_and_empty_arrays(command: Any) -> None:
     assert pose == "pose:\n  position:\n    x: 0.0\n    y: 0.0\n    z: 0.0\n"
     assert command("rosmsg_proto", "msg", "geometry_msgs/Polygon", "-H", "-e").out == "points: []\n"
     assert command("rosmsg_proto", "srv", "SetBool", "-x", "data").out == '"{}"\n'
+
+
+def test_layouts_as_the_real_one_has_them(command: Any) -> None:
+    """Bytes are no list; from the first wide value on all is narrow; lines go on below the 80th column."""
+    image = command("rosmsg_proto", "msg", "sensor_msgs/Image", "-H").out
+    assert "  stamp: {secs: 0, nsecs: 0}\n" in image
+    assert image.endswith('\nstep: 0\ndata: !!binary ""\n')
+    grid = command("rosmsg_proto", "msg", "nav_msgs/OccupancyGrid", "-H").out
+    assert "  stamp:\n    secs: 0\n" in grid
+    assert grid.endswith("\n    orientation: {x: 0.0, y: 0.0, z: 0.0, w: 0.0}\ndata: [0]\n")
+    pose = command("rosmsg_proto", "msg", "geometry_msgs/PoseWithCovariance", "-H").out
+    numbers = ", ".join(["0.0"] * 14) + ",\n  " + ", ".join(["0.0"] * 16) + ",\n  " + ", ".join(["0.0"] * 6)
+    assert pose.endswith(f"\ncovariance: [{numbers}]\n")

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from typing import Any
 
 import pytest
@@ -76,6 +77,7 @@ def test_a_node_that_does_not_answer(robot: Any, ghost: str, command: Any) -> No
     assert status == 1
     assert out.endswith(f"contacting node {ghost} ...\n")
     assert err.startswith(f"rosnode: ERROR: node [/ghost] does not answer at {ghost}")
+    assert "Errno" not in err
     assert command("rosnode", "ping", "/ghost").status == 1
     status, out, err = command("rosnode", "ping", "-a")
     assert status == 1
@@ -121,6 +123,23 @@ def test_kill(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None
     )
     assert out.endswith("> killing /robot\nkilled\n")
     assert command("rosnode", "kill", "-a").out == "killing /robot\nkilled\n"
+
+
+def test_a_node_that_hangs_is_not_killed(
+    robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.introspect.nodes._SHUTDOWN_SECONDS", 0.1)
+    with socket.create_server(("127.0.0.1", 0)) as silent, closing(MasterProxy(master, "/hung")) as proxy:
+        uri = f"http://localhost:{silent.getsockname()[1]}/"
+        proxy.register_publisher("/t", "std_msgs/Bool", uri)
+        status, out, err = command("rosnode", "kill", "/hung")
+        assert (status, out) == (1, "killing /hung\n")
+        assert err.startswith(
+            f"rosnode: ERROR: node [/hung] does not answer at {uri} (timed out after 0.1 s): "
+        )
+        status, out, err = command("rosnode", "kill", "-a")
+        assert (status, out) == (1, "killing:\n * /hung\n * /robot\nkilled\n")
+    assert robot.stopped
 
 
 def test_cleanup(robot: Any, ghost: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -145,6 +145,15 @@ def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "package [mi] not found; did you mean my? (ROS_PACKAGE_PATH names the folders that are searched)",
     )
     assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
+    # Where no name is near, those that there are; a path is one below the package.
+    for wrong in ("zzz", "/etc/passwd"):
+        status, said = fails(capsys, "my", wrong)
+        assert status == 1
+        assert said.startswith(f"executable [{wrong}] not found: package [my] in {package} has dies, ")
+        assert "talker.py" in said
+    (package.parent / "none").mkdir()
+    (package.parent / "none" / "package.xml").write_text("<package><name>none</name></package>")
+    assert fails(capsys, "none", "x")[1].endswith("/none has no programs")
     assert fails(capsys, "--prefix") == (
         2,
         "option --prefix is unknown, or lacks its value (`rosrun -h` shows what there is)",

@@ -144,10 +144,12 @@ def test_the_program(robot: Any, program: Start) -> None:
 def test_a_service_that_does_not_answer(master: str, command: Any) -> None:
     with closing(MasterProxy(master, "/ghost")) as ghost:
         ghost.register_service("/gone", "rosrpc://localhost:9", "http://localhost:9/")
-    for verb in ("type", "call", "info"):
+    for verb in ("type", "call", "args", "info"):
         status, out, err = command("rosservice", verb, "/gone")
-        assert (status, out) == (1, "")
+        # What the master alone knows is told all the same.
+        assert (status, out) == (1, "Node: /ghost\nURI: rosrpc://localhost:9\n" if verb == "info" else "")
         assert err.startswith("rosservice: ERROR: service [/gone] does not answer at rosrpc://localhost:9 (")
+        assert "`rosnode cleanup` forgets nodes that have ended" in err
     assert command("rosservice", "find", "std_srvs/Empty") == (0, "\n", "")
 
 

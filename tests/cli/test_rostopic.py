@@ -198,7 +198,9 @@ def test_pub_from_standard_input_and_file(
         (["/t", "std_msgs/Bool", "datum: True"], 1, "No field name [datum] ([std_msgs/Bool] has bool data)"),
         (["/t", "std_msgs/Bool", "data: [1"], 1, "'data: [1': "),
         (["/t", "std_msgs/Int32", "hi"], 1, "([std_msgs/Int32] has int32 data)"),
-        (["/b-ad", "std_msgs/Bool", "True"], 2, "not a legal name"),
+        (["/t", "std_msgs/String", "5"], 1, "in quotes of its own: \"'5'\""),
+        (["/t", "std_msgs/Float64", "1e-3"], 1, "numbers like 1.0e-3"),
+        (["/b-ad", "std_msgs/Bool", "True"], 2, "topic [/b-ad]: that is not a legal name"),
         (["/t"], 2, "arguments are required"),
         (["-r", "0", "/t", "std_msgs/Bool", "True"], 2, "greater than zero"),
         (["-r", "fast", "/t", "std_msgs/Bool", "True"], 2, "must be a number"),
@@ -356,6 +358,9 @@ def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
     robot.publish("/clock", Clock(genpy.Time(100)))
     row = program(["rostopic", "echo", "-p", "-n1", "/button_state"])
     now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
+    # A node goes by /clock and listens to it with one subscription.
+    clock = program(["rostopic", "echo", "-n1", "/clock"])
+    assert clock.communicate(timeout=20)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
     out, err = row.communicate(timeout=20)
     # The message may have come before the clock's.
     assert re.fullmatch(r"%time,field.data\n(100000000000|0),1\n", out)
@@ -381,3 +386,27 @@ def test_hz_of_a_field_and_bw_of_several_topics(robot: Any, program: Start) -> N
             robot.publish("/ns/chatter", String("hello"))
         line = width.stdout.readline()
     assert line.split() == ["topic", "bandwidth", "mean", "min", "max", "window"]
+
+
+def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: Start) -> None:
+    """`<node pkg="rostopic" type="rostopic" args="pub ..."/>`: __name:=, __ns:=, __log:= and remappings."""
+    everything = command("rostopic", "list").out
+    assert command("rostopic", "list", "__name:=x", "__log:=/x.log", "_p:=1").out == everything
+    assert command("rostopic", "type", "chatter", "__ns:=ns").out == "std_msgs/String\n"
+    assert command("rostopic", "type", "a", "a:=/ns/chatter").out == "std_msgs/String\n"
+    assert command("rostopic", "echo", "-n1", "a", "a:=button_state") == (0, "data: True\n---\n", "")
+    assert command("rostopic", "list", "__master:=http://localhost:1").status == 1
+    assert command("rosservice", "type", "b", "b:=/fail", "__name:=x").out == "std_srvs/Trigger\n"
+    pub = program(
+        ["rosrun", "rostopic", "rostopic", "pub", "a", "std_msgs/Bool", "True", "a:=/listen", "__name:=fake"]
+    )
+    _until(lambda: robot.heard == [b"\x01"])
+    assert command("rosnode", "list").out == "/fake\n/robot\n"
+    _interrupt(pub)
+    assert pub.wait(10) == 0
+
+
+def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "data: 'x:=1'")
+    assert result == (0, 'publishing and latching [data: "x:=1"] for 0.1 seconds\n', "")

@@ -64,6 +64,16 @@ rostopic type /poly/header/stamp
 rostopic type /poly/polygon/points[0]/x ## {_TRACEBACK}
 rostopic type /poly/heder
 rostopic type /nope
+rostopic type /poly/polygon/points/foo
+rostopic type /duration/data/secs
+rostopic type /scan /poly
+rostopic info '!!'
+rostopic list -p /ns
+rostopic list --host /ns
+rostopic find LaserScan
+rostopic list __name:=x a:=b
+rostopic type chatter __ns:=ns
+rosservice call empty __ns:=ns
 rostopic find std_msgs/Bool
 rostopic find std_msgs/Nope
 rostopic find
@@ -80,6 +90,8 @@ rosnode info -q scene
 rosnode info scene /scene -q
 rosnode info nope -q scene ## {_UNKNOWN}
 rosnode info
+rosnode info ~x -q ## {_UNKNOWN}
+rosnode list -ua
 rosnode machine
 rosnode machine localhost
 rosnode machine nope
@@ -89,6 +101,8 @@ rosnode ping -a
 rosnode ping -a -c 2
 rosnode ping nope ## {_UNKNOWN}
 rosnode ping -c x scene
+rosnode ping scene -c1
+rosnode kill -a scene
 rosnode kill nope nope2
 rosnode kill <<< x\\n9\\n ## {_TRACEBACK}
 rosnode cleanup
@@ -98,6 +112,7 @@ rosservice list
 rosservice list -n
 rosservice list /ns
 rosservice list -n /nope
+rosservice list --nodes /ns
 rosservice info /set_led_state
 rosservice info /nope
 rosservice type ns/empty
@@ -113,7 +128,13 @@ rosservice call /set_led_state True
 rosservice call /set_led_state 1 --wait
 rosservice call -v /set_led_state 'data: False'
 rosservice call /set_led_state {{}}
+rosservice call /set_led_state "{{data: true}}"
+rosservice call /set_led_state 'data: maybe' ## {_ONE_STATUS}
+rosservice call /scene/set_logger_level rosout info
+rosservice call /scene/set_logger_level rosout ## {_ONE_STATUS}
 rosservice call /ns/empty
+rosservice call /ns/empty {{}}
+rosservice call /ns/empty 5 ## {_ONE_STATUS}
 rosservice call /set_led_state -v <<< data: true\\n---\\ndata: false\\n---\\n
 rosservice call /set_led_state <<< data: true\\n ## real ROS forgets a document that has no --- behind it
 rosservice call /set_led_state ## a call without values is an error: exit 2
@@ -149,8 +170,14 @@ rosparam get -p /p/l
 rosparam get -v /p/big
 rosparam get /p/nope
 rosparam get
+rosparam get ''
+rosparam get '!!'
+rosparam get /p/l[0]
+rosparam get /p /p/i
+rosparam list /p/
 rosparam dump
 rosparam dump -v dumped.yaml /p/d
+rosparam dump /no/such/folder/x.yaml
 rosparam dump dumped.yaml /nope
 rosparam dump - /p/d ## to standard output; real ROS writes a file called -
 rosparam load nope.yaml
@@ -166,6 +193,9 @@ rosmsg show <<< std_msgs/Header\\n
 rosmsg show std_msgs/Bol
 rosmsg show -b nope.bag std_msgs/Bool
 rosmsg show -r std_msgs/Header ## the comments of the definitions are our own
+rosmsg show ''
+rosmsg show std_msgs/msg/Bool
+rosmsg show std_srvs/SetBool
 rosmsg info std_msgs/Header
 rosmsg md5 Bool
 rosmsg md5 <<< std_msgs/Header\\n
@@ -173,6 +203,7 @@ rosmsg md5 std_msgs/Nope ## {_UNKNOWN}
 rosmsg package std_msgs
 rosmsg package -s std_msgs
 rosmsg package nope ## {_ONE_STATUS}
+rosmsg users std_msgs/Bool ## {_NEAREST}
 rossrv ## {_NEAREST}
 rossrv show SetBool
 rossrv show Empty
@@ -190,6 +221,11 @@ rosmsg-proto msg geometry_msgs/PoseStamped -f 1
 rosmsg-proto msg geometry_msgs/PoseStamped -H -p ab
 rosmsg-proto msg geometry_msgs/PolygonStamped -e
 rosmsg-proto msg geometry_msgs/PoseStamped -x header,orientation
+rosmsg-proto msg geometry_msgs/PoseWithCovarianceStamped
+rosmsg-proto msg nav_msgs/OccupancyGrid
+rosmsg-proto msg sensor_msgs/Image
+rosmsg-proto msg sensor_msgs/Image -f 1 -e
+rosmsg-proto srv nav_msgs/SetMap
 rosmsg-proto srv std_srvs/SetBool
 rosmsg-proto msg nope
 rosmsg-proto
@@ -199,7 +235,8 @@ _TOPICS = """
 button_state ns/chatter poly scan joints image duration time bytes int8s signed_bytes char tiny empty
 poly/polygon poly/polygon/points poly/polygon/points[0] poly/polygon/points[0]/x poly/polygon/points[:]/x
 poly/polygon/points[1:] poly/polygon/points[::-1] poly/header/stamp ns/chatter/data scan/ranges scan/ranges[1:3]
-joints/name joints/name[1] joints/name[-1] duration/data duration/data/secs
+joints/name joints/name[1] joints/name[-1] joints/name[0:2] duration/data duration/data/secs time/data/nsecs
+scan/header scan/ranges[-1] scan/ranges[::2] scan/ranges[:2] poly/polygon/points[0:1]/y bytes/layout
 """
 
 ECHOING = (
@@ -211,6 +248,17 @@ ECHOING = (
         for topic in ("poly", "scan", "joints", "image", "ns/chatter")
     )
     + """
+rostopic echo -n1 -p /scan/ranges[0]
+rostopic echo -n1 -p /poly/header/stamp
+rostopic echo -n1 -p /poly/polygon/points[:]/x
+rostopic echo -n1 -p /bytes
+rostopic echo -n1 -p /duration
+rostopic echo -n1 -p --nostr --noarr /joints
+rostopic echo -n1 --filter 'len(m.ranges)>3' /scan
+rostopic echo -n1 --filter "topic=='/poly'" /poly ## the topic has its name in the expression; real ROS prints tracebacks
+rostopic echo -n1 -w 8 /poly/polygon/points[0]
+rostopic echo /button_state -n1
+rostopic echo /tiny /scan
 rostopic echo -n1 -c /button_state
 rostopic echo -n1 -c -p /button_state
 rostopic echo -n1 --nostr /joints/name
@@ -237,6 +285,16 @@ rostopic pub -1 -v /out geometry_msgs/Point 1 2 3
 rostopic pub -1 -v /out geometry_msgs/Point -- -1 -2 -3
 rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3 ## negative numbers are values: real ROS takes -2 for an option
 rostopic pub -1 -v /out geometry_msgs/Point '{x: 1}'
+rostopic pub -1 -v /out geometry_msgs/Twist -- '[2.0, 0.0, 0.0]' '[0.0, 0.0, 1.8]'
+rostopic pub --once /out geometry_msgs/Twist -v '{linear: {x: 0.2}, angular: [0, 0, -1]}'
+rostopic pub -1 -v /out std_msgs/Int16 -- -1000
+rostopic pub -1 -v /out std_msgs/Float64 .inf
+rostopic pub -1 -v /out std_msgs/Float64 1e-3 ## YAML reads a text there, which is refused: exit 1; real ROS sends nothing, exit 0
+rostopic pub -1 -v /out std_msgs/String "data: 'use:10:1'"
+rostopic pub -1 -v /out std_msgs/String 5 ## YAML reads a number there, which is refused: exit 1; real ROS sends nothing, exit 0
+rostopic pub -1 -v /out std_msgs/UInt8MultiArray '{data: !!binary "AQID"}'
+rostopic pub -1 -v /out sensor_msgs/JointState '{name: [a, b], position: [1, -0.5]}'
+rostopic pub -1 /out std_msgs/Duration 1.5
 rostopic pub -1 -v /out geometry_msgs/Point 1 2
 rostopic pub -1 -v /out geometry_msgs/PointStamped '{header: auto, point: {x: 1}}'
 rostopic pub -1 -v /out std_msgs/Time now
@@ -290,6 +348,18 @@ rosparam set /q/s null
 rosparam set /q/s 99999999999
 rosparam set /q/s
 rosparam set / 5
+rosparam set joy/dev /dev/input/js0
+rosparam get /joy
+rosparam set /n 010
+rosparam get /n
+rosparam set /n 12:30:45
+rosparam get /n
+rosparam set /n nan
+rosparam get /n
+rosparam set /n '#x'
+rosparam set /n "'1'"
+rosparam get /n
+rosparam set /x-y 1
 rosparam load -v values.yaml /q/l
 rosparam load values.yaml
 rosparam load -v - /q/l <<< d: 4\\n
@@ -300,6 +370,9 @@ rosparam delete -v /q
 rosparam delete /q
 rosparam delete -v /a
 rosparam delete /inner
+rosparam delete /
+rosparam delete /
+rosparam list
 rosparam delete
 """
 
@@ -310,10 +383,15 @@ rosnode ping -c 1 dead ## a node that does not answer: exit 1
 rosnode ping -c 1 unresolved ## a node that does not answer: exit 1
 rosnode cleanup <<< n\\n
 rosservice type /dead/srv ## {_ONE_STATUS}
+rosservice info /dead/srv ## {_ONE_STATUS}
+rosservice args /dead/srv ## {_ONE_STATUS}
 rosservice call /dead/srv ## {_ONE_STATUS}
 rosservice call /unresolved/srv 1 ## {_ONE_STATUS}
 rosservice uri /dead/srv
 rostopic info /t/dead
+rostopic type /t/dead
+rosnode machine
+rosnode list -a
 rosnode kill dead
 rosnode cleanup <<< y\\n
 rosnode list

@@ -98,6 +98,8 @@ def running_master(stack: str) -> Iterator[str]:
             time.sleep(0.05)
         yield uri
     finally:
+        # A master does not read its input.
+        program.terminate()
         stop(program)
 
 

@@ -27,6 +27,7 @@ from minirospy.introspect.doctor.reach import (
     trouble_of,
 )
 from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.workspace.packages import built_in_roots
 
 HERE = MasterPlace("localhost", 11311, ["127.0.0.1"])
 AFAR = MasterPlace("robot", 11311, ["192.0.2.7"])
@@ -230,6 +231,14 @@ def test_packages(tmp_path: Path) -> None:
     assert texts[1] == "arm needs hand_msgs, which is no package here"
     assert f"{tmp_path}/b/leg/package.xml" in texts[2]
     assert [each.status.value for each in found] == ["warning", "warning", "problem"]
+
+
+def test_a_package_of_the_workshop_made_anew_is_in_order(tmp_path: Path) -> None:
+    """The course has students make `rpi_msgs`, which minirospy brings along; a workspace names both."""
+    package(tmp_path / "rpi_msgs", "rpi_msgs", "rospy")
+    paths = os.pathsep.join(map(str, (tmp_path, *built_in_roots())))
+    (finding,) = check_packages(Environment.read({"ROS_PACKAGE_PATH": paths}), tmp_path)
+    assert finding == Finding("packages", Status.OK, "1 in ROS_PACKAGE_PATH")
 
 
 def test_a_workspace_that_was_not_sourced(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
     """The packages of ROS_PACKAGE_PATH: of one name, unreadable, with missing dependencies; ``here``: a workspace."""
-    from minirospy.workspace.packages import Packages
+    from minirospy.workspace.packages import Packages, built_in_roots
 
     found: list[Finding] = []
     workspace = _workspace_of(here or Path.cwd())
@@ -154,7 +154,8 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    mine = Packages.below(*environment.package_path)
+    # A workspace that is sourced names minirospy's own, too: they are in order, and a student's package goes before them.
+    mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()
     for name, folders in sorted(copies.items()):
         if len(folders) > 1:

@@ -1,0 +1,483 @@
+"""Every command and verb x everything that goes wrong: one clear line, the documented status, no traceback, no hang.
+
+The rows are the commands' own lists (pyproject.toml, and the help of each): a verb without a row in ``ROWS`` fails.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import os
+import re
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from roscpp.srv import GetLoggers, GetLoggersResponse
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import String
+
+from minirospy.runtime import master_proxy
+from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import InterfaceType
+
+from .conftest import Result, Robot
+
+PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
+posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, signals and devices of Unix")
+
+
+class Row(NamedTuple):
+    """What is typed behind a verb.
+
+    ``good``: something that works on the graph of the fixture ``graph``; None where that starts a program or a
+    master. ``unknown``: with a name that nobody has; "" where the verb takes no name. ``dead``: about the node that
+    does not answer. ``asks``: whether a master is asked. ``streams``: only Ctrl-C ends it. ``quiet``: an unknown name
+    is an empty answer, as of a search. ``waits``: it is waited for, with a warning.
+    """
+
+    good: str | None = ""
+    unknown: str = ""
+    dead: str = ""
+    asks: bool = True
+    streams: bool = False
+    quiet: bool = False
+    waits: bool = False
+
+
+class Kind(NamedTuple):
+    """A kind of definitions, with the types that its rows name."""
+
+    known: str
+    unknown: str
+
+
+ROWS = {
+    "rostopic bw": Row("/button_state", "/nope", streams=True, waits=True),
+    "rostopic delay": Row("/poly", "/nope", streams=True, waits=True),
+    "rostopic echo": Row("-n1 /button_state", "/nope", waits=True),
+    "rostopic find": Row("std_msgs/Bool", "std_msgs/Nope", quiet=True),
+    "rostopic hz": Row("/button_state", "/nope", streams=True, waits=True),
+    "rostopic info": Row("/button_state", "/nope"),
+    "rostopic list": Row("-v"),
+    "rostopic pub": Row("-1 /t std_msgs/Bool 1", "-1 /t std_msgs/Nope 1"),
+    "rostopic type": Row("/button_state", "/nope"),
+    "rosnode ping": Row("-c1 /robot", "/nope", "-c1 /ghost"),
+    "rosnode list": Row(""),
+    "rosnode info": Row("/robot", "/nope", "/ghost"),
+    "rosnode machine": Row("", "nope.invalid"),
+    "rosnode kill": Row("/robot", "/nope"),
+    "rosnode cleanup": Row(""),
+    "rosservice args": Row("/set_led_state", "/nope", "/haunt"),
+    "rosservice call": Row("/set_led_state 1", "/nope 1", "/haunt"),
+    "rosservice find": Row("std_srvs/SetBool", "std_srvs/Nope", quiet=True),
+    "rosservice info": Row("/set_led_state", "/nope", "/haunt"),
+    "rosservice list": Row(""),
+    "rosservice type": Row("/set_led_state", "/nope", "/haunt"),
+    "rosservice uri": Row("/set_led_state", "/nope"),
+    "rosparam set": Row("-v /p 1", "-t /nope.txt /p"),
+    "rosparam get": Row("/text", "/nope"),
+    "rosparam load": Row("- /q", "/nope.yaml"),
+    "rosparam dump": Row("", "- /nope"),
+    "rosparam delete": Row("-v /text", "/nope"),
+    "rosparam list": Row(""),
+    "rosconsole get": Row("/robot rosout", "/nope rosout", "/ghost rosout"),
+    "rosconsole list": Row("/robot", "/nope", "/ghost"),
+    "rosconsole set": Row(None, "/nope rosout info", "/ghost rosout info"),
+    "rosconsole echo": Row("-l debug", "/nope", streams=True, waits=True),
+    "rosgraph": Row("", streams=True),
+    "rosmsg-proto": Row("msg std_msgs/Bool", "msg std_msgs/Nope", asks=False),
+    "rosclean check": Row("", asks=False),
+    "rosclean purge": Row("", asks=False),
+    "rosversion": Row("rospy", "nope", asks=False),
+    "rosrun": Row(None, "std_msgs nope", asks=False),
+    "roscore": Row(None, asks=False),
+    "rosmaster": Row(None, asks=False),
+    "minirospy": Row("-V", "nope", asks=False),
+    **{
+        f"{command} {verb}": row
+        for command, kind in (
+            ("rosmsg", Kind("std_msgs/Bool", "std_msgs/Nope")),
+            ("rossrv", Kind("std_srvs/SetBool", "std_srvs/Nope")),
+        )
+        for verb, row in {
+            "show": Row(kind.known, kind.unknown, asks=False),
+            "info": Row(kind.known, kind.unknown, asks=False),
+            "list": Row("", asks=False),
+            "md5": Row(kind.known, kind.unknown, asks=False),
+            "package": Row(kind.known.partition("/")[0], "nope", asks=False),
+            "packages": Row("", asks=False),
+        }.items()
+    },
+}
+
+ELSEWHERE = re.compile(r"ros(dep|pack|stack|launch|wtf|test|unit)|catkin")
+"""Commands with matrices or tests of their own."""
+
+TYPED_WRONG = 2
+GRAPH = [name for name, row in ROWS.items() if row.asks]
+
+
+def scripts() -> dict[str, tuple[str, str]]:
+    """The commands that are installed -> module and function."""
+    section = PYPROJECT.read_text(encoding="utf-8").partition("[project.scripts]")[2].partition("\n[")[0]
+    return {
+        name: (module, function)
+        for name, module, function in re.findall(r'^(\S+) = "(.*):(.*)"', section, re.M)
+    }
+
+
+class Told(io.StringIO):
+    """What a command says; ``on_text`` is called with each text."""
+
+    def __init__(self, on_text: Callable[[], object] = lambda: None) -> None:
+        super().__init__()
+        self._on_text = on_text
+
+    def write(self, text: str) -> int:
+        self._on_text()
+        return super().write(text)
+
+
+def run(line: str, **streams: Any) -> Result:
+    """Run a command in this process; ``stdin``, ``stdout`` and ``stderr`` in the place of its own."""
+    words = line.split()
+    module, function = scripts()[words[0]]
+    main = getattr(importlib.import_module(module), function)
+    put = {"stdin": io.StringIO("d: 1\n"), "stdout": Told(), "stderr": Told(), **streams}
+    before = {name: getattr(sys, name) for name in put}
+    for name, stream in put.items():
+        setattr(sys, name, stream)
+    try:
+        status = main(words[1:])
+    except SystemExit as ended:
+        status = ended.code
+    finally:
+        for name, stream in before.items():
+            if getattr(sys, name) is not put[name]:
+                getattr(sys, name).close()  # the command's own, in the place of one that was closed
+            setattr(sys, name, stream)
+    return Result(
+        status,
+        *(put[name].getvalue() if isinstance(put[name], Told) else "" for name in ("stdout", "stderr")),
+    )
+
+
+def one_line(result: Result, line: str) -> str:
+    """The line that a command said on stderr, without what every such line begins with."""
+    assert re.fullmatch(rf"(?s){line.split(maxsplit=1)[0]}: ERROR: [^\n]*\n", result.err), (line, result)
+    return result.err.partition("ERROR: ")[2].rstrip("\n")
+
+
+def verbs(name: str) -> list[str]:
+    """The verbs of a command, by its help."""
+    return re.findall(rf"^\t{name} (\S+)\t", run(f"{name} -h").out, re.M)
+
+
+@pytest.fixture(scope="module")
+def lines() -> list[str]:
+    """Each command, or each of its verbs, as their help has them."""
+    found = []
+    for name in scripts():
+        if not ELSEWHERE.match(name):
+            found += [f"{name} {verb}" for verb in verbs(name)] or [name]
+    return found
+
+
+@pytest.fixture
+def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """The robot, with loggers and a parameter; and /ghost, whose services and topics are registered, and nothing else."""
+    loggers = GetLoggersResponse()
+    loggers.loggers.append(importlib.import_module("roscpp.msg").Logger("rosout", "info"))
+    answer = io.BytesIO()
+    loggers.serialize(answer)
+    server = robot.node.make_service(
+        "/robot/get_loggers", InterfaceType(GetLoggers._type, GetLoggers._md5sum), lambda *_: answer.getvalue(),
+        request_type=GetLoggers._request_class._type, response_type=GetLoggers._response_class._type,
+    )  # fmt: skip
+    robot.loop.run(robot.node.serve(server))
+    log = InterfaceType(Log._type, Log._md5sum, Log._full_text)
+    robot.loop.run(robot.node.advertise(Publication("/rosout", log, latch=True)))
+    robot.publish("/rosout", Log(level=Log.ERROR, name="/robot", msg="it hurts"))
+    with contextlib.closing(MasterProxy(master, "/ghost")) as ghost:
+        ghost.register_publisher("/boo", "std_msgs/Bool", "http://localhost:1/")
+        for service in ("/haunt", "/ghost/get_loggers"):
+            ghost.register_service(service, "rosrpc://localhost:1", "http://localhost:1/")
+        ghost.set_param("/text", "日本")
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.02)
+    return robot
+
+
+def _no_such_host(*_: object, **__: object) -> None:
+    raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calls to a master or node that says nothing end soon."""
+    monkeypatch.setattr(master_proxy, "RpcClient", lambda uri, *_, **__: RpcClient(uri, 0.05))
+
+
+# --- typed wrong
+
+
+def test_every_verb_has_a_row(lines: list[str]) -> None:
+    assert sorted(lines) == sorted(ROWS), "a new command needs a row in ROWS, or its name in ELSEWHERE"
+
+
+def test_a_typo_in_the_verb(lines: list[str]) -> None:
+    for name in {line.split()[0] for line in lines if " " in line}:
+        for verb in verbs(name):
+            result = run(f"{name} {verb[:-1]}x")
+            assert (result.status, result.out) == (TYPED_WRONG, "")
+            assert re.search(rf"did you mean .*\b{verb}\b", one_line(result, name)) or len(verb) < 4
+
+
+def test_a_typo_in_an_option(lines: list[str]) -> None:
+    for line in lines:
+        options = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", run(f"{line} -h").out)) - {"--help"}
+        for option in ("--nonsense", *sorted(options)):
+            result = run(f"{line} {option}x")
+            assert (result.status, result.out) == (TYPED_WRONG, ""), (line, option)
+            said = one_line(result, line)
+            assert f"{option}x" in said
+            assert (
+                f"did you mean {option}?" in said or option == "--nonsense" or line in ("rosrun", "minirospy")
+            )
+
+
+def test_an_option_that_no_command_has() -> None:
+    """Of every command that is installed, whoever tests the rest of it."""
+    for name in scripts():
+        result = run(f"{name} --nonsense")
+        assert (result.status, result.out) == (1 if name in ("rospack", "rosstack") else TYPED_WRONG, ""), (
+            name
+        )
+        assert re.fullmatch(rf"({name}: ERROR|\[{name}\] Error): [^\n]*--nonsense[^\n]*\n", result.err)
+
+
+def test_a_missing_argument(lines: list[str]) -> None:
+    """What the usage does not have in brackets must be typed."""
+    for line in lines:
+        usage = run(f"{line} -h").out.partition("\n\n")[0].partition(line)[2]
+        while "[" in usage:
+            usage = re.sub(r"\[[^][]*\]", "", usage)
+        if usage.split() and line != "minirospy":
+            result = run(line)
+            assert (result.status, result.out) == (TYPED_WRONG, ""), line
+            one_line(result, line)
+
+
+def test_the_other_name_of_each_command() -> None:
+    """`minirospy topic` is `rostopic`."""
+    twins = {
+        "master": "roscore",
+        "make": "catkin_make",
+        "demo": "",
+        "board": "",
+        "shell": "",
+        "complete": "",
+        "doctor": "",
+    }
+    for noun in re.findall(r"^  minirospy (\w+) ", run("minirospy -h").out, re.M):
+        name = twins.get(noun, "ros" + noun)
+        if name and not ELSEWHERE.match(name):
+            ours, theirs = run(f"minirospy {noun} --nonsense"), run(f"{name} --nonsense")
+            assert ours.status == theirs.status == TYPED_WRONG
+            assert name == "roscore" or ours == theirs
+
+
+# --- what is not there
+
+
+@pytest.mark.parametrize("line", [name for name, row in ROWS.items() if row.unknown and not row.waits])
+def test_a_name_that_nobody_has(line: str, graph: Robot) -> None:
+    row = ROWS[line]
+    result = run(f"{line} {row.unknown}")
+    if row.quiet:
+        assert result == (0, "\n", "")
+    elif line == "rosmsg-proto":
+        assert (result.status, result.err.count("\n")) == (1, 1)
+    else:
+        assert (result.status, result.out) == (TYPED_WRONG if line == "minirospy" else 1, "")
+        assert "nope" in one_line(result, line).lower()
+
+
+@pytest.mark.parametrize(
+    ("uri", "status", "says"),
+    [
+        ("http://localhost:1", 1, "start one with `roscore`"),
+        ("http://no-such-host.invalid:11311", 1, "or set ROS_MASTER_URI to the machine"),
+        ("nonsense", 2, "is not of the form http://host:port"),
+        ("http://localhost", 2, "is not of the form http://host:port"),
+        ("http://localhost:99999", 2, "is not of the form http://host:port"),
+        ("https://localhost:11311", 2, "is not of the form http://host:port"),
+    ],
+)
+def test_no_master(uri: str, status: int, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    if "invalid" in uri:
+        # Asked of the network, this takes seconds where there is none.
+        monkeypatch.setattr(socket, "getaddrinfo", _no_such_host)
+    for line in GRAPH:
+        result = run(f"{line} {ROWS[line].good or ROWS[line].unknown}")
+        assert (result.status, result.out) == (status, ""), line
+        said = one_line(result, line)
+        assert uri in said
+        assert says in said
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_master_that_accepts_and_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
+        for line in GRAPH:
+            result = run(f"{line} {ROWS[line].good or ROWS[line].unknown}")
+            assert result.status == 1, line
+            assert "no ROS master answers" in one_line(result, line)
+
+
+def test_a_web_server_in_the_place_of_the_master(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{server.getsockname()[1]}")
+
+        def serve() -> None:
+            while True:
+                try:
+                    peer, _ = server.accept()
+                except OSError:
+                    return
+                with peer:
+                    peer.recv(4096)
+                    peer.sendall(b"HTTP/1.1 404 Not Found\r\nContent-Length: 6\r\n\r\nnothing"[:-1])
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            for line in GRAPH:
+                result = run(f"{line} {ROWS[line].good or ROWS[line].unknown}")
+                assert result.status == 1, line
+                one_line(result, line)
+        finally:
+            server.shutdown(socket.SHUT_RDWR)
+            thread.join()
+
+
+@pytest.mark.parametrize("line", [name for name, row in ROWS.items() if row.dead])
+def test_a_node_that_does_not_answer(line: str, graph: Robot) -> None:
+    result = run(f"{line} {ROWS[line].dead}")
+    assert result.status == 1
+    said = one_line(result, line)
+    assert "does not answer at" in said
+    assert "`rosnode cleanup` forgets nodes that have ended" in said
+
+
+# --- streams that are closed, full, or cannot encode
+
+
+PRINTING = [name for name, row in ROWS.items() if row.good is not None]
+
+
+@posix
+@pytest.mark.parametrize("line", PRINTING)
+def test_a_closed_pipe(line: str, graph: Robot) -> None:
+    """`| head -1`."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, "w", encoding="utf-8") as pipe:
+        result = run(f"{line} {ROWS[line].good}", stdout=pipe)
+    assert (result.status, result.err) == (0, "")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux has it")
+@pytest.mark.parametrize("line", PRINTING)
+def test_a_full_disk(line: str, graph: Robot) -> None:
+    full = open("/dev/full", "w", encoding="utf-8")  # noqa: SIM115 to close it fails, too
+    try:
+        result = run(f"{line} {ROWS[line].good}", stdout=full)
+    finally:
+        with contextlib.suppress(OSError):
+            full.close()
+    if result.status:
+        assert (result.status, "No space left on device" in one_line(result, line)) == (1, True)
+    else:
+        assert not run(f"{line} {ROWS[line].good}").out
+
+
+@pytest.mark.parametrize("line", [name for name in PRINTING if not ROWS[name].streams])
+def test_closed_streams(line: str, graph: Robot) -> None:
+    """`<&- >&- 2>&-`, and a Windows program without a console."""
+    words = f"{line} {ROWS[line].good}"
+    assert run(words, stdin=None, stdout=None).err == ""
+    assert run(words, stdin=None, stdout=None, stderr=None).status in (0, 1)
+
+
+def test_an_output_that_cannot_encode(graph: Robot) -> None:
+    graph.publish("/ns/chatter", String("日本"))
+    for line, shown in (
+        ("rosparam get /text", rb'"\u65E5\u672C"'),
+        ("rosparam get -p /text", rb"\u65e5\u672c"),
+        ("rosparam dump", rb'text: "\u65E5\u672C"'),
+        ("rostopic echo -n1 /ns/chatter", rb'data: "\u65E5\u672C"'),
+        ("rostopic echo -n1 -p /ns/chatter", rb"\u65e5\u672c"),
+        ("rostopic pub -1 -v /t std_msgs/String 日本", rb'[data: "\u65E5\u672C"]'),
+    ):
+        raw = io.BytesIO()
+        stdout = io.TextIOWrapper(raw, encoding="ascii", write_through=True)
+        result = run(line, stdout=stdout)
+        assert (result.status, result.err) == (0, ""), line
+        assert shown in raw.getvalue(), line
+
+
+@posix
+@pytest.mark.parametrize(
+    "line",
+    [
+        "rosparam get",
+        "rosparam set /p",
+        "rosnode info",
+        "rosservice call",
+        "rostopic pub -1 /t std_msgs/String",
+    ],
+)
+def test_words_that_are_no_text(line: str, graph: Robot) -> None:
+    """A byte that is no UTF-8, as Python hands it on."""
+    result = run(f"{line} \udcff")
+    assert (result.status, result.out) == (TYPED_WRONG, "")
+    assert "no UTF-8 text" in one_line(result, line)
+
+
+# --- Ctrl-C
+
+
+@posix
+@pytest.mark.parametrize(
+    "line",
+    [f"{name} {row.good}" for name, row in ROWS.items() if row.streams]
+    + [f"{name} {row.unknown}" for name, row in ROWS.items() if row.waits]
+    + ["rosservice call --wait /nope", "rosnode ping /robot", "rostopic pub /t std_msgs/Bool 1"],
+)
+def test_ctrl_c(line: str, graph: Robot) -> None:
+    """Once the command has said something: it ends with 0, and says no more than a warning."""
+    main = threading.main_thread().ident
+    assert main is not None
+    once = partial(next, iter([True]), False)
+
+    def interrupt() -> None:
+        if once():
+            timer = threading.Timer(0.05, signal.pthread_kill, (main, signal.SIGINT))
+            timer.start()
+
+    result = run(line, stdout=Told(interrupt), stderr=Told(interrupt))
+    assert result.status == 0
+    assert re.fullmatch(r"(WARNING: [^\n]*\n)*", result.err)
+    assert run("rosnode list").out == "/ghost\n/robot\n"
