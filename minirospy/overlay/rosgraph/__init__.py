@@ -2,6 +2,8 @@
 
 import sys
 from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
 
 from minirospy.names import parse_arguments
 from rosgraph import masterapi as masterapi
@@ -21,3 +23,10 @@ __all__ = [
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
     """The command line without remappings and private parameters, as `rospy.myargv` gives it."""
     return parse_arguments(sys.argv if argv is None else argv).plain
+
+
+def __getattr__(name: str) -> ModuleType:
+    # With ROS these two are there wherever rospy is imported, too.
+    if name in ("roslogging", "xmlrpc"):
+        return import_module(f"rosgraph.{name}")
+    raise AttributeError(f"module 'rosgraph' has no attribute '{name}'")

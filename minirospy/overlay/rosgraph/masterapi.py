@@ -17,8 +17,6 @@ __all__ = [
     "get_master_uri", "is_online",
 ]  # fmt: skip
 
-_UNSET = object()
-
 
 class MasterException(Exception):
     """The master cannot be asked, or says no."""
@@ -65,6 +63,13 @@ class Master:
             raise ConnectionRefusedError(str(error)) from error
         except RpcError as error:
             raise MasterException(str(error)) from error
+
+    @property
+    def handle(self) -> Any:
+        """The master as Python's own `xmlrpc.client.ServerProxy`; answers are (code, text, value)."""
+        from xmlrpc.client import ServerProxy
+
+        return ServerProxy(self.master_uri)
 
     def is_online(self) -> bool:
         """Whether the master answers."""

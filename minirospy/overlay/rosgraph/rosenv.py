@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
 
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.environment import DEFAULT_MASTER_PORT
 from minirospy.names import parse_arguments
 
 __all__ = [
@@ -30,4 +31,4 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
     """The URI of the master that the command line (``__master:=``) or else the environment names."""
     named = parse_arguments(sys.argv if argv is None else argv).special.get("__master")
-    return named or Environment.read(env, host="localhost").master_uri
+    return named or (os.environ if env is None else env).get(ROS_MASTER_URI) or DEFAULT_MASTER_URI

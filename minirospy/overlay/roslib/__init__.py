@@ -1,6 +1,9 @@
 """roslib, filled in by minirospy. Source: http://wiki.ros.org/roslib."""
 
 from minirospy.workspace.roslib import load_manifest
+from roslib import exceptions as exceptions
+from roslib import launcher as launcher
+from roslib import packages as packages
 
 __all__ = ["is_interactive", "load_manifest", "set_interactive"]
 

@@ -59,9 +59,9 @@ def package_resource_name(name: str) -> tuple[str, str]:
 
 def is_legal_resource_name(name: str) -> bool:
     """Whether a name is one of a resource, with or without its package."""
-    return name is not None and bool(re.match(r"^[A-Za-z][\w/]*$", name, re.ASCII)) and "//" not in name
+    return name is not None and bool(re.match(r"^[A-Za-z][\w/]*\Z", name, re.ASCII)) and "//" not in name
 
 
 def is_legal_resource_base_name(name: str) -> bool:
     """Whether a name is one of a resource without its package."""
-    return name is not None and bool(re.match(r"^[A-Za-z]\w*$", name, re.ASCII))
+    return name is not None and bool(re.match(r"^[A-Za-z]\w*\Z", name, re.ASCII))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from rosgraph.masterapi import Master
+from xmlrpc.client import ServerProxy
+
 from rosgraph.names import script_resolve_name
+from rosgraph.rosenv import get_master_uri
 
 __all__ = ["get_master", "get_param_server", "script_resolve_name"]
 
 
-def get_master() -> Master:
-    """The master that the environment names."""
-    return Master("/roslib")
+def get_master() -> ServerProxy:
+    """The master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
+    return ServerProxy(get_master_uri())
 
 
 get_param_server = get_master

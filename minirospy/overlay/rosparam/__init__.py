@@ -19,10 +19,10 @@ from rosgraph.names import (
     script_resolve_name,
 )
 
-from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError
+from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.values import add_angles, parse_value
+from minirospy.introspect.values import add_angles, parse_documents, parse_value
 
 __all__ = [
     "GLOBALNS", "NAME", "NS", "RosParamException", "RosParamIOException", "delete_param", "dump_params", "get_param",
@@ -33,8 +33,9 @@ __all__ = [
 NAME = "rosparam"
 NS = "_ns"
 
-# Programs that import rosparam read deg(90) and rad(pi/2) with yaml.safe_load, as with ROS's.
-add_angles(yaml.SafeLoader)
+# Programs that import rosparam read deg(90) and rad(pi/2) with the loaders of PyYAML, as with ROS's.
+for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
+    add_angles(_loader)
 
 
 class RosParamException(Exception):
@@ -45,10 +46,14 @@ class RosParamIOException(RosParamException):
     """The master does not answer."""
 
 
+class _YamlError(RosParamException, yaml.YAMLError):
+    """A text is not YAML: programs catch the one or the other."""
+
+
 def get_param(param: str) -> Any:
-    """A parameter's value. Raises rosgraph.MasterError where it is not set."""
+    """A parameter's value. Raises rosgraph.MasterError where it is not set, or the name is empty."""
     with _graph() as graph:
-        name = graph.resolve(param)
+        name = _resolve(graph, param)
         try:
             return parameters.get_parameter(graph, name)
         except NotFoundError as error:
@@ -56,9 +61,11 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter from YAML text."""
-    with _named():
+    """Set a parameter from YAML text. Raises RosParamException, also where it is none."""
+    try:
         parsed = parse_value(value)
+    except ValueTextError as error:
+        raise _YamlError(error) from error
     set_param_raw(param, parsed, verbose)
 
 
@@ -80,9 +87,9 @@ def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raises rosgraph.MasterError where it is not set."""
+    """Delete a parameter. Raises rosgraph.MasterError where it is not set, or the name is empty."""
     with _graph() as graph:
-        name = graph.resolve(param)
+        name = _resolve(graph, param)
         try:
             parameters.delete_parameter(graph, name)
         except NotFoundError as error:
@@ -112,39 +119,62 @@ def list_params(ns: str) -> list[str]:
 
 
 def load_file(filename: str, default_namespace: str | None = None, verbose: bool = False) -> list[Any]:
-    """[(values, namespace)] of each document of a parameter file. Raises RosParamException."""
+    """[(values, namespace)] of each document of a YAML file, which may hold what no parameter can.
+
+    Raises RosParamException where it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
+    """
+    path = Path(filename)
+    if not path.exists():
+        raise RosParamException(f"file [{filename}] does not exist")
+    if verbose:
+        print(f"reading parameters from [{filename}]")
     try:
-        text = Path(filename).read_text(encoding="utf-8")
-    except OSError as error:
-        raise RosParamException(f"file [{filename}] cannot be read: {error.strerror}") from error
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise RosParamException(f"file [{filename}] cannot be read: {why}") from error
     return load_str(text, filename, default_namespace, verbose)
 
 
 def load_str(
     str: str, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[Any]:
-    """[(values, namespace)] of each document of a YAML text. Raises RosParamException."""
-    with _named():
-        files = parameters.parse_parameters(str, filename, default_namespace or "/")
-    return [(file.values, file.namespace) for file in files]
+    """[(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
+    try:
+        documents = list(parse_documents(str, filename))
+    except ValueTextError as error:
+        raise _YamlError(error) from error
+    loaded = []
+    for document in documents:
+        namespace = default_namespace or get_ros_namespace()
+        if isinstance(document, dict) and NS in document:
+            namespace = ns_join(namespace, document.pop(NS))
+        if document is not None:
+            loaded.append((document, namespace))
+    return loaded
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters below a name to a file. Raises RosParamException."""
+    """Write the parameters below a name to a file. Raises OSError, rosgraph.MasterError where there are none."""
     values = get_param(param)
     if verbose:
         print_params(values, param)
-    try:
-        Path(filename).write_text(parameters.dump_parameters(values), encoding="utf-8")
-    except OSError as error:
-        raise RosParamException(f"file [{filename}] cannot be written: {error.strerror}") from error
+    Path(filename).write_text(parameters.dump_parameters(values), encoding="utf-8")
 
 
-def yamlmain(argv: Sequence[str] | None = None) -> int:
-    """The command; ``argv`` begins with its name. Its exit status."""
+def yamlmain(argv: Sequence[str] | None = None) -> None:
+    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
     from minirospy.cli.rosparam import main
 
-    return main(list(sys.argv if argv is None else argv)[1:])
+    if status := main(list(sys.argv if argv is None else argv)[1:]):
+        sys.exit(status)
+
+
+def _resolve(graph: Graph, param: str) -> str:
+    """The global name of a parameter. An empty one would be the namespace, and so all parameters in it."""
+    if not param:
+        raise MasterError("ERROR: parameter [key] must be specified and non-empty")
+    return graph.resolve(param)
 
 
 @contextmanager

@@ -23,3 +23,7 @@ from minirospy.workspace.rospkg import on_ros_path as on_ros_path
 from minirospy.workspace.rospkg import parse_manifest_file as parse_manifest_file
 from rospkg import common as common
 from rospkg import environment as environment
+from rospkg import manifest as manifest
+from rospkg import rospack as rospack
+
+__version__ = "1.4.0"

@@ -113,11 +113,12 @@ def has_service_args(service_name: str, service_class: Any = None) -> bool:
     return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
 
 
-def rosservicemain(argv: Sequence[str] | None = None) -> int:
-    """The command; ``argv`` begins with its name. Its exit status."""
+def rosservicemain(argv: Sequence[str] | None = None) -> None:
+    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
     from minirospy.cli.rosservice import main
 
-    return main(list(sys.argv if argv is None else argv)[1:])
+    if status := main(list(sys.argv if argv is None else argv)[1:]):
+        sys.exit(status)
 
 
 @contextmanager

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
-from minirospy.errors import MasterUnreachableError, MinirospyError, UsageError
+import rosgraph as rosgraph
+
+from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.introspect import topics
 from minirospy.introspect.fields import field_value, parse_path
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.rates import BandwidthWindow, DelayWindow, RateWindow
+from rostopic._echo import CallbackEcho, create_field_filter, create_value_transform
+from rostopic._rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
 
 __all__ = [
-    "NAME", "ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicException", "ROSTopicHz", "ROSTopicIOException",
-    "find_by_type", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "rostopicmain",
+    "NAME", "CallbackEcho", "ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicException", "ROSTopicHz",
+    "ROSTopicIOException", "create_field_filter", "create_publisher", "create_value_transform", "find_by_type",
+    "get_api", "get_info_text", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "publish_message",
+    "rostopicmain",
 ]  # fmt: skip
 
 NAME = "rostopic"
+_LATCH_SECONDS = 3.0
 
 
 class ROSTopicException(Exception):
@@ -32,7 +37,7 @@ class ROSTopicIOException(ROSTopicException):
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """As programs expect it of some of ROS's functions, also an error of sockets."""
+    """As programs expect it of ROS's get_topic_list, also an error of sockets."""
 
 
 def get_topic_type(
@@ -40,13 +45,18 @@ def get_topic_type(
 ) -> tuple[str | None, str | None, Callable[[Any], Any] | None]:
     """(type, topic, function that takes the field out of a message); three times None where it is not there.
 
-    ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there.
+    ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
     """
     with _graph() as graph:
-        field = topics.find_topic(graph, graph.resolve(topic))
-        while field is None and blocking:
-            time.sleep(0.1)
-            field = topics.find_topic(graph, graph.resolve(topic))
+        name = graph.resolve(topic)
+        field = topics.find_topic(graph, name)
+        if field is None and blocking:
+            from minirospy.cli.command import warn_unpublished
+
+            warn_unpublished(name)
+            while field is None and not _is_shutdown():
+                time.sleep(0.1)
+                field = topics.find_topic(graph, name)
     if field is None:
         return None, None, None
     return field.type, field.topic, msgevalgen(field.path)
@@ -69,7 +79,7 @@ def get_topic_class(
 
 def get_topic_list(master: Any = None) -> tuple[list[Any], list[Any]]:
     """(published, subscribed), each a list of (topic, type, nodes)."""
-    with _graph() as graph:
+    with _graph(_NoMaster) as graph:
         found = topics.list_topics(graph)
     published, subscribed = ([(each.name, each.type, list(each.nodes)) for each in side] for side in found)
     return published, subscribed
@@ -94,122 +104,185 @@ def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
     return (lambda message: field_value(message, steps)) if steps else None
 
 
-class ROSTopicHz:
-    """Measures the rate of topics: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``."""
+def get_info_text(topic: str) -> str:
+    """The type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
+    from minirospy.introspect.texts import topic_text
 
-    def __init__(
-        self,
-        window_size: int,
-        filter_expr: Callable[[Any], bool] | None = None,
-        use_wtime: bool = False,
-    ) -> None:
-        self._size = max(window_size, 0)
-        self._filter = filter_expr
-        self._windows: dict[str | None, RateWindow] = {}
-        self._lock = threading.Lock()
-
-    def callback_hz(self, m: Any, topic: str | None = None) -> None:
-        """A message has come."""
-        if self._filter is None or self._filter(m):
-            with self._lock:
-                self._windows.setdefault(topic, RateWindow(self._size)).add(time.time())
-
-    def get_hz(self, topic: str | None = None) -> tuple[float, float, float, float, int] | None:
-        """(rate, least pause, longest pause, standard deviation, messages); None where nothing new has come."""
-        with self._lock:
-            report = self._windows.setdefault(topic, RateWindow(self._size)).report()
-        return (
-            None if report is None else (report.rate, report.min, report.max, report.std_dev, report.window)
-        )
-
-    def print_hz(self, topics: tuple[str | None, ...] = (None,)) -> None:
-        """Print the rates."""
-        for topic in topics:
-            found = self.get_hz(topic)
-            if found is None:
-                print("no new messages")
-                continue
-            rate, low, high, std_dev, window = found
-            print(f"average rate: {rate:.3f}")
-            print(f"\tmin: {low:.3f}s max: {high:.3f}s std dev: {std_dev:.5f}s window: {window}")
+    with _graph() as graph:
+        try:
+            return topic_text(topics.topic_detail(graph, graph.resolve(topic)))
+        except NotFoundError as error:
+            raise ROSTopicException(f"Unknown topic {topic}") from error
 
 
-class ROSTopicBandwidth:
-    """Measures the bandwidth of a topic: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``."""
+def get_api(master: rosgraph.Master, caller_id: str) -> str:
+    """The URI of a node, or `unknown address` and its name. Raises ROSTopicIOException."""
+    try:
+        return master.lookupNode(caller_id)
+    except rosgraph.MasterException:
+        return f"unknown address {caller_id}"
+    except OSError as error:
+        raise ROSTopicIOException(str(error)) from error
 
-    def __init__(self, window_size: int = 100) -> None:
-        self._window = BandwidthWindow(window_size)
-        self._lock = threading.Lock()
 
-    def callback(self, data: Any) -> None:
-        """A message has come."""
-        with self._lock:
-            self._window.add(time.time(), len(data._buff or b""))
+def create_publisher(
+    topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
+) -> tuple[Any, type[Any]]:
+    """(publisher, message class) for a topic, by the type's name; makes the program a node, unless it is one.
 
-    def print_bw(self) -> None:
-        """Print the bandwidth, where two messages have come."""
-        with self._lock:
-            report = self._window.report(time.time())
-        if report is None:
+    Raises ROSTopicException where the type is not installed.
+    """
+    import rospy
+
+    from minirospy.idl.genpy import get_message_class
+
+    try:
+        cls: type[Any] | None = get_message_class(topic_type)
+    except ValueError as error:
+        raise ROSTopicException(f"invalid topic type: {topic_type}") from error
+    if cls is None:
+        raise ROSTopicException(f"invalid message type: {topic_type}.\nIs its package built and sourced?")
+    if not rospy.core.is_initialized():
+        rospy.init_node(NAME, anonymous=True, disable_rosout=True, disable_rostime=disable_rostime)
+    name = rosgraph.names.script_resolve_name(NAME, topic_name)
+    return rospy.Publisher(name, cls, latch=latch, queue_size=100), cls
+
+
+def publish_message(
+    pub: Any,
+    msg_class: type[Any],
+    pub_args: Sequence[Any],
+    rate: float | None = None,
+    once: bool = False,
+    verbose: bool = False,
+    substitute_keywords: bool = False,
+) -> None:
+    """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
+
+    ``substitute_keywords``: `now` and `auto` are filled in anew for each. Raises ROSTopicException on values that do
+    not fit.
+    """
+    import rospy
+
+    from minirospy.errors import MessageException
+    from minirospy.introspect.echo import fill_message
+
+    def message() -> Any:
+        try:
+            return fill_message(msg_class, pub_args, rospy.Time.now().to_nsec())
+        except MessageException as error:
+            raise ROSTopicException(f"Unable to publish message. {error}") from error
+
+    value = message()
+    shown = f"[{value}]" if verbose else "message"
+    if rate is None:
+        pause = f" for {_LATCH_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
+        print(f"publishing and latching {shown}{pause}")
+        pub.publish(value)
+        if not once:
+            rospy.spin()
             return
-        rate, mean, low, high = (_bytes(each) for each in (report.rate, report.mean, report.min, report.max))
-        print(f"average: {rate}/s\n\tmean: {mean} min: {low} max: {high} window: {report.window}")
+        end = time.monotonic() + _LATCH_SECONDS
+        while time.monotonic() < end and not rospy.is_shutdown():
+            time.sleep(0.05)
+        return
+    pauses = rospy.Rate(rate)
+    with suppress(rospy.ROSInterruptException):
+        while not rospy.is_shutdown():
+            if verbose:
+                print(f"publishing {shown}")
+            pub.publish(message() if substitute_keywords else value)
+            if once:
+                return
+            pauses.sleep()
 
 
-class ROSTopicDelay:
-    """Measures how late a topic's stamped messages come: ``rospy.Subscriber(topic, Type, delay.callback_delay)``."""
-
-    def __init__(self, window_size: int) -> None:
-        self._window = DelayWindow(max(window_size, 0))
-        self._lock = threading.Lock()
-
-    def callback_delay(self, msg: Any) -> None:
-        """A message has come. Raises ROSTopicException where it has no header."""
-        if not msg._has_header:
-            raise ROSTopicException("msg does not have header")
-        from minirospy.client import get_time
-
-        with self._lock:
-            self._window.add(get_time(), msg.header.stamp.to_sec())
-
-    def get_delay(self) -> tuple[float, float, float, float, int] | None:
-        """(mean, least, longest, standard deviation, messages); None where nothing new has come."""
-        with self._lock:
-            report = self._window.report()
-        return (
-            None if report is None else (report.mean, report.min, report.max, report.std_dev, report.window)
-        )
-
-    def print_delay(self) -> None:
-        """Print the delay, where something new has come."""
-        found = self.get_delay()
-        if found is None:
-            return
-        mean, low, high, std_dev, window = found
-        print(f"average delay: {mean:.3f}")
-        print(f"\tmin: {low:.3f}s max: {high:.3f}s std dev: {std_dev:.5f}s window: {window}")
+def rostopicmain(argv: Sequence[str] | None = None) -> None:
+    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
+    _command(list(sys.argv if argv is None else argv)[1:])
 
 
-def rostopicmain(argv: Sequence[str] | None = None) -> int:
-    """The command; ``argv`` begins with its name. Its exit status."""
+# Of ROS's private functions those that programs call.
+
+
+def _check_master() -> None:
+    """Raises ROSTopicIOException where no master answers."""
+    with _graph() as graph:
+        graph.master.get_pid()
+
+
+def _master_get_topic_types(master: rosgraph.Master) -> Any:
+    """[[topic, type]] of all that the master knows."""
+    return master.getTopicTypes()
+
+
+_get_topic_type = get_topic_type
+
+
+def _rostopic_list(
+    topic: str | None,
+    verbose: bool = False,
+    subscribers_only: bool = False,
+    publishers_only: bool = False,
+    group_by_host: bool = False,
+) -> None:
+    """Print what `rostopic list` prints. Raises ROSTopicIOException."""
+    _check_master()
+    chosen = {"-v": verbose, "-s": subscribers_only, "-p": publishers_only, "--host": group_by_host}
+    _command(["list", *(option for option, on in chosen.items() if on), *([topic] if topic else [])])
+
+
+def _rostopic_info(topic: str) -> None:
+    """Print what `rostopic info` prints. Raises ROSTopicException."""
+    print(get_info_text(topic))
+
+
+def _rostopic_type(topic: str) -> None:
+    """Print what `rostopic type` prints. Raises ROSTopicIOException."""
+    _check_master()
+    _command(["type", topic])
+
+
+def _rostopic_echo(
+    topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
+) -> None:
+    """Give the messages of a topic, or a field of them, to ``callback_echo`` until it has enough of them."""
+    import rospy
+
+    if bag_file:
+        raise ROSTopicException(f"[{bag_file}]: bags are not read by this function")
+    if not rospy.core.is_initialized():
+        rospy.init_node(NAME, anonymous=True)
+    cls, real_topic, field = get_topic_class(topic, blocking=True)
+    if real_topic is None or cls is None:
+        return
+    callback_echo.msg_eval = field
+    information = {"topic": real_topic, "type_information": cls._type}
+    subscriber = rospy.Subscriber(real_topic, cls, callback_echo.callback, information)
+    while not rospy.is_shutdown() and not callback_echo.done:
+        time.sleep(0.05)
+    subscriber.unregister()
+
+
+def _is_shutdown() -> bool:
+    """Whether the program is a node that shuts down; one that never imported rospy is none."""
+    rospy: Any = sys.modules.get("rospy")
+    return rospy is not None and bool(rospy.is_shutdown())
+
+
+def _command(words: Sequence[str]) -> None:
     from minirospy.cli.rostopic import main
 
-    return main(list(sys.argv if argv is None else argv)[1:])
-
-
-def _bytes(size: float) -> str:
-    """A number of bytes as `rostopic bw` prints it."""
-    if size < 1000:
-        return f"{size:.2f}B"
-    return f"{size / 1000:.2f}KB" if size < 1000000 else f"{size / 1000000:.2f}MB"
+    if status := main(list(words)):
+        sys.exit(status)
 
 
 @contextmanager
-def _graph() -> Iterator[Graph]:
+def _graph(unreachable: type[Exception] = ROSTopicIOException) -> Iterator[Graph]:
     try:
-        with Graph.open("rostopic") as graph:
+        with Graph.open(NAME) as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise _NoMaster(str(error)) from error
+        raise unreachable(str(error)) from error
     except MinirospyError as error:
         raise ROSTopicException(str(error)) from error

@@ -9,7 +9,11 @@ from minirospy.testing.unit import (
     unitrun,
     xml_results_file,
 )
+from rosunit import baretest as baretest
+from rosunit import core as core
 from rosunit import junitxml
+from rosunit import pyunit as pyunit
+from rosunit import xmlrunner as xmlrunner
 
 __all__ = [
     "XML_OUTPUT_FLAG", "create_xml_runner", "junitxml", "print_runner_summary", "print_unittest_summary",

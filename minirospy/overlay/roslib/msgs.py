@@ -1,0 +1,32 @@
+"""roslib.msgs, filled in by minirospy: of genmsg's names under those of old, what programs ask of types."""
+
+from genmsg.msgs import (
+    BUILTIN_TYPES,
+    DURATION,
+    HEADER,
+    PRIMITIVE_TYPES,
+    TIME,
+    is_builtin,
+    is_header_type,
+    is_valid_constant_type,
+    is_valid_msg_type,
+    parse_type,
+    resolve_type,
+)
+from genmsg.msgs import bare_msg_type as base_msg_type
+
+from minirospy.idl.load import Catalogue
+from minirospy.workspace.packages import Packages
+
+__all__ = [
+    "BUILTIN_TYPES", "DURATION", "EXT", "HEADER", "PRIMITIVE_TYPES", "SEP", "TIME", "base_msg_type", "is_builtin",
+    "is_header_type", "is_valid_constant_type", "is_valid_msg_type", "list_msg_types", "parse_type", "resolve_type",
+]  # fmt: skip
+
+EXT = ".msg"
+SEP = "/"
+
+
+def list_msg_types(package: str, include_depends: bool) -> list[str]:
+    """The names of the message files of a package, without it; ``include_depends`` is of rosbuild."""
+    return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))

@@ -1,0 +1,117 @@
+"""The printing of messages that user code hangs into a subscriber, or derives from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from minirospy.idl.message import strify_message
+from minirospy.introspect.echo import elided
+from minirospy.introspect.plot import plot_header, plot_row
+
+__all__ = ["CallbackEcho", "create_field_filter", "create_value_transform"]
+
+_CLEAR_SCREEN = "\033[2J\033[;H"
+FieldFilter = Callable[[Any], Sequence[str]]
+ValueTransform = Callable[[Any, Any], Any]
+
+
+class CallbackEcho:
+    """Prints messages as `rostopic echo` does: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
+
+    ``msg_eval`` takes the field out of a message that is to be printed; of messages for which ``filter_fn`` is false
+    nothing is printed. ``done`` is true once ``count`` messages were.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        msg_eval: Callable[[Any], Any] | None,
+        plot: bool = False,
+        filter_fn: Callable[[Any], bool] | None = None,
+        echo_clear: bool = False,
+        echo_all_topics: bool = False,
+        offset_time: bool = False,
+        count: int | None = None,
+        field_filter_fn: FieldFilter | None = None,
+        fixed_numeric_width: int | None = None,
+        value_transform_fn: ValueTransform | None = None,
+    ) -> None:
+        if topic.endswith("/"):
+            topic = topic[:-1]
+        self.topic = topic
+        self.msg_eval = msg_eval
+        self.plot = plot
+        self.filter_fn = filter_fn
+        self.prefix = _CLEAR_SCREEN if echo_clear and not plot else ""
+        self.echo_all_topics = echo_all_topics
+        self.offset_time = offset_time
+        self.max_count = count
+        self.field_filter = field_filter_fn
+        self.fixed_numeric_width = fixed_numeric_width
+        self.value_transform = value_transform_fn
+        self.count = 0
+        self.done = False
+        self.first = True
+
+    def callback(self, data: Any, callback_args: Mapping[str, Any], current_time: Any = None) -> None:
+        """Print a message. ``callback_args``: its ``topic`` and, where known, ``type_information``."""
+        if self.done or not self._wanted(data, str(callback_args["topic"])):
+            return
+        value = self.msg_eval(data) if self.msg_eval is not None else data
+        if value is not None:
+            print(
+                self.prefix + self._text(value, callback_args.get("type_information"), current_time),
+                flush=True,
+            )
+        self.count += 1
+        if self.max_count is not None and self.count >= self.max_count:
+            self.done = True
+
+    def _wanted(self, message: Any, topic: str) -> bool:
+        mine = self.echo_all_topics or topic == self.topic or self.topic.startswith(topic + "/")
+        return mine and (self.filter_fn is None or bool(self.filter_fn(message)))
+
+    def _text(self, value: Any, type_: Any, current_time: Any) -> str:
+        from minirospy.client import Time
+
+        if self.plot:
+            return self._row(value, current_time or Time.now())
+        if self.value_transform is not None:
+            value = self.value_transform(value, type_)
+        if isinstance(value, bytes):
+            value = list(value)
+        offset = (current_time or Time.now()) if self.offset_time else None
+        text = strify_message(
+            value,
+            time_offset=offset,
+            current_time=current_time,
+            field_filter=self.field_filter,
+            fixed_numeric_width=self.fixed_numeric_width,
+        )
+        return f"{text}\n---"
+
+    def _row(self, value: Any, now: Any) -> str:
+        header = plot_header(value) + "\n" if self.first else ""
+        self.first = False
+        stamp = value.header.stamp if getattr(value, "_has_header", False) else now
+        origin = now.to_nsec() if self.offset_time else 0
+        return header + plot_row(value, stamp.to_nsec() - origin, origin=origin)
+
+
+def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
+    """A function for `strify_message` that leaves out fields that are texts, or arrays."""
+
+    def fields(message: Any) -> list[str]:
+        return [
+            name
+            for name, type_ in zip(message.__slots__, message._slot_types, strict=True)
+            if not (echo_nostr and "string" in type_) and not (echo_noarr and "[" in type_)
+        ]
+
+    return fields
+
+
+def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> ValueTransform:
+    """A function of (value, type) that puts a note in the place of texts, or of arrays."""
+    return lambda value, type_: elided(value, str(type_ or ""), not echo_nostr, not echo_noarr)

@@ -1,0 +1,137 @@
+"""The measuring of rates, bandwidths and delays that user code hangs into a subscriber."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from minirospy.introspect.rates import (
+    BandwidthWindow,
+    DelayWindow,
+    RateWindow,
+    Spread,
+    bandwidth_text,
+    delay_text,
+    rate_text,
+)
+
+__all__ = ["ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicHz"]
+
+Statistics = tuple[float, float, float, float, int]
+
+
+class ROSTopicHz:
+    """Measures the rate of topics: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
+
+    ``window_size``: messages that count (-1: all). Time is that of rospy, with ``use_wtime`` the machine's.
+    """
+
+    def __init__(
+        self,
+        window_size: float,
+        filter_expr: Callable[[Any], bool] | None = None,
+        use_wtime: bool = False,
+    ) -> None:
+        self.lock = threading.Lock()
+        self.window_size = int(max(window_size, 0))
+        self.filter_expr = filter_expr
+        self.use_wtime = use_wtime
+        self._windows: dict[str | None, RateWindow] = {}
+
+    def callback_hz(self, m: Any, topic: str | None = None) -> None:
+        """A message has come."""
+        if self.filter_expr is None or self.filter_expr(m):
+            now = time.time() if self.use_wtime else _now()
+            with self.lock:
+                self._window(topic).add(now)
+
+    def get_hz(self, topic: str | None = None) -> Statistics | None:
+        """(rate, least pause, longest pause, standard deviation, messages); None where nothing new has come."""
+        report = self._report(topic)
+        return report and (report.rate, report.min, report.max, report.std_dev, report.window)
+
+    def print_hz(self, topics: Sequence[str | None] = (None,)) -> None:
+        """Print the rates: of one topic two lines, of several a table."""
+        print(rate_text({str(topic): self._report(topic) for topic in topics}))
+
+    def _report(self, topic: str | None) -> Spread | None:
+        with self.lock:
+            return self._window(topic).report()
+
+    def _window(self, topic: str | None) -> RateWindow:
+        return self._windows.setdefault(topic, RateWindow(self.window_size))
+
+
+class ROSTopicBandwidth:
+    """Measures the bandwidth of a topic: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``.
+
+    ``times`` (seconds) and ``sizes`` (bytes) are those of the latest ``window_size`` messages.
+    """
+
+    def __init__(self, window_size: int = 100) -> None:
+        self.lock = threading.Lock()
+        self.window_size = window_size or 100
+        self.times: list[float] = []
+        self.sizes: list[int] = []
+
+    def callback(self, data: Any) -> None:
+        """A message has come."""
+        with self.lock:
+            self.times.append(time.time())
+            self.sizes.append(len(data._buff or b""))
+            if len(self.times) > self.window_size:
+                del self.times[0], self.sizes[0]
+
+    def print_bw(self) -> None:
+        """Print the bandwidth, where two messages have come."""
+        window = BandwidthWindow(self.window_size)
+        with self.lock:
+            for moment, size in zip(self.times, self.sizes, strict=True):
+                window.add(moment, size)
+        text = bandwidth_text({"": window.report(time.time())})
+        if text:
+            print(text)
+
+
+class ROSTopicDelay:
+    """Measures how late a topic's stamped messages come: ``rospy.Subscriber(topic, Type, delay.callback_delay)``."""
+
+    def __init__(self, window_size: int) -> None:
+        self.lock = threading.Lock()
+        self.window_size = int(max(window_size, 0))
+        self._window = DelayWindow(self.window_size)
+
+    def callback_delay(self, msg: Any) -> None:
+        """A message has come; one that has no header is told of in the log."""
+        if not msg._has_header:
+            import rospy
+
+            rospy.logerr("msg does not have header")
+            return
+        now = _now()
+        with self.lock:
+            self._window.add(now, msg.header.stamp.to_sec())
+
+    def get_delay(self) -> Statistics | None:
+        """(mean, least, longest, standard deviation, messages); None where nothing new has come."""
+        report = self._report()
+        return report and (report.mean, report.min, report.max, report.std_dev, report.window)
+
+    def print_delay(self) -> None:
+        """Print the delay, where something new has come."""
+        report = self._report()
+        if report:
+            print(delay_text(report))
+
+    def _report(self) -> Spread | None:
+        with self.lock:
+            return self._window.report()
+
+
+def _now() -> float:
+    # At the first message rospy has long been imported, for a subscriber of it calls.
+    from minirospy.client import get_time
+
+    return get_time()

@@ -1,0 +1,76 @@
+"""What programs do with the `impl` of a Publisher and a Subscriber: rosbridge and Jupyter's widgets among them."""
+
+import rospy
+from referee import eventually, outcome, show
+from std_msgs.msg import Int32
+
+rospy.init_node("case", argv=[], disable_rosout=True)
+got = []
+
+
+def take(message, *args):
+    got.append((message.data, *args))
+
+
+def taken(*expected):
+    """Whether just these have come; forgets them."""
+    came = eventually(lambda: len(got) >= len(expected), 3.0) and sorted(got, key=str) == list(expected)
+    found, got[:] = list(got), []
+    return came or found
+
+
+publisher = rospy.Publisher("c", Int32, queue_size=5, latch=True)
+subscriber = rospy.Subscriber("c", Int32, take, "own")
+show(publisher.impl.is_latch, publisher.impl.subscriber_listeners)
+publisher.publish(1)
+show(taken((1, "own")))
+show(subscriber.impl.add_callback(take, ["more"]), taken((1, ["more"])))
+publisher.publish(2)
+show(taken((2, "own"), (2, ["more"])))
+show(subscriber.impl.remove_callback(take, ["more"]))
+publisher.publish(3)
+show(taken((3, "own")))
+outcome("again", lambda: subscriber.impl.remove_callback(take, ["more"]))
+outcome("another", lambda: subscriber.impl.remove_callback(print, None))
+subscriber.impl.add_callback(take, None)
+show(taken((3,)))
+publisher.publish(4)
+show(taken((4, "own"), (4,)))
+
+
+class Listener(rospy.SubscribeListener):
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        show("has come", topic_name)
+
+    def peer_unsubscribe(self, topic_name, num_peers):
+        show("has gone", topic_name, num_peers)
+
+
+listener = Listener()
+show(publisher.impl.add_subscriber_listener(listener), publisher.impl.subscriber_listeners == [listener])
+subscriber.unregister()
+show(eventually(lambda: not publisher.impl.has_connections()))
+rospy.sleep(0.1)
+subscriber = rospy.Subscriber("c", Int32, take)
+show(taken((4,)))
+rospy.sleep(0.1)
+publisher.impl.subscriber_listeners.remove(listener)
+subscriber.unregister()
+show(eventually(lambda: not publisher.impl.has_connections()))
+
+# A topic that latches no more, and does again.
+publisher.impl.is_latch = False
+subscriber = rospy.Subscriber("c", Int32, take)
+show(eventually(lambda: publisher.impl.has_connection("/case")))
+publisher.publish(5)
+show(taken((5,)))
+publisher.impl.is_latch = True
+publisher.publish(6)
+show(taken((6,)))
+subscriber.unregister()
+show(eventually(lambda: not publisher.impl.has_connections()))
+subscriber = rospy.Subscriber("c", Int32, take)
+show(taken((6,)))
+show(subscriber.impl.set_queue_size(1), subscriber.impl.set_buff_size(100))
+other = rospy.Publisher("d", Int32, queue_size=5)
+show(other.impl.is_latch, other.impl.enable_latch(), other.impl.is_latch)
