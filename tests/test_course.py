@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -57,18 +56,23 @@ def test_the_page_shows_what_happens(course: Course, page: str) -> None:
     course.play_up_to(page)
 
 
-def commands(text: str) -> Iterator[str]:
-    return (line for line in text.splitlines() if re.match(r"(terminal \d)?\$ ", line))
-
-
 def test_the_recorded_session_is_that_of_the_pages() -> None:
     """`python docs/workshop/record.py` makes it anew."""
     assert record is not None
-    typed = [
-        step.shown for page in PAGES for step in record.steps(FOLDER / page) if step.typed.endswith("\n")
-    ]
-    assert list(commands((FOLDER / "session.txt").read_text(encoding="utf-8"))) == typed
-    assert len(typed) > 100
+    session = (FOLDER / "session.txt").read_text(encoding="utf-8")
+    heads = [f"\n===== {page} =====\n" for page in PAGES]
+    for page, head, following in zip(PAGES, heads, [*heads[1:], ""], strict=True):
+        left = session.partition(head)[2]
+        left = left.partition(following)[0] if following else left
+        steps = record.steps(FOLDER / page)
+        begins = [f"({step.path} is saved)\n" if step.path else f"{step.shown}\n" for step in steps]
+        for step, begin, after in zip(steps, begins, [*begins[1:], ""], strict=True):
+            assert left.startswith(begin), f"{step.place}: the session has {left[:80]!r} instead of {begin!r}"
+            left = left.removeprefix(begin)
+            end = f"\n{left}".find(f"\n{after}") if after else len(left)
+            printed, left = left[:end], left[end:]
+            shown = record.pattern(step.answer, skip=True) + "(?:.*\n)*" * step.goes_on
+            assert re.fullmatch(shown + "\n*", record.TIME.sub("<time>", printed)), f"{step.place}: {printed}"
 
 
 def test_the_index_names_each_page() -> None:

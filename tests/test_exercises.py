@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from minirospy.cli.catkin import catkin_make
-from minirospy.launch.load import load_files
+from minirospy.errors import MinirospyError
+from minirospy.launch.load import find_files, load_files
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import read_plan
 
@@ -52,6 +53,11 @@ def test_one_launch_file_for_all(exercise: str) -> None:
     for _, program in alone:
         package = "sick_safetyscanners" if program == "sick_safetyscanners_node" else "rpi_feros"
         assert packages.find_executable(package, program)
+
+
+def test_an_argument_that_lacks_its_colon() -> None:
+    with pytest.raises(MinirospyError, match=r"an argument is written exercise:=sick_zone$"):
+        find_files(["rpi_feros_bringup", "workshop.launch", "exercise=sick_zone"], Packages())
 
 
 def test_copied_into_a_workspace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,15 +15,27 @@ from pathlib import Path
 import pytest
 
 from minirospy.gpio.board import Board
+from minirospy.gpio.model import Function
 
 TESTS = Path(__file__).parent
 LISTINGS = TESTS / "workshop"
 OURS = TESTS.parent / "rpi_feros" / "scripts"
 BUTTON = 11
+CTRL_C = signal.SIGINT if os.name == "posix" else signal.CTRL_BREAK_EVENT  # type: ignore[attr-defined]
 SECONDS_TO_END = 2.0
 """0.2 on a quiet machine; a busy one needs its time."""
 
-Start = Callable[[Path], subprocess.Popen[str]]
+LEDS = range(2, 8)
+CANCEL = """
+import rospy
+from actionlib_msgs.msg import GoalID
+rospy.init_node("cancel", argv=[])
+cancel = rospy.Publisher("run_led/cancel", GoalID, queue_size=1)
+cancel.wait_for_subscribers(timeout=20)
+cancel.publish(GoalID())
+"""
+
+Start = Callable[..., "subprocess.Popen[str]"]
 
 
 @pytest.fixture
@@ -33,13 +46,13 @@ def board() -> Iterator[Board]:
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Starts `python FILE`, as a student does."""
+    """Starts `python ARGUMENTS`, as a student does."""
     running: list[subprocess.Popen[str]] = []
 
-    def start(script: Path) -> subprocess.Popen[str]:
+    def start(*arguments: str | Path) -> subprocess.Popen[str]:
         flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
         process = subprocess.Popen(
-            [sys.executable, str(script)],
+            [sys.executable, *map(str, arguments)],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -107,6 +120,60 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
     assert "Exit now" not in output
 
 
+def test_the_leds_run_and_the_client_tells_how_far_they_came(start: Start, board: Board) -> None:
+    server = start(LISTINGS / "ledrun_server.py")
+    wait_line(server, "Server pripravljen")
+    edges = board.watch(LEDS, timeout=20)
+    client = start(LISTINGS / "ledrun_client.py")
+    wait_line(client, "Server is active.")
+    lit = [edge.pin for edge, _ in zip((edge for edge in edges if edge.level), range(7), strict=False)]
+    assert lit == [*LEDS, 2]
+    start("-c", CANCEL).communicate(timeout=20)
+    output, _ = client.communicate(timeout=20)
+    # The second run, or a later one where starting CANCEL took its time.
+    assert re.fullmatch(r"Result: [2-9]\n", output)
+    said = interrupt(server)
+    assert "Stevilo iteracij: 10" in said
+    assert "Goal preempted." in said
+
+
+def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Board) -> None:
+    server = start(LISTINGS / "ledrun_server.py")
+    wait_line(server, "Server pripravljen")
+    edges = board.watch([3], timeout=20)
+    client = start(LISTINGS / "ledrun_client.py")
+    assert any(edge.level for edge in edges)
+    interrupt(server)
+    # It waits for a server that comes back; without one, Ctrl-C ends it. The listing then has no result to tell.
+    wait_line(client, "Server is active.")
+    client.send_signal(CTRL_C)
+    output, _ = client.communicate(timeout=20)
+    assert "'NoneType' object has no attribute 'finalRun'" in output
+
+
+def test_the_readmes_own_node(start: Start, board: Board, tmp_path: Path) -> None:
+    text = (TESTS.parent / "README.md").read_text(encoding="utf-8")
+    node = tmp_path / "my_node.py"
+    node.write_text(re.findall(r"```python\n(import rospy.*?)```", text, re.DOTALL)[0])
+    publisher, mine = start(OURS / "button_publisher.py"), start(node)
+    board.press(BUTTON)
+    wait_for(board, 4, 1)
+    interrupt(publisher)
+    interrupt(mine)
+    # Nothing is left for the next program to be warned about.
+    assert board.state().pins[4].function is Function.IN
+
+
+def wait_line(process: subprocess.Popen[str], text: str) -> None:
+    assert process.stdout
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if text in line:
+            return
+    raise AssertionError(f"not {text!r}, but {said}")
+
+
 def wait_for(board: Board, pin: int, level: int, seconds: float = 20.0) -> None:
     edges = board.watch([pin], timeout=seconds)
     if board.get(pin) != level:
@@ -117,7 +184,7 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 20.0) -> None:
 def interrupt(process: subprocess.Popen[str]) -> str:
     """Ctrl-C: the process ends by itself, soon, with status 0 and without a traceback."""
     began = time.monotonic()
-    os.kill(process.pid, signal.SIGINT if os.name == "posix" else signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined]
+    process.send_signal(CTRL_C)
     output, _ = process.communicate(timeout=20)
     assert time.monotonic() - began < SECONDS_TO_END
     assert "Traceback" not in output, output

@@ -59,6 +59,8 @@ LOOKS = re.compile(
     r"(rosnode|rostopic|rosservice|rosparam) (list|info|type|find|get)\b|minirospy board (get|list)\b"
 )
 TIME = re.compile(r"\b1\d{9}\.\d+")
+REDRAWN = re.compile(r"\r\x1b\[2K(?:\x1b\[1A\x1b\[2K)+")
+"""How a program goes back to draw its picture anew: in the record the new one stands below the old one."""
 CONTROL = re.compile(r"\x1b\][^\x07\x1b]*(\x07|\x1b\\)|\x1b\[[0-?]*[ -/]*[@-~]|\x1b[=>()][B0]?|\r")
 TAKE_TERMINAL = """
 import fcntl, os, sys, termios
@@ -195,7 +197,7 @@ class Terminal:
     def printed(self) -> tuple[str, bool]:
         """What was printed since the last prompt, and whether the next one has come."""
         text, prompt, _ = self._bytes.decode(errors="replace").partition(self._prompt)
-        text = CONTROL.sub("", text)
+        text = CONTROL.sub("", REDRAWN.sub("\n", text))
         return text + ("\n" if prompt and text and not text.endswith("\n") else ""), bool(prompt)
 
     def finish(self) -> None:
@@ -336,6 +338,7 @@ class Player:
     def _shown(self, printed: str) -> str:
         for name, address in PLACES.items():
             printed = printed.replace(address, name)
+        printed = printed.replace(f"roslaunch-{socket.gethostname()}-", "roslaunch-laptop-")
         printed = printed.replace(self._port, "11311").replace(str(self._home), "/home/student")
         return printed.replace(str(HERE.parents[1]), "/home/student/minirospy").expandtabs()
 
@@ -343,7 +346,7 @@ class Player:
 def main() -> int:
     """Write session.txt; 1 if a page is wrong."""
     home = Path(tempfile.mkdtemp(prefix="course-"))
-    player = Player(home, {"MINIROSPY_BOARD": home.name})
+    player = Player(home, {"MINIROSPY_RUNTIME_DIR": str(home / "board")})
     try:
         for name in PAGES:
             player.play(HERE / name)

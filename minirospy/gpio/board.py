@@ -20,7 +20,7 @@ from types import TracebackType
 
 from minirospy.errors import BoardError
 from minirospy.gpio.link import Edge, Link
-from minirospy.gpio.model import PINS, Force, Pin, Position, Press, Release
+from minirospy.gpio.model import PINS, BoardModel, Force, Function, Pin, Position, Press, Release, Setup
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import MovePerson
 
@@ -88,6 +88,14 @@ class Board:
     def move_person(self, position: Position | None) -> None:
         """Put the person somewhere (see :attr:`person`), or send them away (None)."""
         self._link.call(MovePerson(position))
+
+    def reset(self) -> None:
+        """As when it was new: all pins inputs at 0, no button pressed, nobody before the scanner."""
+        for pin, (state, fresh) in enumerate(zip(self.state().pins, BoardModel().pins, strict=True)):
+            if state != fresh:
+                self._link.call(Setup(pin, Function.IN, initial=0))
+                self._link.call(Release(pin))
+        self.move_person(None)
 
     def get(self, pin: int) -> int:
         """The level of ``pin``: 0 or 1."""

@@ -50,6 +50,11 @@ class Detector:
         self._occurred.set()
         return True
 
+    def excludes(self, waiter: Detector) -> bool:
+        """Whether nobody may wait with ``waiter`` while this one watches the channel."""
+        same = waiter.slope is self.slope
+        return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
+
     def take(self) -> bool:
         """Whether an edge counted since the last call."""
         occurred = self._occurred.is_set()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import operator
 import sys
 import threading
 import time
@@ -137,6 +138,7 @@ class Gpio:
 
     def setmode(self, mode: int) -> None:
         """Choose the numbering: BCM (chip) or BOARD (header)."""
+        mode = operator.index(mode)
         if self._mode is not None and mode != self._mode:
             raise ValueError("A different mode has already been set!")
         if mode not in {BOARD, BCM}:
@@ -155,6 +157,7 @@ class Gpio:
         self, channel: int | Sequence[int], direction: int, pull_up_down: int = PUD_OFF, initial: int = -1
     ) -> None:
         """Make a channel, or several, an input or an output."""
+        direction, pull_up_down, initial = map(operator.index, (direction, pull_up_down, initial))
         if direction not in {IN, OUT}:
             raise ValueError("An invalid direction was passed to setup()")
         if direction == OUT and pull_up_down != PUD_OFF:
@@ -163,7 +166,7 @@ class Gpio:
             raise ValueError("initial parameter is not valid for inputs")
         if pull_up_down not in {PUD_OFF, PUD_DOWN, PUD_UP}:
             raise ValueError("Invalid value for pull_up_down - should be either PUD_OFF, PUD_UP or PUD_DOWN")
-        level = None if initial == -1 else int(bool(initial))
+        level = initial if initial in {LOW, HIGH} else None
         for one in _channels(channel):
             self._set_up(one, direction, pull_up_down, level)
 
@@ -209,7 +212,8 @@ class Gpio:
             for table in (self._readable, self._writable):
                 for one in [one for one, pin in table.items() if pin in mine]:
                     del table[one]
-            if everything and mine:
+            if everything and self._link is not None:
+                # Also where nothing was left: RPi.GPIO only asks whether it has touched a pin yet.
                 self._mode = None
         if not mine:
             self._warn(
@@ -262,11 +266,11 @@ class Gpio:
         """Wait for an edge, up to ``timeout`` ms (-1: for ever); the channel, or None when time is up."""
         pin = self._input_pin(channel)
         detector = _detector(channel, edge, bouncetime)
-        if timeout <= 0 and timeout != -1:
+        if operator.index(timeout) <= 0 and timeout != -1:
             raise ValueError("Timeout must be greater than 0")
         with self._lock:
             existing = self._detectors.get(pin)
-            if pin in self._waiting or (existing is not None and existing.callbacks):
+            if pin in self._waiting or (existing is not None and existing.excludes(detector)):
                 raise RuntimeError("Conflicting edge detection events already exist for this GPIO channel")
             self._waiting[pin] = detector
         try:
@@ -361,9 +365,14 @@ class Gpio:
             )
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
+        with self._lock:
+            # Before the board is asked: a Ctrl-C may end the asking, and cleanup() has to undo what the board did.
+            self._directions[pin] = direction
         link.call(Setup(pin, direction, pull, level))
         with self._lock:
-            self._directions[pin] = direction
+            if pin not in self._directions:
+                # A signal handler's cleanup() came while the board was asked.
+                return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin
             if direction == OUT:
@@ -386,16 +395,17 @@ class Gpio:
         if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
             return
         channels = _channels(channel)
-        values = list(value) if isinstance(value, (list, tuple)) else [value]
-        if len(values) == 1 and not isinstance(value, (list, tuple)):
-            values *= len(channels)
-        if len(channels) != len(values):
+        several = isinstance(value, (list, tuple))
+        values = list(value) if several else [value] * len(channels)
+        if len(channels) != len(values) or (several and not isinstance(channel, (list, tuple))):
             raise RuntimeError("Number of channels != number of values")
         try:
             levels = [_level(one) for one in values]
         except TypeError:
             raise ValueError(
-                "Value must be an integer/boolean or a list/tuple of integers/booleans"
+                "Value must be an integer or boolean"
+                if several
+                else "Value must be an integer/boolean or a list/tuple of integers/booleans"
             ) from None
         pins = [self._pin(one) for one in channels]
         if any(self._directions.get(pin) != OUT for pin in pins):
@@ -548,10 +558,13 @@ remove_event_detect = _gpio.remove_event_detect
 
 
 def _channels(channel: object) -> list[int]:
-    channels: list[Any] = list(channel) if isinstance(channel, (list, tuple)) else [channel]
-    if not all(isinstance(one, int) for one in channels):
+    if isinstance(channel, int):
+        return [channel]
+    if not isinstance(channel, (list, tuple)):
         raise ValueError("Channel must be an integer or list/tuple of integers")
-    return channels
+    if not all(isinstance(one, int) for one in channel):
+        raise ValueError("Channel must be an integer")
+    return list(channel)
 
 
 def _level(value: object) -> int:
@@ -564,6 +577,8 @@ def _level(value: object) -> int:
 
 
 def _detector(channel: int, edge: int, bouncetime: int) -> Detector:
+    # Whole milliseconds: a time in seconds, such as 0.2, is refused with a TypeError, as by RPi.GPIO.
+    edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {RISING, FALLING, BOTH}:
         raise ValueError("The edge must be set to RISING, FALLING or BOTH")
     if bouncetime <= 0 and bouncetime != _NO_BOUNCETIME:

@@ -15,6 +15,7 @@ def main() -> None:
     publisher = rospy.Publisher("/button_state", Bool, queue_size=10)
     rate = rospy.Rate(10)  # Hz
     try:
+        rate.sleep()  # subscribers need a moment to connect
         # In every turn, not only on a change: a subscriber that comes late learns the state, too.
         while not rospy.is_shutdown():
             publisher.publish(Bool(data=bool(GPIO.input(BUTTON))))

@@ -17,6 +17,7 @@ from rich.console import Console
 from minirospy.cli.board import main, render
 from minirospy.gpio.board import Board
 from minirospy.gpio.raspberry import model_name, warn_of_missing_library
+from minirospy.gpio.rpigpio import BCM, IN, OUT, PUD_UP, Gpio
 
 
 def test_press_get_release(capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,6 +75,24 @@ def test_watch_prints_a_line_for_each_edge() -> None:
         assert child.stdout is not None
         assert sorted(child.stdout.read().splitlines()) == ["7 0", "7 1"]
         assert child.returncode == 0
+
+
+def test_reset(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["list"])
+    new = capsys.readouterr().out
+    program = Gpio()
+    program.setmode(BCM)
+    program.setup(7, OUT, initial=1)
+    program.setup(20, IN, pull_up_down=PUD_UP)
+    program.close()
+    for words in ("press 11", "set 21 1", "person 0.3"):
+        assert main(words.split()) == 0
+    main(["list"])
+    assert capsys.readouterr().out != new
+    assert main(["reset"]) == 0
+    main(["list"])
+    main(["person"])
+    assert capsys.readouterr().out == f"{new}away\n"
 
 
 def test_without_a_terminal_it_prints_once(capsys: pytest.CaptureFixture[str]) -> None:
@@ -163,9 +182,11 @@ def test_the_picture_of_a_person(encoding: str) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal")
-def test_keys_press_buttons_and_move_the_person() -> None:
+@pytest.mark.parametrize("kind", ["xterm", "dumb"])
+def test_keys_press_buttons_and_move_the_person(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import pty
 
+    monkeypatch.setenv("TERM", kind)
     ours, theirs = pty.openpty()
     code = "import sys; from minirospy.cli.board import main; sys.exit(main([]))"
     with Board() as board:

@@ -15,6 +15,7 @@ import pytest
 
 from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
 from minirospy.gpio.board import Board
+from minirospy.gpio.model import Function, Setup
 from minirospy.gpio.rpigpio import Gpio, Wave
 
 
@@ -49,11 +50,17 @@ def test_import_by_its_real_name() -> None:
 
     assert RPi.GPIO.BCM == 11
     assert RPi.GPIO.setup == GPIO.setup
+    names: dict[str, object] = {}
+    exec("from RPi._GPIO import *", names)
+    assert names["output"] == GPIO.output
+    with pytest.raises(ImportError, match=r"^cannot import name 'PUD_SIDEWAYS' from 'RPi._GPIO'"):
+        exec("from RPi._GPIO import PUD_SIDEWAYS")
 
 
 MODE = "Please set pin numbering mode using GPIO.setmode(GPIO.BOARD) or GPIO.setmode(GPIO.BCM)"
 INVALID = "The channel sent is invalid on a Raspberry Pi"
 LIST = "Channel must be an integer or list/tuple of integers"
+NO_INTEGER = "'{}' object cannot be interpreted as an integer"
 PUD = "Invalid value for pull_up_down - should be either PUD_OFF, PUD_UP or PUD_DOWN"
 
 
@@ -89,7 +96,10 @@ def _prepare(gpio: Gpio) -> None:
         (lambda g: g.setup(54, GPIO.IN), ValueError, INVALID),
         (lambda g: g.setup(-1, GPIO.IN), ValueError, INVALID),
         (lambda g: g.setup("7", GPIO.IN), ValueError, LIST),
-        (lambda g: g.setup([7, "8"], GPIO.IN), ValueError, LIST),
+        (lambda g: g.setup([7, "8"], GPIO.IN), ValueError, "Channel must be an integer"),
+        (lambda g: g.setup(7, GPIO.IN, pull_up_down="up"), TypeError, NO_INTEGER.format("str")),
+        (lambda g: g.setup(7, GPIO.OUT, initial=None), TypeError, NO_INTEGER.format("NoneType")),
+        (lambda g: g.setmode("BCM"), TypeError, NO_INTEGER.format("str")),
         (lambda g: g.setup(7, 5), ValueError, "An invalid direction was passed to setup()"),
         (
             lambda g: g.setup(7, GPIO.OUT, pull_up_down=GPIO.PUD_UP),
@@ -105,6 +115,8 @@ def _prepare(gpio: Gpio) -> None:
         (lambda g: g.output(11, 1), RuntimeError, "The GPIO channel has not been set up as an OUTPUT"),
         (lambda g: g.output(20, 1), RuntimeError, "The GPIO channel has not been set up as an OUTPUT"),
         (lambda g: g.output((6, 7), (1, 0, 1)), RuntimeError, "Number of channels != number of values"),
+        (lambda g: g.output(7, [1]), RuntimeError, "Number of channels != number of values"),
+        (lambda g: g.output((6, 7), (1, "on")), ValueError, "Value must be an integer or boolean"),
         (lambda g: g.output(99, 1), ValueError, INVALID),
         (
             lambda g: g.output(7, "on"),
@@ -128,6 +140,13 @@ def _prepare(gpio: Gpio) -> None:
             ValueError,
             "Bouncetime must be greater than 0",
         ),
+        (
+            # In seconds, where milliseconds are meant.
+            lambda g: g.add_event_detect(11, GPIO.RISING, bouncetime=0.2),
+            TypeError,
+            NO_INTEGER.format("float"),
+        ),
+        (lambda g: g.wait_for_edge(11, GPIO.RISING, timeout=0.5), TypeError, NO_INTEGER.format("float")),
         (lambda g: g.add_event_detect(11, GPIO.RISING, callback=5), TypeError, "Parameter must be callable"),
         (lambda g: g.add_event_callback(11, 5), TypeError, "Parameter must be callable"),
         (
@@ -241,6 +260,47 @@ def test_cleanup(bcm: Gpio, board: Board) -> None:
         bcm.cleanup()
 
 
+def test_cleanup_forgets_the_numbering_also_where_no_channel_is_left(bcm: Gpio) -> None:
+    bcm.setwarnings(False)
+    bcm.cleanup()
+    assert bcm.getmode() == GPIO.BCM  # no pin was touched yet
+    bcm.setup(7, GPIO.OUT)
+    bcm.cleanup(7)
+    assert bcm.getmode() == GPIO.BCM
+    bcm.cleanup()
+    assert bcm.getmode() is None
+
+
+@pytest.mark.parametrize("hook_cleans_up", [False, True])
+def test_cleanup_undoes_a_setup_that_a_signal_has_ended(
+    bcm: Gpio, board: Board, hook_cleans_up: bool
+) -> None:
+    link = bcm._linked()
+    ask = link.call
+
+    def interrupted(operation: Setup) -> None:
+        # The board has done it, and the signal comes before its answer.
+        del vars(link)["call"]
+        ask(operation)
+        if not hook_cleans_up:
+            raise KeyboardInterrupt
+        bcm.cleanup()
+
+    vars(link)["call"] = interrupted
+    if hook_cleans_up:
+        bcm.setup(7, GPIO.OUT, initial=1)
+        bcm.setmode(GPIO.BCM)
+        with pytest.raises(RuntimeError, match=r"^You must setup\(\) the GPIO channel first$"):
+            bcm.input(7)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            bcm.setup(7, GPIO.OUT, initial=1)
+        assert heard(board, 7) == 1
+        bcm.cleanup()
+    assert heard(board, 7) == 0
+    assert board.state().pins[7].function is Function.IN
+
+
 def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, board: Board) -> None:
     bcm.setup(11, GPIO.IN)
     bcm.setup(7, GPIO.OUT)
@@ -336,6 +396,11 @@ def test_wait_for_edge(bcm: Gpio, board: Board) -> None:
     finger.start()
     assert bcm.wait_for_edge(11, GPIO.RISING, timeout=5000) == 11
     finger.join()
+    bcm.add_event_detect(11, GPIO.RISING, bouncetime=50)
+    with pytest.raises(RuntimeError, match=r"^Conflicting edge detection events already exist for this GPIO"):
+        bcm.wait_for_edge(11, GPIO.RISING, timeout=20)
+    assert bcm.wait_for_edge(11, GPIO.RISING, bouncetime=50, timeout=20) is None
+    assert bcm.wait_for_edge(11, GPIO.FALLING, timeout=20) is None
 
 
 def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
