@@ -89,6 +89,7 @@ class RpcClient:
         reader = HttpReader()
         try:
             sock.sendall(request)
+            sockets.expect_answer(sock)
             while True:
                 data = sock.recv(_RECEIVE)
                 if not data and reader.is_idle:

@@ -93,6 +93,7 @@ class ServiceClient:
     def call(self, request: bytes) -> bytes:
         """The response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
         self._sock.sendall(LENGTH.pack(len(request)) + request)
+        sockets.expect_answer(self._sock)
         ok, length = ANSWER.unpack(self._reader.take(ANSWER.size))
         body = self._reader.take(checked(length))
         if not ok:
@@ -114,6 +115,7 @@ class ServiceClient:
             self._sock.close()
 
     def _receive_header(self) -> Header:
+        sockets.expect_answer(self._sock)
         try:
             (length,) = LENGTH.unpack(self._reader.take(4))
             if length > MAX_HEADER:

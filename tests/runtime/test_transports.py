@@ -17,7 +17,7 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcUnreachable, UsageError, WireError
-from minirospy.runtime import local
+from minirospy.runtime import local, sockets
 from minirospy.runtime.access import Access
 from minirospy.runtime.node import Node
 from minirospy.runtime.rpc_async import AsyncRpcClient
@@ -158,6 +158,29 @@ def test_a_service_and_the_slave_api_are_reached_by_the_socket_beside_their_port
 
     run(scene)
     assert families == [family] * 3
+
+
+def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    turns = 0
+
+    def answer_at_third_turn() -> None:
+        nonlocal turns
+        turns += 1
+        if turns == 3:
+            other.send(b"x")
+
+    monkeypatch.setattr(os, "sched_yield", answer_at_third_turn)
+    monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 60.0)
+    one, other = socket.socketpair()
+    with one, other:
+        sockets.expect_answer(one)
+        assert (turns, one.recv(1)) == (3, b"x")
+        monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 0.0)
+        sockets.expect_answer(one)  # nobody answers
+    with socket.socket() as tcp:
+        monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 60.0)
+        sockets.expect_answer(tcp)
+    assert turns == 3
 
 
 @pytest.mark.parametrize("uri", ["http://localhost:{}", "http://127.0.0.1:{}/", "http://LocalHost:{}"])
