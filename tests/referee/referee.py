@@ -6,6 +6,8 @@ A case is a program of a user; what it prints is the same under both, line for l
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import re
 import subprocess
@@ -22,6 +24,8 @@ _MASKS = [
     (re.compile(r"_\d+_\d{13}"), "<anonymous>"),
     (re.compile(r"\b1[5-9]\d{8}\.\d+"), "<time>"),
     (re.compile(r"0x[0-9a-f]{6,}"), "<id>"),
+    (re.compile(r"\d+\.\d+ms"), "<ms>"),
+    (re.compile(r"Pid: \d+"), "Pid: <pid>"),
     (re.compile(r"/tmp/[\w./-]+"), "<file>"),
 ]
 _lock = threading.Lock()
@@ -45,6 +49,25 @@ def outcome(label: str, call: Callable[[], Any]) -> None:
         show(label, "raises", type(error).__name__, "|", str(error))
     else:
         show(label, "gives", repr(value))
+
+
+def printed(label: str, call: Callable[[], Any], *masks: tuple[str, str], texts: bool = True) -> None:
+    """Show what a call gives, what it prints on stdout, and whether it prints on stderr.
+
+    ``masks``: pattern and word for what differs each time in what it prints. Without ``texts`` an error is its type alone.
+    """
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as errors:
+        try:
+            value = repr(call())
+        except SystemExit as error:
+            value = f"SystemExit {error.code}"
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            value = f"{type(error).__name__}: {error}" if texts else type(error).__name__
+    text = out.getvalue()
+    for pattern, word in masks:
+        text = re.sub(pattern, word, text)
+    show(label, value, repr(text), bool(errors.getvalue()))
 
 
 class Other:

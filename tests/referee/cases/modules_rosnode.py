@@ -1,30 +1,11 @@
 """rosnode's texts and clean-up as programs that watch a robot's nodes use them."""
 
-import contextlib
-import io
-import re
-
 import rosgraph
 import rosnode
 import rospy
-from referee import outcome, show
+from referee import outcome, printed, show
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, SetBoolResponse
-
-
-def printed(label, call):
-    """Show what a call prints on stdout, and what it gives; milliseconds and process ids differ each time."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as errors:
-        try:
-            value = repr(call())
-        except SystemExit as error:
-            value = f"SystemExit {error.code}"
-        except Exception as error:  # noqa: BLE001 - whatever it is
-            value = f"{type(error).__name__}: {error}"
-    text = re.sub(r"\d+\.\d+ms", "<ms>", out.getvalue())
-    show(label, value, repr(re.sub(r"Pid: \d+", "Pid: <pid>", text)), bool(errors.getvalue()))
-
 
 rospy.init_node("tester")
 bools = rospy.Publisher("/ns/bools", Bool, queue_size=1)

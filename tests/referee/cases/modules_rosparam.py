@@ -1,7 +1,6 @@
 """rosparam as programs that read configuration files and load them onto the server use it."""
 
-import contextlib
-import io
+import functools
 import itertools
 import os
 import tempfile
@@ -10,9 +9,13 @@ import rosgraph
 import rosparam
 import yaml
 from referee import outcome, show
+from referee import printed as printed_with_texts
 
 folder = tempfile.mkdtemp()
 numbers = itertools.count()
+
+
+printed = functools.partial(printed_with_texts, texts=False)
 
 
 def file(text):
@@ -20,19 +23,6 @@ def file(text):
     with open(path, "w") as stream:
         stream.write(text)
     return path
-
-
-def printed(label, call):
-    """Show what a call prints on stdout, and what it gives."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as errors:
-        try:
-            value = repr(call())
-        except SystemExit as error:
-            value = f"SystemExit {error.code}"
-        except Exception as error:  # noqa: BLE001 - whatever it is
-            value = type(error).__name__
-    show(label, value, repr(out.getvalue()), bool(errors.getvalue()))
 
 
 show("# load")

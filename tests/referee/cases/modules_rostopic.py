@@ -9,19 +9,14 @@ import rosgraph
 import rospy
 import rostopic
 from referee import outcome, show
+from referee import printed as printed_exactly
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool, Float32, Header, String
 
 
 def printed(label, call):
-    """Show what a call prints on stdout, and what it gives; a measured number differs each time."""
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as errors:
-        try:
-            value = repr(call())
-        except SystemExit as error:
-            value = f"SystemExit {error.code}"
-    show(label, value, repr(re.sub(r"\d+\.\d+(e-\d+)?", "<n>", out.getvalue())), bool(errors.getvalue()))
+    """A measured number differs each time."""
+    printed_exactly(label, call, (r"\d+\.\d+(e-\d+)?", "<n>"))
 
 
 outcome("master", rostopic._check_master)
