@@ -49,7 +49,7 @@ class ServerProxy:
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
-        self._client = RpcClient(uri)
+        self._client = RpcClient(uri, nearby=process.environment.nearby)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("__"):

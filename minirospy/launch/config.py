@@ -5,13 +5,14 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from minirospy import names
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
-from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.load import STDIN, Source, load_sources
 from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
 from minirospy.launch.substitution import Substitution, SubstitutionError
@@ -93,14 +94,8 @@ class Master:
 
     def is_running(self) -> bool:
         """Whether it answers."""
-        proxy = MasterProxy(self.uri, "/roslaunch")
-        try:
-            proxy.get_pid()
-        except MasterUnreachableError:
-            return False
-        finally:
-            proxy.close()
-        return True
+        with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
+            return proxy.is_online()
 
 
 class Param:

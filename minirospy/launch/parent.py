@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import logging
 import os
 import sys
@@ -352,14 +353,8 @@ def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
 
 
 def _master_answers(environment: Environment) -> bool:
-    master = MasterProxy(environment.master_uri, "/roslaunch")
-    try:
-        master.get_pid()
-    except MasterUnreachableError:
-        return False
-    finally:
-        master.close()
-    return True
+    with contextlib.closing(MasterProxy(environment.master_uri, "/roslaunch")) as master:
+        return master.is_online()
 
 
 def _master_words(timeout: float | None, logger_level: str | bool) -> tuple[str, ...]:

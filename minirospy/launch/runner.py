@@ -165,7 +165,7 @@ class Launcher:
             for node in here:
                 node_command(node, self._packages)
         self._has_begun = True
-        had_master = self._master_answers()
+        had_master = self._master.is_online()
         if wait and not had_master:
             self._wait_for_master()
             had_master = True
@@ -236,7 +236,7 @@ class Launcher:
 
     def _wait_for_master(self) -> None:
         self._output.say("roscore/master is not yet running, will wait for it to start")
-        while not self._master_answers():
+        while not self._master.is_online():
             self._pause(0.1)
         self._output.say("master has started, initiating launch")
 
@@ -265,7 +265,7 @@ class Launcher:
         self._attend(process)
         self._output.say(f"process[master]: started with pid [{process.pid}]", bold=True)
         end = time.monotonic() + _MASTER_SECONDS
-        while not self._master_answers():
+        while not self._master.is_online():
             if not process.is_running:
                 raise MinirospyError(f"the master ended with status {process.exit_code}")
             if time.monotonic() > end:
@@ -275,13 +275,6 @@ class Launcher:
             # That of a program that launches: the folder of its log files is named by it.
             self._master.set_param("/run_id", self.run_id)
         self._find_run_id()
-
-    def _master_answers(self) -> bool:
-        try:
-            self._master.get_pid()
-        except MasterUnreachableError:
-            return False
-        return True
 
     def set_parameters(self) -> None:
         """Set the parameters, after what <rosparam> commands and clear_params delete. Raises MinirospyError."""

@@ -70,6 +70,14 @@ class MasterProxy:
         """Close the connections. Idempotent."""
         self._client.close()
 
+    def is_online(self) -> bool:
+        """Whether it answers."""
+        try:
+            self.get_pid()
+        except MasterUnreachableError:
+            return False
+        return True
+
     def get_pid(self) -> int:
         """The master's process id."""
         return int(self.call("getPid"))
