@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import select
 import socket
 import threading
 import time
@@ -20,7 +19,7 @@ from types import FrameType
 from typing import Protocol
 
 from minirospy.errors import WireError
-from minirospy.runtime.sockets import FAMILIES, is_readable
+from minirospy.runtime.sockets import EXPECTED_SECONDS, FAMILIES, expect_answer, is_readable, is_writable
 from minirospy.wire.framing import (
     CHUNK,
     MAX_FRAME,
@@ -44,6 +43,7 @@ _PUSH_SECONDS = 0.005
 _PUSH_WAIT_MS = 1
 """How long the thread that publishes a large message helps it into the socket, and waits for one step."""
 
+_DO_NOT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0)
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 _log = logging.getLogger(__name__)
 
@@ -194,7 +194,7 @@ class OutLink:
                     self._write_some()
             if not self._is_full() or not self._is_reading or not self._may_stay() or time.monotonic() > end:
                 break
-            self._is_reading = _is_writable(self._sock, _PUSH_WAIT_MS)
+            self._is_reading = is_writable(self._sock, _PUSH_WAIT_MS)
         if not self._outbox:
             self._drained.notify_all()
 
@@ -218,7 +218,7 @@ class OutLink:
                 return
             if not left:
                 return
-            if not self._may_stay() or time.monotonic() > end or not _is_writable(self._sock, _PUSH_WAIT_MS):
+            if not self._may_stay() or time.monotonic() > end or not is_writable(self._sock, _PUSH_WAIT_MS):
                 break
         self._begun = left < size
         self._outbox.append(buffers)
@@ -382,6 +382,7 @@ class _Source:
         self._reader = FrameReader(gathers=False)
         self._rest = b""
         self._was_large = False
+        self._is_lively = False
 
     def read(self) -> Iterable[Frame]:
         """Wait for the next frames; they are valid until the next call, large ones for good.
@@ -397,10 +398,22 @@ class _Source:
                 return (self._large(length),)
             self._was_large = False
             reader.put_back(word)
-        count = self.sock.recv_into(reader.space())
+        count = self._receive(reader.space())
         if not count:
             raise _Ended
         return self._small(count)
+
+    def _receive(self, space: memoryview) -> int:
+        """Wait for bytes; without falling asleep, where the last ones let wait no longer than waking up takes."""
+        try:
+            return self.sock.recv_into(space, 0, _DO_NOT_WAIT)
+        except BlockingIOError:
+            begun = time.perf_counter()
+        if self._is_lively:
+            expect_answer(self.sock)
+        count = self.sock.recv_into(space)
+        self._is_lively = time.perf_counter() - begun < EXPECTED_SECONDS
+        return count
 
     def _small(self, count: int) -> Iterator[Frame]:
         reader = self._reader
@@ -486,12 +499,3 @@ def _take_off(buffers: list[bytes | memoryview], count: int) -> None:
             return
         count -= len(first)
         del buffers[0]
-
-
-def _is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Whether the socket takes something within so long."""
-    if hasattr(select, "poll"):
-        poll = select.poll()
-        poll.register(sock, select.POLLOUT)
-        return bool(poll.poll(milliseconds))
-    return bool(select.select([], [sock], [], milliseconds / 1000)[1])

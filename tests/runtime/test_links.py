@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import statistics
 import struct
 import threading
 import time
@@ -122,9 +123,9 @@ def test_a_peer_that_hangs_up_ends_the_link_and_whoever_waits_for_it(
     waiter = threading.Thread(target=link.wait)
     waiter.start()
     pair[1].close()
-    waiter.join(10)
+    waiter.join(30)
     assert not waiter.is_alive()
-    assert ended.wait(10)
+    assert ended.wait(30)
     link.send(b"to nobody")
 
 
@@ -165,6 +166,51 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
     bodies: list[int] = []
     links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), Keeps(newest))
     assert bodies == expected
+
+
+@pytest.mark.parametrize(("seconds", "looks"), [(60.0, 2), (0.0, 0)])
+def test_a_reader_stays_awake_where_messages_come_quickly(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, looks: int
+) -> None:
+    """``seconds``: how long a wait may last to be a short one. The first one is never waited for awake."""
+    one, other = socket.socketpair()
+    looked = 0
+
+    def answer(_: socket.socket) -> None:
+        nonlocal looked
+        looked += 1
+        if looked == 1:
+            other.sendall(serialize_frame(b"second"))
+        else:
+            other.close()
+
+    def deliver(frame: Frame) -> None:
+        bodies.append(bytes(frame))
+        if not looks:
+            other.close()
+
+    monkeypatch.setattr(links, "EXPECTED_SECONDS", seconds)
+    monkeypatch.setattr(links, "expect_answer", answer)
+    bodies: list[bytes] = []
+    waiting = threading.Event()
+
+    class Waiting(socket.socket):
+        def recv_into(self, buffer: Any, nbytes: int = 0, flags: int = 0) -> int:
+            if not flags:
+                waiting.set()
+            return super().recv_into(buffer, nbytes, flags)
+
+    with other:
+        reader = threading.Thread(
+            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, Keeps(0))
+        )
+        reader.start()
+        # Only what was waited for tells how long the waits are.
+        assert waiting.wait(60)
+        other.sendall(serialize_frame(b"first"))
+        reader.join(60)
+    assert bodies == [b"first", b"second"][: looks or 1]
+    assert looked == looks
 
 
 # --- large messages
@@ -213,9 +259,9 @@ def test_small_and_large_messages_in_turns(
         for size in [0, 10, CHUNK - 4, CHUNK][: number % 5]:
             link.send(serialize_frame(bytes(size)))
             sent.append(bytes(size))
-    loop.run(link.drain(10))
+    loop.run(link.drain(30))
     loop.loop.call_soon_threadsafe(link.close)
-    reader.join(10)
+    reader.join(30)
     assert [len(frame) for frame in frames] == [len(frame) for frame in sent]
     assert list(map(bytes, frames)) == sent
     assert {type(frame) for frame in frames if len(frame) > CHUNK} == {SplitFrame if split else bytes}
@@ -229,9 +275,9 @@ def test_the_array_is_an_object_of_its_own(
     frames: list[Frame] = []
     reader = read_in_thread(pair[1], frames)
     link.send(image(b"x" * 1_000_000))
-    loop.run(link.drain(10))
+    loop.run(link.drain(30))
     loop.loop.call_soon_threadsafe(link.close)
-    reader.join(10)
+    reader.join(30)
     (frame,) = frames
     assert isinstance(frame, SplitFrame)
     assert frame[9:] is frame.tail
@@ -270,8 +316,8 @@ def test_a_peer_that_ends_in_the_middle_of_a_large_message(
     sender.start()
     receive_all(pair[1], 1_000_000)
     pair[1].close()
-    assert ended.wait(10)
-    sender.join(10)
+    assert ended.wait(30)
+    sender.join(30)
     assert not sender.is_alive()
     assert link.waiting == 0
 
@@ -305,14 +351,14 @@ def test_split_frames_that_lie(
     sender.start()
     with pytest.raises(WireError, match=words):
         links.read_frames(pair[0], lambda _: None, Keeps(0))
-    sender.join(10)
+    sender.join(30)
 
 
 def test_no_memory_for_a_message_ends_the_link_with_a_line() -> None:
     def receive(_count: int, _flags: int = 0) -> bytes:
         raise MemoryError
 
-    def receive_into(space: memoryview) -> int:
+    def receive_into(space: memoryview, _count: int = 0, _flags: int = 0) -> int:
         space[:4] = struct.pack("<I", 1 << 29)
         return 4
 
@@ -330,7 +376,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
     sender.start()
     frames: list[bytes] = []
     links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(1))
-    sender.join(10)
+    sender.join(30)
     assert frames[-1] == joined(image(bytes([2]) * CHUNK))
 
 
@@ -345,9 +391,9 @@ def test_who_reads_is_waited_for_rather_than_dropped(
     reader = read_in_thread(pair[1], frames)
     for number in range(50_000):
         link.send(serialize_frame(number.to_bytes(8, "little")))
-    loop.run(link.drain(10))
+    loop.run(link.drain(30))
     loop.loop.call_soon_threadsafe(link.close)
-    reader.join(10)
+    reader.join(30)
     # Another program may take the reader's processor away for longer than it is waited for.
     assert len(frames) + link.dropped == 50_000
     assert link.dropped < 25_000
@@ -362,9 +408,11 @@ def test_who_does_not_read_is_not_waited_for(
     frame = serialize_frame(bytes(60_000))
     while not link.dropped:
         link.send(frame)
-    begin = time.monotonic()
+    took = []
     for _ in range(1000):
+        begin = time.monotonic()
         link.send(frame)
-    # Each wait would be a millisecond.
-    assert time.monotonic() - begin < 0.5
+        took.append(time.monotonic() - begin)
+    # Each wait would be a millisecond; one may be as long on a machine that stands still.
+    assert statistics.median(took) < 0.0005
     assert link.waiting <= 3

@@ -170,15 +170,15 @@ def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.Monkey
             other.send(b"x")
 
     monkeypatch.setattr(os, "sched_yield", answer_at_third_turn)
-    monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 60.0)
+    monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
     one, other = socket.socketpair()
     with one, other:
         sockets.expect_answer(one)
         assert (turns, one.recv(1)) == (3, b"x")
-        monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 0.0)
+        monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 0.0)
         sockets.expect_answer(one)  # nobody answers
     with socket.socket() as tcp:
-        monkeypatch.setattr(sockets, "_EXPECTED_SECONDS", 60.0)
+        monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
         sockets.expect_answer(tcp)
     assert turns == 3
 
