@@ -7,6 +7,7 @@ import logging
 import os
 import threading
 import time
+from collections.abc import Callable
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
@@ -24,7 +25,7 @@ class LogFile(RotatingFileHandler):
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
         super().__init__(path, maxBytes=most_bytes, backupCount=3, encoding="utf-8")
-        self.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))
+        self.setFormatter(_Formatter(self._stamp))
         self._line_head = f"[{name}][INFO] "
         self._lines: list[str] = []
         self._guard = threading.Lock()
@@ -33,14 +34,9 @@ class LogFile(RotatingFileHandler):
 
     def line(self, text: str) -> None:
         """A line of level INFO (on the loop)."""
-        now = time.time()
-        second, stamp = self._second
-        if int(now) != second:
-            second, stamp = int(now), time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
-            self._second = (second, stamp)
-        self._lines.append(f"{self._line_head}{stamp},{int((now - second) * 1000):03d}: {text}\n")
+        self._lines.append(f"{self._line_head}{self._stamp(time.time())}: {text}\n")
         if self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._write_out)
+            self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
         """As logging wants it; from any thread."""
@@ -62,9 +58,19 @@ class LogFile(RotatingFileHandler):
             self._timer.cancel()
         super().close()
 
+    def _stamp(self, now: float) -> str:
+        second, stamp = self._second
+        if int(now) != second:
+            second, stamp = int(now), time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(now))
+            self._second = (second, stamp)
+        return f"{stamp},{int((now - second) * 1000):03d}"
+
+    def _time_is_up(self) -> None:
+        self._timer = None
+        self._write_out()
+
     def _write_out(self) -> None:
         with self._guard:
-            self._timer = None
             lines, self._lines = self._lines, []
             if not lines:
                 return
@@ -78,3 +84,14 @@ class LogFile(RotatingFileHandler):
             except (OSError, ValueError):
                 # A full disk must not stop the master.
                 return
+
+
+class _Formatter(logging.Formatter):
+    """As the lines are written; the time of a second is looked up once."""
+
+    def __init__(self, stamp: Callable[[float], str]) -> None:
+        super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")
+        self._stamp = stamp
+
+    def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802 - logging's
+        return self._stamp(record.created)

@@ -1,0 +1,43 @@
+"""runtime/log_file: many lines are written together, and a warning at once."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+
+import pytest
+
+from minirospy.runtime import log_file
+from minirospy.runtime.log_file import LogFile
+
+
+def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(log_file, "_SECONDS", 0.05)
+    written: list[int] = []
+
+    async def scene() -> None:
+        file = LogFile(tmp_path / "master.log", 1_000_000, "master")
+
+        def write_out() -> None:
+            written.append(len(written))
+            LogFile._write_out(file)
+
+        monkeypatch.setattr(file, "_write_out", write_out)
+        for number in range(20):
+            file.line(f"line {number}")
+            file.handle(logging.LogRecord("x", logging.WARNING, "", 0, f"warning {number}", None, None))
+        # What was warned of is there by now, with the lines in front of it.
+        assert (tmp_path / "master.log").read_text().count("\n") == 40
+        at_once = len(written)
+        file.line("the last")
+        while len(written) == at_once:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.1)
+        assert len(written) == at_once + 1
+        assert (tmp_path / "master.log").read_text().endswith(": the last\n")
+        file.close()
+
+    asyncio.run(scene())
