@@ -20,17 +20,21 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, Final
+from typing import Any
 
 from minirospy.client.life import Life, ROSInterruptException, where
 
 __all__ = ["EndWatch", "is_over"]
 
 _TICK, _LATE_TICK = 0.02, 0.002
+_LOOK_SECONDS = 2 * _TICK
+"""The watch looks at the time at least so often, where the process runs."""
 _BEGIN_SECONDS = 0.1
 """How long the main thread may take to run its handler, before another runs the hooks."""
-_HEAR_SECONDS, _TURN_SECONDS, _LONG_TURN_SECONDS = 0.4, 0.7, 1.1
+_HEAR_SECONDS, _TURN_SECONDS, _LONG_TURN_SECONDS = 0.4, 0.7, 1.2
 """How long a thread may take to hear; one that asks; and one whose loop is known to ask once a second."""
+_TURN_MARGIN = 0.1
+"""How much longer than those before a turn may take."""
 _CHILDREN_SECONDS = 0.5
 _ANSWER_TICKS = 8
 """Ticks, not seconds: on a machine that is busy the watch is slow, too."""
@@ -48,9 +52,6 @@ class EndWatch:
     ``late`` tells of a signal whose handler has to run once more (see :class:`minirospy.client.signals.Signals`).
     """
 
-    AGAIN: Final = object()
-    """The order to a handler to look at the late signal."""
-
     def __init__(self, life: Life, late: Callable[[], int]) -> None:
         self._life = life
         self._late = late
@@ -58,10 +59,13 @@ class EndWatch:
         self._sending.setblocking(False)
         self._numbers: frozenset[int] = frozenset()
         self._handler: object = None
-        self._order: object = None
+        self._order: BaseException | None = None
+        self._has_nudged = False
         self._first = 0
         self._arrived = self._handled = self._own = 0
         self._limit = math.inf
+        self._looked = (0.0, 0.0)
+        self._stalled = 0.0
         threading.Thread(target=self._run, name="minirospy-end", daemon=True).start()
 
     def listen(self, numbers: frozenset[int], handler: object) -> None:
@@ -85,15 +89,21 @@ class EndWatch:
         with contextlib.suppress(OSError):
             self._sending.send(bytes([_HANDLED | number]))
 
-    def take_order(self) -> object:
-        """What a handler is to do: an exception to raise, AGAIN, or None where the signal is none of the watch's."""
+    def take_order(self) -> BaseException | None:
+        """What a handler is to raise, or None where the signal is none of the watch's."""
         order, self._order = self._order, None
         return order
+
+    def take_nudge(self) -> bool:
+        """Whether a handler runs only to look at the late signal once more."""
+        has_nudged, self._has_nudged = self._has_nudged, False
+        return has_nudged
 
     @contextlib.contextmanager
     def at_once(self) -> Any:
         """What the block does has to be done in a moment, or the process ends."""
-        self._limit, before = min(self._limit, time.monotonic() + _LAST_SECONDS), self._limit
+        now = time.monotonic() - self._stalled
+        self._limit, before = min(self._limit, now + _LAST_SECONDS), self._limit
         try:
             yield
         finally:
@@ -106,7 +116,7 @@ class EndWatch:
             if not self._take(None):
                 self._receiving.close()
                 return
-        begun = time.monotonic()
+        begun = self._now()
         life = self._life
         if not self._wait(lambda: life.is_shutdown_requested, begun + _BEGIN_SECONDS):
             reason = f"signal-{self._first}"
@@ -119,7 +129,7 @@ class EndWatch:
 
     def _see_that_main_hears(self, begun: float) -> None:
         main = threading.main_thread()
-        until = max(self._patience(main, begun), time.monotonic() + 2 * _TICK)
+        until = max(self._patience(main, begun), self._now() + 2 * _TICK)
         told = self._wait(lambda: self._knows(main) or is_over(), until)
         if not told and not self._interrupt(ROSInterruptException("the program was asked to end")):
             end_process()
@@ -151,9 +161,10 @@ class EndWatch:
         listener = self._life.listeners.get(thread.ident or 0)
         if not listener or not listener.asks:
             return begun + _HEAR_SECONDS
-        due = listener.asked + max(listener.turns) + _TICK
-        # What stands behind a loop is often its clean-up: one that sleeps for a second gets that second.
-        return due if _TURN_SECONDS < due - begun < _LONG_TURN_SECONDS else begun + _TURN_SECONDS
+        # What stands behind a loop is often its clean-up: one that sleeps for a second gets that second. A turn in which
+        # the machine stood still tells nothing.
+        rests = [listener.asked + turn + _TURN_MARGIN - begun for turn in listener.turns]
+        return begun + max([_TURN_SECONDS, *(rest for rest in rests if rest < _LONG_TURN_SECONDS)])
 
     def _knows(self, thread: threading.Thread) -> bool:
         listener = self._life.listeners.get(thread.ident or 0)
@@ -164,7 +175,7 @@ class EndWatch:
         self._send(error)
         ticks = 0
         while self._order is not None and ticks < _ANSWER_TICKS:
-            self._wait(lambda: self._order is None, time.monotonic() + _TICK)
+            self._wait(lambda: self._order is None, self._now() + _TICK)
             ticks += 1
         return self._order is None
 
@@ -178,19 +189,33 @@ class EndWatch:
             same = same + 1 if where(frame) == self._life.told_at else 0
             if same == _SAME_PLACE_TICKS:
                 return True
-            self._wait(is_over, time.monotonic() + _TICK)
+            self._wait(is_over, self._now() + _TICK)
         return False
+
+    def _now(self) -> float:
+        """Seconds, by a clock that stands still while the process is stopped or the machine gives it no time.
+
+        What the program is granted to hear, and to clean up, is time in which it can run. A look that comes late while
+        the process used the processor is no stall: C code held Python's lock.
+        """
+        wall, cpu = time.monotonic(), time.process_time()
+        idle = (wall - self._looked[0]) - (cpu - self._looked[1])
+        self._stalled += max(0.0, idle - _LOOK_SECONDS)
+        self._looked = (wall, cpu)
+        return wall - self._stalled
 
     def _wait(self, is_done: Callable[[], bool], until: float = math.inf) -> bool:
         """Wait; False where the time is up. Ends the process some time after a second signal."""
         while not is_done():
-            now = time.monotonic()
+            now = self._now()
             if now >= self._limit:
                 end_process()
             if now >= until:
                 return False
             if late := self._late():
-                self._send(self.AGAIN, late)
+                self._own += 1
+                self._has_nudged = True
+                _thread.interrupt_main(signal.Signals(late))
                 self._take(_LATE_TICK)
             else:
                 self._take(_TICK)
@@ -205,6 +230,9 @@ class EndWatch:
             return True
         except OSError:
             return False
+        if seconds is None:
+            # Not a look that comes late.
+            self._looked = (time.monotonic(), time.process_time())
         for byte in data:
             number = byte & _NUMBER
             if byte & _HANDLED:
@@ -214,21 +242,18 @@ class EndWatch:
                 self._arrived += 1
                 self._first = self._first or number
         if max(self._arrived - self._own, self._handled) > 1:
-            self._limit = min(self._limit, time.monotonic() + _SECOND_SIGNAL_SECONDS)
+            self._limit = min(self._limit, self._now() + _SECOND_SIGNAL_SECONDS)
         return bool(data)
 
-    def _send(self, order: object, late: int = 0) -> None:
+    def _send(self, order: BaseException) -> None:
         """Run the handler of the main thread with an order, and end a system call that it is in."""
         self._order = order
         self._own += 1
-        main = threading.main_thread()
-        if late:
-            _thread.interrupt_main(signal.Signals(late))
-        elif sys.platform == "win32":
+        if sys.platform == "win32":
             # The only one that ends time.sleep() there.
             signal.raise_signal(signal.SIGINT)
         else:
-            signal.pthread_kill(main.ident or 0, self._first)
+            signal.pthread_kill(threading.main_thread().ident or 0, self._first)
 
 
 def is_over(frame: FrameType | None = None) -> bool:
@@ -249,7 +274,8 @@ def end_process() -> None:
     """End without the main thread: the functions of atexit, what is printed, and out."""
     last = threading.Thread(target=_last_words, daemon=True)
     last.start()
-    last.join(_LAST_SECONDS)
+    for _ in range(round(_LAST_SECONDS / _TICK)):
+        last.join(_TICK)
     os._exit(0)
 
 

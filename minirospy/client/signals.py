@@ -70,8 +70,11 @@ class Signals:
 
     def take_late(self) -> None:
         """Act on a signal that came while the main thread was sending or logging."""
-        if threading.current_thread() is threading.main_thread() and self.late:
-            self._on_signal(self.late, None)
+        if threading.current_thread() is not threading.main_thread():
+            return
+        late, self.late = self.late, 0
+        if late:
+            self._act_on(late, None)
 
     def end_quietly(self) -> None:
         """A program, or a thread of it, that does not catch what tells it of its end, ends without a traceback."""
@@ -157,6 +160,9 @@ class Signals:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         watch = self._watching()
+        if watch.take_nudge() and not self.late:
+            # The program has taken it while the watch was on its way: a second one would end its clean-up.
+            return
         if self._is_sending(frame) or _is_logging(frame) or self._is_too_early(frame):
             # A hook that publishes, or logs, would need what this very thread holds. publish() takes the signal when it
             # has sent, loginfo() when it has written; for all others the watch sends it again. A loop that only
@@ -164,16 +170,18 @@ class Signals:
             self.late = number
             watch.handled(0)
             return
-        was_late, self.late = self.late, 0
+        self.late = 0
+        self._act_on(number, frame)
+
+    def _act_on(self, number: int, frame: FrameType | None) -> None:
+        watch = self._watching()
         order = watch.take_order()
-        if order is EndWatch.AGAIN and not was_late:
-            return
         if self._is_inherited and not self._life.listener().asks:
             # A worker of the program, which never asks is_shutdown(), ends as any child process does.
             signal.signal(number, self._before[number])
             signal.raise_signal(number)
             return
-        if isinstance(order, BaseException):
+        if order is not None:
             if isinstance(order, ROSInterruptException) and self._life.knows_of_shutdown():
                 # It has heard while the order was on its way: what would be interrupted now is its clean-up.
                 return

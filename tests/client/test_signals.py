@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import _thread
+import logging
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
-from types import FrameType
+from types import FrameType, SimpleNamespace
+from typing import cast
 
 import pytest
 
+from minirospy.client.ending import EndWatch
 from minirospy.client.life import Life, ROSInterruptException
 from minirospy.client.signals import Signals
 
@@ -71,13 +75,59 @@ def test_it_does_not_wait_for_ever() -> None:
     assert not answers[-1]
 
 
+@pytest.mark.parametrize("turns", [(0.9, 30.0), (30.0, 0.9)])
+def test_a_turn_in_which_the_machine_stood_still_tells_nothing(turns: tuple[float, float]) -> None:
+    life = Life()
+    watch = EndWatch(life, lambda: 0)
+    listener = life.listener()
+    listener.asks, listener.asked, listener.turns = True, 100.0, turns
+    try:
+        assert watch._patience(threading.current_thread(), 100.0) == pytest.approx(101.0)
+    finally:
+        watch.let_go()
+
+
+@pytest.mark.parametrize("is_logging", [False, True])
+def test_a_late_signal_is_acted_on_once(is_logging: bool) -> None:
+    """Though the watch sends it again, to arrive when the program has just taken it, and a hook logs."""
+    life = Life()
+    signals = Signals(life)
+    nudges: list[bool] = []
+    handled: list[int] = []
+    signals._watch = cast(
+        EndWatch,
+        SimpleNamespace(
+            take_nudge=lambda: bool(nudges and nudges.pop()), take_order=lambda: None, handled=handled.append
+        ),
+    )
+
+    class Nudged(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            nudges.append(True)
+            signals._on_signal(signal.SIGINT, sys._getframe() if is_logging else None)
+
+    record = logging.LogRecord("test", logging.INFO, "", 1, "a line", None, None)
+    life.on_shutdown(lambda: Nudged().handle(record))
+    signals.late = signal.SIGINT
+    signals.take_late()
+    assert (handled, signals.late) == ([signal.SIGINT], 0)
+    assert life.is_shutdown()
+
+
 def with_handler(handler: Callable[[int, FrameType | None], None], run: Callable[[], None]) -> None:
-    """Have ``handler`` called while ``run`` runs."""
+    """Have ``handler`` called while ``run`` runs a program of exec()."""
     before = signal.signal(signal.SIGINT, handler)
-    timer = threading.Timer(0.05, _thread.interrupt_main)
-    timer.start()
+    main = threading.get_ident()
+
+    def interrupt() -> None:
+        while sys._current_frames()[main].f_code.co_filename != "<string>":
+            time.sleep(0.01)
+        _thread.interrupt_main()
+
+    interrupting = threading.Thread(target=interrupt)
+    interrupting.start()
     try:
         run()
     finally:
-        timer.join()
+        interrupting.join()
         signal.signal(signal.SIGINT, before)
