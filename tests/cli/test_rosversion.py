@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.environment import ROS_VERSION
+
 from .conftest import Command
 
 
@@ -29,6 +31,20 @@ def test_of_all(command: Command) -> None:
     assert "my: 1.2.3" in lines
     names = [line.partition(":")[0] for line in lines]
     assert names == sorted(names)
+
+
+def test_of_what_minirospy_brings_along(command: Command) -> None:
+    """The releases of ROS that the definitions are those of, not a number of our own."""
+    for package, version in (
+        ("std_msgs", "0.5.13"),
+        ("sensor_msgs", "1.13.1"),
+        ("roscpp", ROS_VERSION.strip()),
+    ):
+        assert command("rosversion", package) == (0, f"{version}\n", "")
+    own = {"minirospy_msgs", "rpi_msgs"}
+    for line in command("rosversion", "-a").out.splitlines():
+        name, _, version = line.partition(": ")
+        assert version != "1.0.0" or name in own, line
 
 
 def test_of_the_distribution(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
