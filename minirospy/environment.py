@@ -128,7 +128,8 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
     found, _, rest = uri.partition("://")
     address, slash, path = rest.partition("/")
     host, _, port = address.rpartition(":")
-    if host.startswith("[") and host.endswith("]"):
+    # `http://[hostname]:11311` is what a page says, and no address of IPv6.
+    if host.startswith("[") and host.endswith("]") and ":" in host:
         host = host[1:-1]
     is_host = host.isprintable() and host[:1] not in ("", "[")
     if found.lower() != scheme or not is_host or not (port.isascii() and port.isdecimal()):

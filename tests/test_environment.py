@@ -58,7 +58,16 @@ def test_overrides_win() -> None:
 
 
 @pytest.mark.parametrize(
-    "uri", ["localhost:11311", "http://", "http://a", "http://a:b", "ftp://a:1", "http://[:1"]
+    "uri",
+    [
+        "localhost:11311",
+        "http://",
+        "http://a",
+        "http://a:b",
+        "ftp://a:1",
+        "http://[:1",
+        "http://[hostname]:11311",
+    ],
 )
 def test_a_bad_master_uri_is_refused_in_words(uri: str) -> None:
     with pytest.raises(UsageError, match="is not of the form http://host:port"):

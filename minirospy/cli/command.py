@@ -9,6 +9,7 @@ status when
 0      done; a stream, a wait or a question ended by Ctrl-C or a closed pipe
 1      it could not be done: no master, an unknown name, a peer that fails
 2      typed wrong: unknown option, missing argument
+130    work that Ctrl-C ended half done: INTERRUPTED
 ====== =====================================================================
 """
 
@@ -26,13 +27,16 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from minirospy.errors import MessageException, MinirospyError, ROSException, ServiceException, UsageError
 
 if TYPE_CHECKING:
+    from minirospy.introspect.graph import Graph
     from minirospy.introspect.streams import ToolNode
     from minirospy.names import Arguments
 
 __all__ = [
+    "INTERRUPTED",
     "Parser",
     "complain",
     "did_you_mean",
+    "hint_near",
     "one_argument",
     "refuse_bag",
     "run",
@@ -40,6 +44,10 @@ __all__ = [
     "warn",
     "warn_unpublished",
 ]
+
+
+INTERRUPTED = 130
+"""As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
 
 
 class _Help(argparse.HelpFormatter):
@@ -104,8 +112,8 @@ def refuse_bag(command: str) -> NoReturn:
     raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
-def run(name: str, body: Callable[[], int | None]) -> int:
-    """The exit status of ``body``; a named error becomes ``name: ERROR: text`` on stderr."""
+def run(name: str, body: Callable[[], int | None], interrupted: int = 0) -> int:
+    """The exit status of ``body`` (at Ctrl-C ``interrupted``); a named error becomes ``name: ERROR: text`` on stderr."""
     _open_streams()
     try:
         status = body() or 0
@@ -127,7 +135,7 @@ def run(name: str, body: Callable[[], int | None]) -> int:
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
-        return 0
+        return interrupted
 
 
 def _open_streams() -> None:
@@ -152,9 +160,17 @@ def warn(what: str, name: str = "") -> None:
     print(f"WARNING: {what}{why and f'; {why}'}", file=sys.stderr)
 
 
-def warn_unpublished(topic: str) -> None:
-    """What a command that waits for the messages of a topic says, where it does not know it."""
+def warn_unpublished(graph: Graph, topic: str) -> None:
+    """What a command that waits for the messages of a topic says, where it does not know it; then the nearest names."""
     warn(f"topic [{topic}] does not appear to be published yet", topic)
+    hint_near(topic, graph.state().publishers)
+
+
+def hint_near(name: str, known: Iterable[str]) -> None:
+    """A line on stderr, below the warning that ``name`` is waited for: the nearest names, where one is near."""
+    near = did_you_mean(name, (each for each in known if each != name))
+    if near:
+        print(near.removeprefix("; "), file=sys.stderr)
 
 
 @contextlib.contextmanager

@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import minirospy
-from minirospy.cli.command import Parser, run
-from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment
+from minirospy.cli.command import Parser, run, warn
+from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
 from minirospy.runtime.access import Access, listening_lines
 from minirospy.runtime.log_file import LogFile
@@ -151,14 +151,18 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
             master.set_param("/roslaunch", key, value)
         where = listening_lines(environment.bind_host, master.port, access)
         if not options.quiet:
-            print(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, log file {log_file}")
+            logs = f"log file {log_file}" if log_file else "no log file"
+            print(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")
             print("\n".join([where[0], *master.news]))
             print(f"ROS_MASTER_URI={master.uri}", flush=True)
         if where[1:]:
             print("\n".join(where[1:]), file=sys.stderr, flush=True)
+        _warn_of_host(environment.host)
         for line in (*where, *master.news):
             logging.getLogger("minirospy.master").warning(line)
-        await _run(master, stop, environment, log_file.parent / "rosout.log", options)
+        rosout_file = log_file.with_name("rosout.log") if log_file else None
+        rosout = RosoutNode(environment._replace(master_uri=master.uri), rosout_file)
+        await _run(master, stop, None if options.no_rosout else rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
         await master.close(keep_journal=keep)
@@ -168,17 +172,16 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
 
 
 async def _run(
-    master: Master, stop: asyncio.Event, environment: Environment, log_file: Path, options: argparse.Namespace
+    master: Master, stop: asyncio.Event, rosout: RosoutNode | None, run_id: str, *, quiet: bool
 ) -> None:
     """Until somebody ends it."""
-    rosout = None
     try:
-        if not options.no_rosout:
-            rosout = RosoutNode(environment._replace(master_uri=master.uri), log_file)
+        if rosout:
             await rosout.start()
-        if not options.quiet:
-            print(f"setting /run_id to {log_file.parent.name}")
-            core = "" if options.no_rosout else "started core service [/rosout]; "
+            master.adopt(rosout.node)
+        if not quiet:
+            print(f"setting /run_id to {run_id}")
+            core = "started core service [/rosout]; " if rosout else ""
             print(f"{core}Ctrl-C stops the master", flush=True)
         await _first(stop, master.stopped)
     finally:
@@ -217,6 +220,19 @@ def _span(seconds: float) -> str:
     minutes, rest = divmod(int(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}"
+
+
+def _warn_of_host(host: str) -> None:
+    """Say so where ROS_IP is no address of this machine: most often that of yesterday's network.
+
+    Names are left alone: a name server that is out of reach would keep the master waiting.
+    """
+    if host.replace(".", "").isdigit() and not is_own_host(host):
+        variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
+        warn(
+            f"{variable}={host} is no address of this machine: right only behind NAT or in a container "
+            "(`minirospy doctor` tells more)"
+        )
 
 
 def _most_clients() -> int:
@@ -297,23 +313,24 @@ def _show(line: str) -> None:
         print(line, flush=True)
 
 
-def _log_to_file(folder: Path, *, verbose: bool, level: str | None) -> tuple[Path, Callable[[str], object]]:
+def _log_to_file(
+    folder: Path, *, verbose: bool, level: str | None
+) -> tuple[Path | None, Callable[[str], object]]:
     """Log to ``folder``/master.log; ``latest`` beside the folder points to it where links are allowed.
 
-    The file, and what takes a line about a registration.
+    The file, and what takes a line about a registration. Where none can be written the master goes on without.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")
     logger.setLevel(_LEVELS[level or "info"])
+    file = None
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handler = LogFile(path, _LOG_BYTES, "minirospy.master")
+        file = LogFile(path, _LOG_BYTES, "minirospy.master")
     except OSError as error:
-        raise MinirospyError(
-            f"cannot write logs to {folder}: {error.strerror or error}; set ROS_LOG_DIR"
-        ) from error
-    logger.addHandler(handler)
-    say: Callable[[str], object] = handler.line if logger.isEnabledFor(logging.INFO) else _quiet
+        warn(f"cannot write logs to {folder}: {error.strerror or error}; set ROS_LOG_DIR")
+    logger.addHandler(file or logging.NullHandler())
+    say: Callable[[str], object] = file.line if file and logger.isEnabledFor(logging.INFO) else _quiet
     if verbose:
         logger.addHandler(_Shown())
 
@@ -322,6 +339,8 @@ def _log_to_file(folder: Path, *, verbose: bool, level: str | None) -> tuple[Pat
             _show(line)
 
         say = say_twice
+    if not file:
+        return None, say
     latest = folder.parent / "latest"
     with contextlib.suppress(OSError):
         latest.unlink(missing_ok=True)

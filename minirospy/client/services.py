@@ -200,14 +200,15 @@ class ServiceProxy(Generic[_S]):
             raise TypeError("request object is not a valid request message instance")
         buffer = BytesIO()
         request.serialize(buffer)
+        body = buffer.getvalue()
         if not self.persistent:
-            return self._exchange(self._connect(), buffer.getvalue(), keep=False)
+            return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._client and self._client.has_ended():
                 self.close()
             if self._client is None:
-                self._client = self._connect()
-            return self._exchange(self._client, buffer.getvalue(), keep=True)
+                self._client = self._connect(body)
+            return self._exchange(self._client, body, keep=True)
 
     def wait_for_service(self, timeout: float | None = None) -> None:
         """Wait until the service is there. Raises ROSException after ``timeout`` seconds."""
@@ -219,10 +220,11 @@ class ServiceProxy(Generic[_S]):
         if client:
             client.close()
 
-    def _connect(self) -> ServiceClient:
+    def _connect(self, request: bytes) -> ServiceClient:
+        """A connection for the call of ``request``, which may be on its way by then."""
         ahead = self._connect_ahead()
         try:
-            return self._connect_by_master(ahead)
+            return self._connect_by_master(ahead, request)
         finally:
             if ahead and not ahead.header:
                 ahead.close()
@@ -254,7 +256,7 @@ class ServiceProxy(Generic[_S]):
             nearby=process.environment.nearby,
         )
 
-    def _connect_by_master(self, ahead: ServiceClient | None) -> ServiceClient:
+    def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
         before = self.uri
         try:
             self.uri = uri = process.master.lookup_service(self.resolved_name)
@@ -264,9 +266,10 @@ class ServiceProxy(Generic[_S]):
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
             if ahead and uri == before:
-                # It may have begun with a server that was about to end: then once more.
-                with contextlib.suppress(OSError, WireError):
-                    ahead.finish()
+                # It may have begun with a server that was about to end: then once more. One that is silent may have
+                # the request by now.
+                with contextlib.suppress(ConnectionError, WireError):
+                    ahead.finish(request)
                     return ahead
             return self._client_of(uri, waits=True)
         except HandshakeRefused as error:

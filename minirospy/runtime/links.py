@@ -14,12 +14,20 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 from types import FrameType
 from typing import Protocol
 
 from minirospy.errors import WireError
-from minirospy.runtime.sockets import EXPECTED_SECONDS, FAMILIES, expect_answer, is_readable, is_writable
+from minirospy.runtime.sockets import (
+    EXPECTED_SECONDS,
+    FAMILIES,
+    is_readable,
+    is_writable,
+    may_expect,
+    receive_awake,
+)
 from minirospy.wire.framing import (
     CHUNK,
     MAX_FRAME,
@@ -32,7 +40,7 @@ from minirospy.wire.framing import (
     split_sizes,
 )
 
-__all__ = ["Keeps", "OutLink", "is_sending", "read_frames", "watch_frames"]
+__all__ = ["Keeps", "OutLink", "Readers", "is_sending", "read_frames", "watch_frames"]
 
 _GATHER = 64
 _DRAIN_BYTES = 64 * 1024 * 1024
@@ -43,7 +51,6 @@ _PUSH_SECONDS = 0.005
 _PUSH_WAIT_MS = 1
 """How long the thread that publishes a large message helps it into the socket, and waits for one step."""
 
-_DO_NOT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0)
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 _log = logging.getLogger(__name__)
 
@@ -326,7 +333,20 @@ class Keeps(Protocol):
     newest: int
 
 
-def read_frames(sock: socket.socket, deliver: Callable[[Frame], None], keeps: Keeps) -> None:
+@dataclass(eq=False)
+class Readers:
+    """The readers of a node's topics. One that finds that it alone reads may look for its next message awake.
+
+    Two would wait for each other's turn in the interpreter, which takes longer than to be woken.
+    """
+
+    last: object = None
+    """Who has read last."""
+
+
+def read_frames(
+    sock: socket.socket, deliver: Callable[[Frame], None], keeps: Keeps, readers: Readers
+) -> None:
     """Read frames in the calling thread until the peer ends; closes the socket.
 
     ``keeps.newest``: of what lies ready when the thread comes to read, only so many frames, the newest, are
@@ -334,7 +354,7 @@ def read_frames(sock: socket.socket, deliver: Callable[[Frame], None], keeps: Ke
     """
     try:
         sock.setblocking(True)
-        source = _Source(sock)
+        source = _Source(sock, readers)
         with contextlib.suppress(_Ended):
             while True:
                 frames = source.read()
@@ -377,11 +397,13 @@ def watch_frames(
 class _Source:
     """Frames off a blocking socket: small ones by the bufferful, large ones each in memory of its own."""
 
-    def __init__(self, sock: socket.socket) -> None:
+    def __init__(self, sock: socket.socket, readers: Readers) -> None:
         self.sock = sock
+        self._readers = readers
         self._reader = FrameReader(gathers=False)
         self._rest = b""
         self._was_large = False
+        self._may_look = may_expect(sock)
         self._is_lively = False
 
     def read(self) -> Iterable[Frame]:
@@ -405,14 +427,13 @@ class _Source:
 
     def _receive(self, space: memoryview) -> int:
         """Wait for bytes; without falling asleep, where the last ones let wait no longer than waking up takes."""
-        try:
-            return self.sock.recv_into(space, 0, _DO_NOT_WAIT)
-        except BlockingIOError:
-            begun = time.perf_counter()
-        if self._is_lively:
-            expect_answer(self.sock)
+        if self._is_lively and self._readers.last is self:
+            with contextlib.suppress(BlockingIOError):
+                return receive_awake(self.sock, space)
+        begun = time.perf_counter()
         count = self.sock.recv_into(space)
-        self._is_lively = time.perf_counter() - begun < EXPECTED_SECONDS
+        self._is_lively = self._may_look and time.perf_counter() - begun < EXPECTED_SECONDS
+        self._readers.last = self
         return count
 
     def _small(self, count: int) -> Iterator[Frame]:

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import os
 import socket
-import struct
 import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from minirospy.runtime import sockets
+
 __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
-_CREDENTIALS = struct.Struct("iII")
-"""Of a peer: process, user and group."""
-
 _TRUSTED = frozenset({0})
 """Users that are believed to be whom they say: root, and oneself."""
 
@@ -75,8 +73,7 @@ def reach(host: str, port: int) -> socket.socket | None:
         sock = connect(name_of(host, port))
     except OSError:
         return None
-    credentials = sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-    _, user, _ = _CREDENTIALS.unpack(credentials)
+    user = sockets.peer(sock).user
     if user not in _TRUSTED and user != os.geteuid():
         sock.close()
         return None

@@ -13,7 +13,7 @@ import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sized
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import minirospy
 from minirospy.errors import RpcError, RpcUnreachable
@@ -24,6 +24,9 @@ from minirospy.runtime.master_api import Answer, MasterApi, key_of_node, nothing
 from minirospy.runtime.notifier import Notice, Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
+
+if TYPE_CHECKING:
+    from minirospy.runtime.node import Node
 
 __all__ = ["Master"]
 
@@ -132,6 +135,10 @@ class Master(MasterApi):
             else:
                 self._journal.remove()
 
+    def adopt(self, node: Node) -> None:
+        """``node``, which has started, is on this loop: it is told of publishers without a call."""
+        self._notifier.here[node.uri] = node.publishers_changed
+
     def act(self, actions: Iterable[Notice]) -> None:
         """Call the nodes that are to be told."""
         for action in actions:
@@ -196,7 +203,8 @@ class Master(MasterApi):
             return {}
         except OSError as error:
             journal.close()
-            self.news.append(f"no journal, a crash of the master would lose the graph: {error}")
+            why = f"{self._journal_path} cannot be written: {error.strerror or error}; set ROS_HOME"
+            self.news.append(f"no journal, a crash of the master would lose the graph: {why}")
             return {}
         self._journal = journal
         self.note = journal.append

@@ -17,6 +17,7 @@ from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable, WireError
 from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
+from minirospy.runtime.links import Readers
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.services import Handler, ServiceServer
@@ -70,6 +71,7 @@ class Node:
         self._watch_seconds = watch_seconds
         self.when_registered_again: list[Callable[[], object]] = []
         """Called in workers when the master had forgotten this node: for what else it has to be told."""
+        self._readers = Readers()
         self._rpc = AsyncRpcClient(nearby=environment.nearby)
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
@@ -186,6 +188,7 @@ class Node:
             deliver,
             rpc=self._rpc,
             workers=self.workers,
+            readers=self._readers,
             newest=newest,
             tcp_nodelay=tcp_nodelay,
             on_loop=on_loop,

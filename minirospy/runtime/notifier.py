@@ -65,6 +65,8 @@ class Notifier:
         self._publishers = publishers
         self._timeout = timeout
         self._rpc = AsyncRpcClient(nearby=nearby)
+        self.here: dict[str, Callable[[str, list[str]], object]] = {}
+        """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
         self._nodes: dict[str, _Node] = {}
         self._line = _Line(_CALLS_AT_ONCE)
         self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
@@ -125,13 +127,19 @@ class Notifier:
             self._pause(node)
             return
         notice, count = node.notices.pop(key), 0
+        line.under_way += 1
         if isinstance(notice, PublisherUpdate):
-            count, body = self._update(notice.topic)
+            publishers = self._publishers(notice.topic)
+            count = len(publishers)
+            if node.uri in self.here:
+                self.here[node.uri](notice.topic, publishers)
+                self._called(node, line, notice, count, b"")
+                return
+            body = self._update(notice.topic, publishers)
         elif isinstance(notice, ParameterUpdate):
             body = serialize_call("paramUpdate", [_MASTER, notice.key, notice.value])
         else:
             body = serialize_call("shutdown", [_MASTER, f"[{notice.name}] Reason: {notice.reason}"])
-        line.under_way += 1
         self._rpc.begin(node.uri, body, self._timeout, partial(self._called, node, line, notice, count))
 
     def _called(self, node: _Node, line: _Line, notice: Notice, count: int, answer: bytes | RpcError) -> None:
@@ -172,10 +180,9 @@ class Notifier:
         else:
             del self._nodes[node.uri]
 
-    def _update(self, topic: str) -> tuple[int, bytes]:
-        """How many publish a topic, and the call that tells of them."""
-        publishers = self._publishers(topic)
+    def _update(self, topic: str, publishers: list[str]) -> bytes:
+        """The call that tells of a topic's publishers."""
         if self._last[:2] != (topic, publishers):
             body = serialize_call("publisherUpdate", [_MASTER, topic, publishers])
             self._last = (topic, publishers, body)
-        return len(publishers), self._last[2]
+        return self._last[2]

@@ -6,7 +6,6 @@ http://wiki.ros.org/rosout.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from io import BytesIO
 from logging.handlers import RotatingFileHandler
@@ -38,8 +37,8 @@ _LOGGER_LEVELS = {
 class RosoutNode:
     """Runs on the loop of whoever starts it; a message is passed on as it came, bytes for bytes."""
 
-    def __init__(self, environment: Environment, log_file: Path) -> None:
-        self._node = Node("/rosout", environment)
+    def __init__(self, environment: Environment, log_file: Path | None) -> None:
+        self.node = Node("/rosout", environment)
         self._log_file = log_file
         self._handler: logging.Handler | None = None
         self._log_class: Any = None
@@ -50,22 +49,22 @@ class RosoutNode:
         from rosgraph_msgs.msg import Log
 
         self._log_class = Log
-        with contextlib.suppress(OSError):
+        if self._log_file:
             self._handler = RotatingFileHandler(
                 self._log_file, maxBytes=_LOG_BYTES, backupCount=3, encoding="utf-8", delay=True
             )
         type_ = InterfaceType(Log._type, Log._md5sum, Log._full_text)
-        await self._node.start()
+        await self.node.start()
         self._aggregated = Publication("/rosout_agg", type_, queue_size=1000)
-        await self._node.advertise(self._aggregated)
-        await self._node.subscribe(
-            self._node.make_subscription("/rosout", type_, self._on_message, on_loop=True)
+        await self.node.advertise(self._aggregated)
+        await self.node.subscribe(
+            self.node.make_subscription("/rosout", type_, self._on_message, on_loop=True)
         )
         await self._serve_loggers()
 
     async def close(self) -> None:
         """Leave the graph. Idempotent."""
-        await self._node.close()
+        await self.node.close()
         if self._handler:
             self._handler.close()
 
@@ -95,15 +94,15 @@ class RosoutNode:
         await self._serve("set_logger_level", SetLoggerLevel, set_level)
 
     async def _serve(self, name: str, class_: Any, handler: AsyncHandler) -> None:
-        await self._node.serve(
+        await self.node.serve(
             LoopServiceServer(
                 f"/rosout/{name}",
                 InterfaceType(class_._type, class_._md5sum),
-                self._node.name,
+                self.node.name,
                 handler,
                 request_type=class_._request_class._type,
                 response_type=class_._response_class._type,
-                workers=self._node.workers,
+                workers=self.node.workers,
             )
         )
 

@@ -8,10 +8,12 @@ import os
 import re
 import socket
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.runtime import local, tcp
+from minirospy.runtime.deadlines import Deadlines
 from minirospy.runtime.rpc_client import parse_http_uri
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
@@ -38,10 +40,10 @@ class AsyncRpcClient:
     def __init__(self, *, nearby: bool = True) -> None:
         """``nearby``: a Unix socket is tried first."""
         self.nearby = nearby
-        # Of each server, in the order of their last use: sockets, and when that was.
-        self._idle: dict[_Address, list[tuple[socket.socket, float]]] = {}
+        # Of each server, in the order of their last use.
+        self._idle: dict[_Address, list[_Connection]] = {}
         self._sweep: asyncio.TimerHandle | None = None
-        self.under_way: set[Call] = set()
+        self.under_way: Deadlines[Call] = Deadlines(Call.end_late)
         self.closed = False
 
     async def call(self, uri: str, method: str, *args: Any, timeout: float = 5.0) -> Any:
@@ -49,30 +51,18 @@ class AsyncRpcClient:
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError.
         """
-        return parse_response(await self.post(uri, serialize_call(method, args), timeout))
-
-    async def post(self, uri: str, body: bytes, timeout: float) -> bytes:
-        """The same for a call that is XML already, and its answer as XML."""
         answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
-
-        def done(found: bytes | RpcError) -> None:
-            if answer.done():
-                return
-            if isinstance(found, bytes):
-                answer.set_result(found)
-            else:
-                answer.set_exception(found)
-
-        call = self.begin(uri, body, timeout, done)
+        call = self.begin(uri, serialize_call(method, args), timeout, partial(_settle, answer))
         try:
-            return await answer
+            return parse_response(await answer)
         finally:
             call.cancel()
 
     def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[bytes | RpcError], None]) -> Call:
         """The same without a coroutine, which costs a master as much as all the rest of a call.
 
-        ``done`` is called on the loop, perhaps at once, with what :meth:`post` would return or raise.
+        ``body`` is the call as XML. ``done`` is called on the loop, perhaps at once, with the answer as XML, or with
+        what :meth:`call` would raise.
         """
         call = Call(self, uri, body, timeout, done)
         call.start()
@@ -85,51 +75,114 @@ class AsyncRpcClient:
             self._sweep.cancel()
             self._sweep = None
         for kept in self._idle.values():
-            for sock, _ in kept:
-                sock.close()
+            for connection in kept:
+                connection.close()
         self._idle.clear()
         for call in list(self.under_way):
             call.fail(EOFError("the client was closed"))
+        self.under_way.close()
 
-    def take(self, address: _Address) -> socket.socket | None:
+    def take(self, address: _Address) -> _Connection | None:
         """A kept connection."""
         kept = self._idle.get(address)
         if not kept:
             return None
-        sock, _ = kept.pop()
+        connection = kept.pop()
         if not kept:
             del self._idle[address]
-        return sock
+        return connection
 
-    def keep(self, sock: socket.socket, address: _Address) -> None:
+    def keep(self, connection: _Connection) -> None:
         """Keep a connection for the next call."""
         if self.closed:
-            sock.close()
+            connection.close()
             return
-        kept = self._idle.pop(address, [])
+        kept = self._idle.pop(connection.address, [])
         if len(kept) >= _KEEP_PER_SERVER:
-            kept.pop(0)[0].close()
-        loop = asyncio.get_running_loop()
-        kept.append((sock, loop.time()))
-        self._idle[address] = kept
+            kept.pop(0).close()
+        kept.append(connection)
+        self._idle[connection.address] = kept
         if len(self._idle) > _KEEP_AT_MOST:
-            for oldest, _ in self._idle.pop(next(iter(self._idle))):
+            for oldest in self._idle.pop(next(iter(self._idle))):
                 oldest.close()
+        loop = asyncio.get_running_loop()
+        connection.used = loop.time()
         if self._sweep is None:
             self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
 
+    def drop(self, connection: _Connection) -> None:
+        """A kept connection has ended."""
+        connection.close()
+        kept = self._idle[connection.address]
+        kept.remove(connection)
+        if not kept:
+            del self._idle[connection.address]
+
     def _close_idle(self) -> None:
-        """Close what was not used for a while: a peer that ended would leave its half of a connection here."""
+        """Close what was not used for a while: at the other end it may hold a thread."""
         loop = asyncio.get_running_loop()
         end = loop.time() - _KEEP_SECONDS / 2
-        for address, kept in list(self._idle.items()):
-            for sock, used in kept:
-                if used < end:
-                    sock.close()
-            kept[:] = [entry for entry in kept if entry[1] >= end]
-            if not kept:
-                del self._idle[address]
+        for connection in [each for kept in self._idle.values() for each in kept if each.used < end]:
+            self.drop(connection)
         self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle) if self._idle else None
+
+
+class _Connection:
+    """A connection to a server, for one call after the other; the loop watches it as long as it is open."""
+
+    __slots__ = ("_client", "_fd", "_is_watched", "_loop", "address", "call", "reader", "sock", "used")
+
+    def __init__(
+        self, client: AsyncRpcClient, loop: asyncio.AbstractEventLoop, sock: socket.socket, address: _Address
+    ) -> None:
+        self._client = client
+        self._loop = loop
+        self.sock = sock
+        self.address = address
+        # A number, since the loop makes a text of what it does not know yet.
+        self._fd = sock.fileno()
+        self.call: Call | None = None
+        self.reader = HttpReader()
+        self.used = 0.0
+        self._is_watched = False
+
+    def watch(self) -> None:
+        """Take what comes from now on. Idempotent."""
+        if not self._is_watched:
+            self._is_watched = True
+            self._loop.add_reader(self._fd, self._readable)
+
+    def write_on(self, function: Callable[[], None]) -> None:
+        """Call ``function`` when there is room to write."""
+        self._loop.add_writer(self._fd, function)
+
+    def stop_writing(self) -> None:
+        """Call it no more."""
+        self._loop.remove_writer(self._fd)
+
+    def close(self) -> None:
+        """Hang up."""
+        if self._is_watched:
+            self._loop.remove_reader(self._fd)
+        self.sock.close()
+
+    def _readable(self) -> None:
+        call = self.call
+        try:
+            data = self.sock.recv(_RECEIVE)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            if call:
+                call.broken(error)
+            else:
+                self._client.drop(self)
+            return
+        if call:
+            call.received(data)
+        else:
+            # Nothing was asked: it is the end.
+            self._client.drop(self)
 
 
 class Call:
@@ -143,17 +196,13 @@ class Call:
         "_address",
         "_client",
         "_connecting",
+        "_connection",
         "_done",
-        "_fd",
         "_is_kept",
         "_left",
         "_loop",
-        "_reader",
-        "_reading",
         "_request",
-        "_sock",
         "_timeout",
-        "_timer",
         "_uri",
         "_writing",
     )
@@ -173,13 +222,9 @@ class Call:
         self._loop = asyncio.get_running_loop()
         self._address: _Address = ("", 0)
         self._request = body
-        self._left = memoryview(body)
-        self._reader = HttpReader()
-        self._sock: socket.socket | None = None
-        # A number, since the loop makes a text of what it does not know yet.
-        self._fd = -1
-        self._is_kept = self._writing = self._reading = False
-        self._timer: asyncio.TimerHandle | None = None
+        self._left: bytes | memoryview = b""
+        self._connection: _Connection | None = None
+        self._is_kept = self._writing = False
         self._connecting: asyncio.Task[None] | None = None
 
     def start(self) -> None:
@@ -191,12 +236,12 @@ class Call:
             return
         self._address = (host, port)
         self._request = serialize_request(f"{host}:{port}", path, self._request)
-        self._client.under_way.add(self)
-        self._timer = self._loop.call_later(self._timeout, self.fail, TimeoutError("timed out"))
-        sock = self._client.take(self._address)
-        if sock:
+        client = self._client
+        client.under_way.set(self, self._timeout)
+        kept = client.take(self._address)
+        if kept:
             self._is_kept = True
-            self._use(sock)
+            self._use(kept)
             self._send()
         else:
             self._connect()
@@ -206,6 +251,10 @@ class Call:
         if self._done:
             self._done = None
             self._end()
+
+    def end_late(self) -> None:
+        """Give up: the time is up."""
+        self.fail(TimeoutError("timed out"))
 
     def fail(self, error: Exception) -> None:
         """Give up, and say why. Idempotent."""
@@ -217,12 +266,39 @@ class Call:
         unreachable.__cause__ = error
         self._finish(error if isinstance(error, RpcError) else unreachable)
 
+    def received(self, data: bytes) -> None:
+        """Bytes of the answer have come; b"" is the end."""
+        assert self._connection
+        reader = self._connection.reader
+        try:
+            if not data and reader.is_idle:
+                raise EOFError("the connection was closed without an answer")
+            messages = reader.feed(data)
+        except (EOFError, RpcProtocolError) as error:
+            self.broken(error)
+            return
+        if messages:
+            self._answered(messages[0], is_all=len(messages) == 1 and reader.is_idle)
+
+    def broken(self, error: Exception) -> None:
+        """This connection does not do: perhaps another one does."""
+        self._close()
+        if self._is_kept and isinstance(error, ConnectionError | EOFError):
+            # The peer closed it meanwhile: once more on a new one.
+            self._is_kept = False
+            self._connect()
+        elif isinstance(error, ConnectionRefusedError) and _literal(self._address[0]) != self._address[0]:
+            # "localhost" may be served at its IPv6 address alone.
+            self._look_up()
+        else:
+            self.fail(error)
+
     def _connect(self) -> None:
         """A new connection, at once where the host needs no looking up."""
         host, port = self._address
         near = local.reach(host, port) if self._client.nearby else None
         if near:
-            self._use(near)
+            self._use(self._connected_by(near))
             self._send()
             return
         literal = _literal(host)
@@ -236,19 +312,19 @@ class Call:
             self.fail(error)
             return
         sock.setblocking(False)
-        self._use(sock)
+        self._use(self._connected_by(sock))
         try:
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             number = sock.connect_ex((literal, port))
         except OSError as error:
-            self._broken(error)
+            self.broken(error)
             return
         if not number:
             self._send()
         elif number in _UNDER_WAY:
             self._send_early()
         else:
-            self._broken(OSError(number, os.strerror(number)))
+            self.broken(OSError(number, os.strerror(number)))
 
     def _look_up(self) -> None:
         async def connect() -> None:
@@ -257,98 +333,72 @@ class Call:
             except OSError as error:
                 self.fail(error)
             else:
-                self._use(sock)
+                self._use(self._connected_by(sock))
                 self._send()
 
         self._connecting = asyncio.ensure_future(connect())
 
-    def _use(self, sock: socket.socket) -> None:
-        self._sock = sock
-        self._fd = sock.fileno()
-        # A view: a Unix socket takes a large request in many pieces.
-        self._left = memoryview(self._request)
+    def _connected_by(self, sock: socket.socket) -> _Connection:
+        return _Connection(self._client, self._loop, sock, self._address)
+
+    def _use(self, connection: _Connection) -> None:
+        self._connection = connection
+        connection.call = self
+        self._left = self._request
 
     def _send_early(self) -> None:
         """A connection to this machine is made by now, although nobody has said so yet."""
-        assert self._sock
+        assert self._connection
         try:
-            sent = self._sock.send(self._left)
+            sent = self._connection.sock.send(self._left)
         except ConnectionError as error:
-            self._broken(error)
+            self.broken(error)
         except OSError:
             self._write_on(self._connected)
         else:
             self._sent(sent)
 
     def _connected(self) -> None:
-        assert self._sock
+        assert self._connection
         self._stop_writing()
-        number = self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        number = self._connection.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if number:
-            self._broken(OSError(number, os.strerror(number)))
+            self.broken(OSError(number, os.strerror(number)))
         else:
             self._send()
 
     def _send(self) -> None:
-        assert self._sock
+        assert self._connection
         try:
-            sent = self._sock.send(self._left)
+            sent = self._connection.sock.send(self._left)
         except (BlockingIOError, InterruptedError):
             sent = 0
         except OSError as error:
-            self._broken(error)
+            self.broken(error)
             return
         self._sent(sent)
 
     def _sent(self, count: int) -> None:
-        self._left = self._left[count:]
-        if self._left:
+        assert self._connection
+        if count < len(self._left):
+            # A view: a Unix socket takes a large request in many pieces.
+            self._left = memoryview(self._left)[count:]
             self._write_on(self._send)
         else:
+            self._left = b""
             self._stop_writing()
-            self._reading = True
-            self._loop.add_reader(self._fd, self._receive)
+            self._connection.watch()
 
-    def _receive(self) -> None:
-        assert self._sock
-        try:
-            data = self._sock.recv(_RECEIVE)
-            if not data and self._reader.is_idle:
-                raise EOFError("the connection was closed without an answer")
-            messages = self._reader.feed(data)
-        except (BlockingIOError, InterruptedError):
-            return
-        except (OSError, EOFError, RpcProtocolError) as error:
-            self._broken(error)
-            return
-        if messages:
-            self._answered(messages[0])
-
-    def _answered(self, message: HttpMessage) -> None:
-        sock = self._sock
-        assert sock
-        if message.keep_alive:
-            self._let_go()
-            self._sock = None
-            self._client.keep(sock, self._address)
+    def _answered(self, message: HttpMessage, *, is_all: bool) -> None:
+        connection = self._connection
+        assert connection
+        if message.keep_alive and is_all and not self._left:
+            connection.call = self._connection = None
+            self._client.keep(connection)
         if message.status == 200:
             self._finish(message.body)
         else:
             self._finish(RpcProtocolError(f"{self._uri} answered {message.start}"))
-
-    def _broken(self, error: Exception) -> None:
-        """This connection does not do: perhaps another one does."""
-        self._close()
-        if self._is_kept and isinstance(error, ConnectionError | EOFError):
-            # The peer closed it meanwhile: once more on a new one.
-            self._is_kept = False
-            self._reader = HttpReader()
-            self._connect()
-        elif isinstance(error, ConnectionRefusedError) and _literal(self._address[0]) != self._address[0]:
-            # "localhost" may be served at its IPv6 address alone.
-            self._look_up()
-        else:
-            self.fail(error)
 
     def _finish(self, found: bytes | RpcError) -> None:
         done, self._done = self._done, None
@@ -357,34 +407,37 @@ class Call:
             done(found)
 
     def _end(self) -> None:
-        self._client.under_way.discard(self)
-        if self._timer:
-            self._timer.cancel()
+        self._client.under_way.drop(self)
         if self._connecting:
             self._connecting.cancel()
         self._close()
 
     def _close(self) -> None:
-        if self._sock:
-            self._let_go()
-            self._sock.close()
-            self._sock = None
-
-    def _let_go(self) -> None:
-        self._stop_writing()
-        if self._reading:
-            self._reading = False
-            self._loop.remove_reader(self._fd)
+        if self._connection:
+            self._stop_writing()
+            self._connection.close()
+            self._connection = None
 
     def _write_on(self, function: Callable[[], None]) -> None:
         if not self._writing:
             self._writing = True
-            self._loop.add_writer(self._fd, function)
+            assert self._connection
+            self._connection.write_on(function)
 
     def _stop_writing(self) -> None:
         if self._writing:
             self._writing = False
-            self._loop.remove_writer(self._fd)
+            assert self._connection
+            self._connection.stop_writing()
+
+
+def _settle(answer: asyncio.Future[bytes], found: bytes | RpcError) -> None:
+    if answer.done():
+        return
+    if isinstance(found, bytes):
+        answer.set_result(found)
+    else:
+        answer.set_exception(found)
 
 
 def _parts(uri: str) -> tuple[str, int, str]:

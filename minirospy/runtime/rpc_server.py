@@ -21,6 +21,7 @@ from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.deadlines import Deadlines
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
 from minirospy.wire.xmlrpc import parse_call, serialize_fault
 from minirospy.wire.xmlrpc import serialize_response as serialize_value
@@ -106,9 +107,8 @@ class RpcServer:
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._listening: list[socket.socket] = []
-        # Until when a request has to be whole, or an answer taken; idle connections are not in here.
-        self._deadlines: dict[_Connection, float] = {}
-        self._sweep: asyncio.TimerHandle | None = None
+        self.deadlines: Deadlines[_Connection] = Deadlines(_Connection.end)
+        """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
         self._complaints = Complaints(_log)
         self._strangers = Complaints(_log, 10)
 
@@ -143,32 +143,9 @@ class RpcServer:
             sock.close()
         for connection in list(self.connections):
             connection.end()
-        if self._sweep:
-            self._sweep.cancel()
+        self.deadlines.close()
         self._complaints.close()
         self._strangers.close()
-
-    def limit(self, connection: _Connection, seconds: float) -> None:
-        """Hang up on ``connection`` after so long."""
-        loop = asyncio.get_running_loop()
-        end = self._deadlines[connection] = loop.time() + seconds
-        if self._sweep is None or end < self._sweep.when():
-            if self._sweep:
-                self._sweep.cancel()
-            self._sweep = loop.call_at(end, self._end_late)
-
-    def unlimit(self, connection: _Connection) -> None:
-        """It has done what it had to do in time. Idempotent."""
-        self._deadlines.pop(connection, None)
-
-    def _end_late(self) -> None:
-        self._sweep = None
-        loop = asyncio.get_running_loop()
-        now = loop.time()
-        for connection in [each for each, end in self._deadlines.items() if end <= now]:
-            connection.end()
-        if self._deadlines:
-            self._sweep = loop.call_at(min(self._deadlines.values()), self._end_late)
 
     def _watch(self, sock: socket.socket) -> None:
         self._listening.append(sock)
@@ -206,7 +183,10 @@ class RpcServer:
             return
         if self._most is not None and len(self.connections) >= self._most:
             self._end_longest_silent()
-        self.connections[_Connection(self, peer, loop)] = None
+        connection = _Connection(self, peer, loop)
+        self.connections[connection] = None
+        # Who connects has something to say: mostly its first request is there by now.
+        connection.readable()
 
     def tell_refusal(self, sock: socket.socket, why: str) -> None:
         """Log that a request was refused; a flood of them is summed up."""
@@ -268,7 +248,7 @@ class _Connection:
         self._moved = 0
         self._task: asyncio.Task[None] | None = None
         self._held = 0
-        loop.add_reader(self._fd, self._readable)
+        loop.add_reader(self._fd, self.readable)
 
     @property
     def is_idle(self) -> bool:
@@ -287,7 +267,7 @@ class _Connection:
         self._server.connections.pop(self, None)
         self._hold(0)
         self._waiting.clear()
-        self._server.unlimit(self)
+        self._server.deadlines.drop(self)
         if self._task:
             self._task.cancel()
 
@@ -307,7 +287,7 @@ class _Connection:
                 self._write(self._reader.continue_line())
         if self._has_deadline and messages:
             self._has_deadline = False
-            self._server.unlimit(self)
+            self._server.deadlines.drop(self)
         self._moved += len(data)
         self._waiting += messages
         self._answer_waiting()
@@ -322,7 +302,8 @@ class _Connection:
         except OSError:
             return b""
 
-    def _readable(self) -> None:
+    def readable(self) -> None:
+        """There may be something to read."""
         data = self._receive()
         if data is None:
             return
@@ -359,7 +340,7 @@ class _Connection:
     def _go_on(self) -> None:
         if self._state is _BUSY:
             self._state = _OPEN
-            self._loop.add_reader(self._fd, self._readable)
+            self._loop.add_reader(self._fd, self.readable)
             self._answer_waiting()
             self._set_deadline()
 
@@ -410,7 +391,7 @@ class _Connection:
         self._server.tell_refusal(self._sock, text)
         self._write(serialize_error(status, text))
         if self._state is _FULL:
-            self._loop.add_reader(self._fd, self._readable)
+            self._loop.add_reader(self._fd, self.readable)
         if self._state in (_OPEN, _FULL):
             self._state = _REFUSED
             if not self._out:
@@ -470,7 +451,7 @@ class _Connection:
         else:
             if self._state is _FULL:
                 self._state = _OPEN
-                self._loop.add_reader(self._fd, self._readable)
+                self._loop.add_reader(self._fd, self.readable)
             self._answer_waiting()
             self._set_deadline()
 
@@ -490,12 +471,12 @@ class _Connection:
                 self._limit(_REQUEST_SECONDS)
         elif self._has_deadline and self._state is not _REFUSED:
             self._has_deadline = False
-            self._server.unlimit(self)
+            self._server.deadlines.drop(self)
 
     def _limit(self, seconds: float) -> None:
         self._has_deadline = True
         self._moved = 0
-        self._server.limit(self, seconds)
+        self._server.deadlines.set(self, seconds)
 
 
 def is_address_in_use(error: OSError) -> bool:

@@ -13,7 +13,9 @@ from minirospy.errors import RpcFault
 from minirospy.runtime.local import PROTOCOL
 
 if TYPE_CHECKING:
+    from minirospy.runtime.links import OutLink
     from minirospy.runtime.node import Node
+    from minirospy.runtime.topics import InLink
 
 __all__ = ["SlaveApi"]
 
@@ -94,14 +96,11 @@ class SlaveApi:
         port = self._node.tcpros_port
         for publication in self._node.publications.values():
             for out in publication.links:
-                what = f"{out.transport} connection on port {port} to [{out.address} on socket {out.number}]"
+                what = _connection_text(out, port)
                 rows.append([out.number, out.peer, "o", out.transport, publication.topic, True, what])
         for subscription in self._node.subscriptions.values():
             for link in subscription.links:
-                what = (
-                    f"{link.transport} connection on port {link.local_port} to "
-                    f"[{link.address} on socket {link.number}]"
-                )
+                what = _connection_text(link, link.local_port)
                 rows.append([link.number, link.uri, "i", link.transport, subscription.topic, True, what])
         return [_SUCCESS, "bus info", rows]
 
@@ -178,3 +177,9 @@ def _text(value: object, what: str) -> str:
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
     return value
+
+
+def _connection_text(link: InLink | OutLink, port: int) -> str:
+    """A connection in the words of which `rosnode info` shows the numbers; of a Unix socket, which has no port, none."""
+    on = f" on port {port}" if link.transport == "TCPROS" else ""
+    return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

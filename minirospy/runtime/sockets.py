@@ -6,8 +6,10 @@ import contextlib
 import os
 import select
 import socket
+import struct
 import sys
 import time
+from typing import NamedTuple
 
 __all__ = [
     "EXPECTED_SECONDS",
@@ -16,6 +18,10 @@ __all__ = [
     "expect_answer",
     "hang_up",
     "is_readable",
+    "is_writable",
+    "may_expect",
+    "peer",
+    "receive_awake",
     "resolvable",
     "tune",
 ]
@@ -31,6 +37,17 @@ EXPECTED_SECONDS = 0.0002
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between questions, questions. macOS calls the first TCP_KEEPALIVE."""
+
+
+_PEER = struct.Struct("iII")
+
+
+class Peer(NamedTuple):
+    """The numbers of a process, its user and its group."""
+
+    process: int
+    user: int
+    group: int
 
 
 def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
@@ -60,6 +77,11 @@ def resolvable(host: str) -> bytes:
         raise OSError(f"'{host}' is no name of a machine") from error
 
 
+def peer(sock: socket.socket) -> Peer:
+    """Who has connected this Unix socket, or listened for it. Linux only."""
+    return Peer(*_PEER.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)))
+
+
 def hang_up(sock: socket.socket) -> None:
     """End a connection; a thread that is blocked in a read of it wakes up and closes it."""
     with contextlib.suppress(OSError):
@@ -76,31 +98,53 @@ def is_readable(sock: socket.socket) -> bool:
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
     """Whether the socket takes something within so long; for most of the time a look, see expect_answer."""
     if hasattr(select, "poll"):
-        return _expect(sock, select.POLLOUT) or bool(_poll(sock, select.POLLOUT).poll(milliseconds))
+        return (may_expect(sock) and _expect(sock, select.POLLOUT)) or bool(
+            _poll(sock, select.POLLOUT).poll(milliseconds)
+        )
     return bool(select.select([], [sock], [], milliseconds / 1000)[1])
 
 
 def expect_answer(sock: socket.socket) -> None:
-    """Wait for what a process of this machine answers, a fifth of a millisecond at most, without falling asleep.
+    """Wait for what another process answers, a fifth of a millisecond at most, without falling asleep.
 
-    To be woken takes as long as such a call. The processor is offered to others meanwhile: the peer may need it. A
-    socket of TCP is left as it is.
+    To be woken takes as long as such a call. The processor is offered to others meanwhile: the peer may need it. Does
+    nothing with a socket that may not be waited for so.
     """
-    if hasattr(select, "poll"):
+    if may_expect(sock):
         _expect(sock, select.POLLIN)
 
 
+def may_expect(sock: socket.socket) -> bool:
+    """Whether the peer is another process of this machine, at a Unix socket; one of this process needs the interpreter."""
+    return sys.platform == "linux" and sock.family == socket.AF_UNIX and peer(sock).process != os.getpid()
+
+
+def receive_awake(sock: socket.socket, space: memoryview) -> int:
+    """Receive what another process sends within a fifth of a millisecond, without falling asleep.
+
+    For a socket of which ``may_expect`` is true. Raises BlockingIOError where nothing comes, OSError.
+    """
+    end = time.perf_counter() + EXPECTED_SECONDS
+    while True:
+        os.sched_yield()
+        try:
+            return sock.recv_into(space, 0, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            if time.perf_counter() > end:
+                raise
+
+
 def _expect(sock: socket.socket, events: int) -> bool:
-    """Look for the events for a fifth of a millisecond; False where they do not come, or it is a socket of TCP."""
-    if sys.platform != "linux" or sock.family in FAMILIES:
-        return False
+    """Look for the events for a fifth of a millisecond; whether they have come."""
     poll = _poll(sock, events)
     end = time.perf_counter() + EXPECTED_SECONDS
-    while not poll.poll(0):
+    while True:
+        # First, since the peer may wait for this processor.
+        os.sched_yield()
+        if poll.poll(0):
+            return True
         if time.perf_counter() > end:
             return False
-        os.sched_yield()
-    return True
 
 
 def _poll(sock: socket.socket, events: int) -> select.poll:

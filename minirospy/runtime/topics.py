@@ -18,7 +18,8 @@ from minirospy.environment import split_uri
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime import local, sockets, tcp
-from minirospy.runtime.links import OutLink, read_frames, watch_frames
+from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.links import OutLink, Readers, read_frames, watch_frames
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
@@ -40,6 +41,9 @@ _SETTLE_SECONDS = 10.0
 
 _TELL_AFTER = 3
 """A publisher that refuses is told of at this failure: one that just leaves has left by then."""
+
+_REFUSALS_TOLD = 10
+"""Of publishers that answer nonsense, before they are summed up."""
 
 _WORKED_SECONDS = 5.0
 """A link that lived so long, or brought a message, was a good one."""
@@ -198,6 +202,7 @@ class Subscription:
         *,
         rpc: AsyncRpcClient,
         workers: Workers,
+        readers: Readers,
         newest: int = 0,
         tcp_nodelay: bool = False,
         on_loop: bool = False,
@@ -214,11 +219,14 @@ class Subscription:
         self._deliver = deliver
         self._rpc = rpc
         self._workers = workers
+        self._readers = readers
         self._on_loop = on_loop
         self._plan = SubscriptionPlan()
         self._named: list[str] = []
         self._settling: asyncio.TimerHandle | None = None
         self._told: set[str] = set()
+        # /rosout has as many publishers as there are nodes.
+        self._complaints = Complaints(_log, _REFUSALS_TOLD)
         self._connecting: dict[str, asyncio.Task[None]] = {}
         self.on_connected: list[Callable[[], object]] = []
         """Called on the loop when a publisher is connected."""
@@ -248,6 +256,7 @@ class Subscription:
     def close(self) -> None:
         """End all links (on the loop)."""
         self._closed = True
+        self._complaints.close()
         if self._settling:
             self._settling.cancel()
         for task in self._connecting.values():
@@ -296,7 +305,7 @@ class Subscription:
             _log.warning("publisher %s of %s refused the connection: %s", uri, self.topic, error)
             self._plan.refused(uri)
         except _NoPublisher as error:
-            _log.warning("no connection for %s: %s", self.topic, error)
+            self._complaints.warning("no connection for %s: %s", self.topic, error)
         except (RpcError, WireError, OSError) as error:
             self._retry(uri, error)
         else:
@@ -374,6 +383,7 @@ class Subscription:
                 link.sock,
                 on_latched_frame if header.get("latching") == "1" else on_frame,
                 self,
+                self._readers,
             )
         except (OSError, WireError) as error:
             link.fault = error

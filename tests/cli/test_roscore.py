@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from minirospy.cli.master import main, roscore
+from minirospy.cli.rostopic import main as rostopic
 from minirospy.runtime.master_proxy import MasterProxy
 
 BIN = Path(sys.executable).parent
@@ -39,7 +40,7 @@ class Core:
         """End it; what it still said."""
         if self.process.poll() is None:
             self.process.send_signal(number)
-        return self.process.communicate(timeout=10)[0]
+        return self.process.communicate(timeout=30)[0]
 
 
 Start = Callable[..., Core]
@@ -113,8 +114,42 @@ def test_a_shutdown_call_is_one_too(start: Start) -> None:
     master = proxy()
     master.call("shutdown", "enough")
     master.close()
-    assert core.process.wait(10) == 0
+    assert core.process.wait(30) == 0
     assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
+
+
+def test_folders_that_cannot_be_made(start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It runs without them, and says so: a line for the logs, a line for the journal."""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
+    monkeypatch.delenv("ROS_LOG_DIR")
+    core = start()
+    master = proxy()
+    run_id = master.get_param("/run_id")
+    assert (
+        f"WARNING: cannot write logs to {tmp_path}/file/log/{run_id}: Not a directory; set ROS_LOG_DIR\n"
+        in core.said
+    )
+    assert ", no log file\n" in core.said
+    assert f"{tmp_path}/file/master/journal-" in core.said
+    assert " cannot be written: Not a directory; set ROS_HOME\n" in core.said
+    assert "Errno" not in core.said
+    assert f"setting /run_id to {run_id}\n" in core.said
+    # The /rosout node hears what is logged, and does not stumble over its file.
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.2)
+    assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
+    master.close()
+    assert core.end() == "master stopped\n"
+
+
+def test_the_address_of_another_network(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_HOSTNAME")
+    for address, is_ours in (("203.0.113.9", False), ("127.0.0.1", True)):
+        monkeypatch.setenv("ROS_IP", address)
+        core = start()
+        warning = f"WARNING: ROS_IP={address} is no address of this machine: right only behind NAT or in a container"
+        assert (warning in core.said) != is_ours
+        core.end()
 
 
 def test_the_log_folder(start: Start) -> None:
@@ -221,5 +256,5 @@ def test_a_reader_that_has_gone_does_not_hurt_the_master(start: Start) -> None:
     assert {"/t0", "/t1", "/t2"} <= set(proxy.get_system_state().publishers)
     proxy.close()
     core.process.send_signal(signal.SIGTERM)
-    assert core.process.wait(10) == 0
+    assert core.process.wait(30) == 0
     core.process.stdout = None

@@ -22,7 +22,7 @@ gate = threading.Event()
 
 def slow(request):
     print("called", flush=True)
-    gate.wait(20)
+    gate.wait(30)
     return True, "late"
 
 rospy.init_node(sys.argv[1])
@@ -109,7 +109,7 @@ def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
             assert hear(client) == name
         say(server, "rospy.signal_shutdown('end')")
         say(server, "sys.exit()")
-        server.wait(10)
+        server.wait(30)
         say(client)
         assert hear(client) == "service [/s] unavailable"
 
@@ -140,7 +140,7 @@ def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
     assert hear(server) == "called"
     say(client)
     assert hear(client) == "node shutdown interrupted service call"
-    assert client.wait(5) == 0
+    assert client.wait(30) == 0
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
@@ -154,7 +154,7 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
         f"{key}={value}".encode() for key, value in (("callerid", "/me"), ("md5sum", "*"), ("service", "/s"))
     ]
     header = b"".join(struct.pack("<I", len(pair)) + pair for pair in pairs)
-    with socket.create_connection((host, int(port)), 5) as sock, sock.makefile("rb") as answer:
+    with socket.create_connection((host, int(port)), 30) as sock, sock.makefile("rb") as answer:
         sock.sendall(struct.pack("<I", len(header)) + header)
         answer.read(struct.unpack("<I", answer.read(4))[0])
         sock.sendall(struct.pack("<I", 0))

@@ -144,7 +144,7 @@ def test_reading_ends_at_a_length_over_the_limit(pair: tuple[socket.socket, sock
     pair[1].sendall(serialize_frame(b"good") + b"\xff\xff\xff\xff")
     bodies: list[bytes] = []
     with pytest.raises(WireError, match="over the limit"):
-        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0))
+        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0), links.Readers())
     assert bodies == [b"good"]
     assert pair[0].fileno() == -1
 
@@ -153,7 +153,7 @@ def test_reading_ends_with_half_a_frame(pair: tuple[socket.socket, socket.socket
     pair[1].sendall(serialize_frame(b"whole") + b"\x05\0\0\0ab")
     pair[1].close()
     bodies: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0))
+    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0), links.Readers())
     assert bodies == [b"whole"]
 
 
@@ -164,48 +164,56 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
     pair[1].sendall(b"".join(serialize_frame(bytes([number])) for number in range(10)))
     pair[1].close()
     bodies: list[int] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), Keeps(newest))
+    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), Keeps(newest), links.Readers())
     assert bodies == expected
 
 
-@pytest.mark.parametrize(("seconds", "looks"), [(60.0, 2), (0.0, 0)])
+@pytest.mark.parametrize(
+    ("seconds", "is_alone", "looks"), [(60.0, True, 2), (60.0, False, 0), (0.0, True, 0)]
+)
 def test_a_reader_stays_awake_where_messages_come_quickly(
-    monkeypatch: pytest.MonkeyPatch, seconds: float, looks: int
+    monkeypatch: pytest.MonkeyPatch, seconds: float, is_alone: bool, looks: int
 ) -> None:
-    """``seconds``: how long a wait may last to be a short one. The first one is never waited for awake."""
+    """``seconds``: how long a wait may last to be a short one. The first one is never waited for awake.
+
+    ``is_alone``: whether no other reader of the node has read meanwhile.
+    """
     one, other = socket.socketpair()
     looked = 0
 
-    def answer(_: socket.socket) -> None:
+    def receive_awake(sock: socket.socket, space: memoryview) -> int:
         nonlocal looked
         looked += 1
         if looked == 1:
             other.sendall(serialize_frame(b"second"))
         else:
             other.close()
+        return sock.recv_into(space)
 
     def deliver(frame: Frame) -> None:
         bodies.append(bytes(frame))
+        if not is_alone:
+            readers.last = "another"
         if not looks:
             other.close()
 
     monkeypatch.setattr(links, "EXPECTED_SECONDS", seconds)
-    monkeypatch.setattr(links, "expect_answer", answer)
+    monkeypatch.setattr(links, "may_expect", lambda _: True)
+    monkeypatch.setattr(links, "receive_awake", receive_awake)
     bodies: list[bytes] = []
+    readers = links.Readers()
     waiting = threading.Event()
 
     class Waiting(socket.socket):
         def recv_into(self, buffer: Any, nbytes: int = 0, flags: int = 0) -> int:
-            if not flags:
-                waiting.set()
+            waiting.set()
             return super().recv_into(buffer, nbytes, flags)
 
     with other:
         reader = threading.Thread(
-            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, Keeps(0))
+            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, Keeps(0), readers)
         )
         reader.start()
-        # Only what was waited for tells how long the waits are.
         assert waiting.wait(60)
         other.sendall(serialize_frame(b"first"))
         reader.join(60)
@@ -238,6 +246,7 @@ def read_in_thread(sock: socket.socket, frames: list[Frame], newest: int = 0) ->
             sock,
             lambda frame: frames.append(frame if isinstance(frame, bytes) else bytes(frame)),
             Keeps(newest),
+            links.Readers(),
         ),
     )
     thread.start()
@@ -329,7 +338,7 @@ def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
     pair[1].sendall(serialize_frame(b"whole") + begin)
     pair[1].close()
     frames: list[Frame] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(0))
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(0), links.Readers())
     assert frames == [b"whole"]
 
 
@@ -350,7 +359,7 @@ def test_split_frames_that_lie(
     sender = threading.Thread(target=pair[1].sendall, args=(data,))
     sender.start()
     with pytest.raises(WireError, match=words):
-        links.read_frames(pair[0], lambda _: None, Keeps(0))
+        links.read_frames(pair[0], lambda _: None, Keeps(0), links.Readers())
     sender.join(30)
 
 
@@ -363,10 +372,14 @@ def test_no_memory_for_a_message_ends_the_link_with_a_line() -> None:
         return 4
 
     sock: Any = SimpleNamespace(
-        setblocking=lambda _: None, recv=receive, recv_into=receive_into, close=lambda: None
+        family=socket.AF_INET,
+        setblocking=lambda _: None,
+        recv=receive,
+        recv_into=receive_into,
+        close=lambda: None,
     )
     with pytest.raises(WireError, match="no memory for a message of 536870912 bytes"):
-        links.read_frames(sock, lambda _: None, Keeps(0))
+        links.read_frames(sock, lambda _: None, Keeps(0), links.Readers())
 
 
 def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> None:
@@ -375,7 +388,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
     sender = threading.Thread(target=lambda: (pair[1].sendall(data), pair[1].close()))
     sender.start()
     frames: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(1))
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(1), links.Readers())
     sender.join(30)
     assert frames[-1] == joined(image(bytes([2]) * CHUNK))
 

@@ -130,7 +130,7 @@ class Slave:
         return [1, "", 0]
 
     def next(self) -> tuple[Any, ...]:
-        return self.called.get(timeout=5)
+        return self.called.get(timeout=30)
 
     def all_until_quiet(self) -> list[tuple[Any, ...]]:
         """For recording alone: what comes within half a second."""

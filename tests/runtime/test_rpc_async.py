@@ -12,6 +12,7 @@ import pytest
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
+from minirospy.runtime.deadlines import Deadlines
 from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_client import RpcClient
@@ -22,7 +23,7 @@ CALL = serialize_call("getPid", ["/x"])
 
 
 def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    asyncio.run(asyncio.wait_for(test(), 20))
+    asyncio.run(asyncio.wait_for(test(), 30))
 
 
 async def until(condition: Callable[[], object]) -> None:
@@ -232,5 +233,86 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
         assert notifier._line.under_way + notifier._suspect_line.under_way <= 1
         await notifier.close()
         await server.close()
+
+    run(test)
+
+
+def test_a_kept_connection_ends_with_its_server() -> None:
+    async def test() -> None:
+        client, server = AsyncRpcClient(nearby=False), RpcServer(lambda *_: 5)
+        await server.start()
+        await client.call(f"http://127.0.0.1:{server.port}/", "a")
+        await until(lambda: client._idle)
+        await server.close()
+        # At once, not when it was idle for long.
+        await asyncio.wait_for(until(lambda: not client._idle), 5.0)
+        await client.close()
+
+    run(test)
+
+
+def test_what_a_server_says_unasked_is_nobodys_answer() -> None:
+    body = b"<methodResponse><params><param><value>%d</value></param></params></methodResponse>"
+    calls = 0
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        nonlocal calls
+        while await reader.readuntil(b"</methodCall>\n"):
+            calls += 1
+            one = body % calls
+            answer = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (len(one), one)
+            writer.write(answer + answer[:-5])
+
+    async def test() -> None:
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        client = AsyncRpcClient()
+        uri = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/"
+        assert [await client.call(uri, "a") for _ in range(3)] == ["1", "2", "3"]
+        await client.close()
+        server.close()
+
+    run(test)
+
+
+def test_a_node_on_the_loop_is_told_without_a_call() -> None:
+    async def test() -> None:
+        told: list[tuple[float, str, int]] = []
+        loop = asyncio.get_running_loop()
+        notifier = Notifier(lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1), 5.0)
+        # Nobody listens there.
+        notifier.here["http://127.0.0.1:9/"] = lambda topic, uris: told.append(
+            (loop.time(), topic, len(uris))
+        )
+        for topic in ("/many", "/few", "/few", "/many"):
+            notifier.send(PublisherUpdate("http://127.0.0.1:9/", topic))
+        await until(lambda: len(told) == 2)
+        notifier.send(PublisherUpdate("http://127.0.0.1:9/", "/many"))
+        await until(lambda: not notifier._nodes)
+        assert [(topic, count) for _, topic, count in told] == [("/many", 1000), ("/few", 1), ("/many", 1000)]
+        assert told[2][0] - told[0][0] > 0.05
+        assert not notifier._line.under_way
+        await notifier.close()
+
+    run(test)
+
+
+def test_deadlines_are_kept_with_one_timer() -> None:
+    async def test() -> None:
+        late: list[str] = []
+        deadlines: Deadlines[str] = Deadlines(late.append)
+        begin = asyncio.get_running_loop().time()
+        deadlines.set("long", 60.0)
+        deadlines.set("third", 0.05)
+        deadlines.set("first", 0.01)
+        deadlines.set("in time", 0.01)
+        deadlines.set("second", 0.01)
+        deadlines.set("second", 0.03)
+        deadlines.drop("in time")
+        assert deadlines.get("in time") is None
+        await until(lambda: len(late) == 3)
+        assert late == ["first", "second", "third"]
+        assert asyncio.get_running_loop().time() - begin >= 0.05
+        assert list(deadlines) == ["long"]
+        deadlines.close()
 
     run(test)

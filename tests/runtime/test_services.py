@@ -46,7 +46,7 @@ def scene(master: str) -> Iterator[Scene]:
     def handle(request: memoryview, _: object) -> bytes:
         if bytes(request) == b"wait":
             called.set()
-            gate.wait(10)
+            gate.wait(30)
         if bytes(request) == b"fail":
             raise ServiceException("zażółć")
         return bytes(request)[::-1]
@@ -122,12 +122,12 @@ def test_closing_hangs_up_on_those_that_wait_for_nothing(scene: Scene, service: 
     answers: list[bytes] = []
     calling = threading.Thread(target=lambda: answers.append(busy.call(b"wait")))
     calling.start()
-    assert scene.called.wait(10)
+    assert scene.called.wait(30)
     scene.run(scene.node.unserve(scene.node.services[service]))
     with pytest.raises((WireError, OSError)):
         idle.call(b"ab")
     scene.gate.set()
-    calling.join(10)
+    calling.join(30)
     assert len(answers) == 1
     with pytest.raises((WireError, OSError)):
         busy.call(b"ab")
@@ -148,9 +148,9 @@ def test_hang_up_ends_a_call_of_another_thread(scene: Scene) -> None:
 
     calling = threading.Thread(target=call)
     calling.start()
-    assert scene.called.wait(10)
+    assert scene.called.wait(30)
     client.hang_up()
-    calling.join(10)
+    calling.join(30)
     assert "unable to receive data from sender" in str(errors[0])
     client.close()
 
@@ -189,7 +189,7 @@ def liar() -> Iterator[Serve]:
 
     yield serve
     for thread in threads:
-        thread.join(10)
+        thread.join(30)
 
 
 @pytest.mark.parametrize(

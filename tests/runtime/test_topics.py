@@ -278,7 +278,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
     def slow(frame: memoryview, _header: Header) -> None:
         bodies.append(bytes(frame[:4]))
         begun.set()
-        go_on.wait(10)
+        go_on.wait(30)
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -370,7 +370,7 @@ def test_who_has_the_header_misses_nothing_that_is_published_from_then_on(*, lat
         )
         for number in range(rounds):
             with socket.create_connection(("127.0.0.1", port)) as sock, sock.makefile("rb") as stream:
-                sock.settimeout(5)
+                sock.settimeout(30)
                 sock.sendall(header)
                 (length,) = struct.unpack("<I", stream.read(4))
                 stream.read(length)
@@ -514,6 +514,29 @@ def test_nodes_meet_over_ipv6() -> None:
             await master.close()
 
     run(scene)
+
+
+def test_many_publishers_that_answer_nonsense_are_summed_up(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def answer(uri: str, *_: object) -> object:
+        return [1, "", uri]
+
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            subscription = a.make_subscription("/t", STRING, Box())
+            monkeypatch.setattr(subscription._rpc, "call", answer)
+            subscription.publishers_changed(f"http://127.0.0.1:{port}/" for port in range(1, 101))
+            await eventually(lambda: not subscription._connecting)
+            subscription.close()
+
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.topics"]
+    assert len(lines) == 11
+    assert lines[0].startswith(
+        "no connection for /t: http://127.0.0.1:1/ answered requestTopic for /t with [1, "
+    )
+    assert lines[-1] == "90 more like the last ones"
 
 
 @pytest.mark.usefixtures("transport")

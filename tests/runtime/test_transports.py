@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import functools
 import os
@@ -11,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -23,12 +25,13 @@ from minirospy.runtime.node import Node
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.service_client import ServiceClient
+from minirospy.runtime.service_client import ANSWER, ServiceClient
 from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.slave import SlaveApi
 from minirospy.runtime.tcp import Listener
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
-from minirospy.wire.header import Header
+from minirospy.wire.header import Header, serialize_header
+from minirospy.wire.tcpros import InterfaceType, service_client_header
 from tests.runtime.test_topics import STRING, Box, eventually, graph, listen, publish, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="abstract Unix sockets are Linux'")
@@ -173,14 +176,21 @@ def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.Monkey
     monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
     one, other = socket.socketpair()
     with one, other:
+        sockets.expect_answer(one)  # of this process
+        assert turns == 0
+        monkeypatch.setattr(sockets, "peer", lambda _: sockets.Peer(process=0, user=0, group=0))
         sockets.expect_answer(one)
         assert (turns, one.recv(1)) == (3, b"x")
         monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 0.0)
         sockets.expect_answer(one)  # nobody answers
+        assert turns == 4
+        with pytest.raises(BlockingIOError):
+            sockets.receive_awake(one, memoryview(bytearray(1)))
+        assert turns == 5
     with socket.socket() as tcp:
         monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
         sockets.expect_answer(tcp)
-    assert turns == 3
+    assert turns == 5
 
 
 @pytest.mark.parametrize("uri", ["http://localhost:{}", "http://127.0.0.1:{}/", "http://LocalHost:{}"])
@@ -499,3 +509,71 @@ def test_the_environment_names_a_transport_that_there_is() -> None:
     assert Environment.read({"MINIROSPY_TRANSPORT": "TCP"}).transport == "tcp"
     with pytest.raises(UsageError, match=r"MINIROSPY_TRANSPORT \[shm\] is neither 'tcp' nor 'auto'"):
         Environment.read({"MINIROSPY_TRANSPORT": "shm"})
+
+
+def _received_before_the_header(sock: socket.socket) -> bytes:
+    """What a client of "/s" sends behind its header before it gets one, within a moment or the request's length."""
+    header = serialize_header(service_client_header("/s", "*", "/c"))
+    got = b""
+    sock.settimeout(0.2)
+    with contextlib.suppress(TimeoutError):
+        while len(got) < len(header) + 9:
+            got += sock.recv(1000)
+    assert got.startswith(header)
+    return got.removeprefix(header)
+
+
+@pytest.mark.parametrize(("family", "ahead"), [(socket.AF_UNIX, b"\5\0\0\0hello"), (socket.AF_INET, b"")])
+def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(family: int, ahead: bytes) -> None:
+    """A server of rospy may lose what comes with the header."""
+    with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as closing:
+        listening, port = server, server.getsockname()[1]
+        if family == socket.AF_UNIX:
+            beside = local.bind("127.0.0.1", port)
+            assert beside
+            listening = closing.enter_context(beside)
+            listening.setblocking(True)
+            listening.listen()
+
+        def serve() -> bytes:
+            with listening.accept()[0] as sock:
+                before = _received_before_the_header(sock)
+                sock.sendall(serialize_header({"callerid": "/s", "md5sum": "*", "type": "a/B"}))
+                sock.settimeout(10)
+                request = before or sock.recv(1000)
+                # An answer that comes with the header, or right behind it, is found.
+                sock.sendall(ANSWER.pack(1, len(request)) + request)
+            return before
+
+        with ThreadPoolExecutor() as pool:
+            served = pool.submit(serve)
+            client = ServiceClient(f"rosrpc://127.0.0.1:{port}", "/s", "*", "/c", waits=False)
+            client.finish(b"hello")
+            assert client.call(b"hello") == b"\5\0\0\0hello"
+            client.close()
+            assert served.result(10) == ahead
+
+
+def test_a_request_that_went_ahead_is_sent_once_and_the_next_one_too() -> None:
+    async def scene() -> None:
+        async with graph("/a") as (_, (a,)):
+            got: list[bytes] = []
+
+            def handle(request: memoryview, _: Header) -> bytes:
+                got.append(bytes(request))
+                return bytes(request)[::-1]
+
+            type_ = InterfaceType("a/B", "0" * 32)
+            await a.serve(a.make_service("/s", type_, handle, request_type="a/Q", response_type="a/R"))
+
+            def calls() -> None:
+                client = ServiceClient(a.service_uri, "/s", "*", "/c", persistent=True, waits=False)
+                client.finish(b"")
+                assert client.call(b"") == b""
+                assert client.call(b"abc") == b"cba"
+                client.close()
+
+            await asyncio.to_thread(calls)
+            assert got == [b"", b"abc"]
+
+    run(scene)
