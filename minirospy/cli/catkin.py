@@ -10,6 +10,7 @@ import argparse
 import getpass
 import json
 import re
+import shlex
 import shutil
 import sys
 from collections.abc import Collection, Mapping, Sequence
@@ -17,7 +18,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.command import INTERRUPTED, Parser, run, warn
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import BuildError, NotFoundError, UsageError
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans, write_set_up
@@ -36,12 +37,13 @@ catkin_workspace()
 
 def catkin_make(argv: Sequence[str] | None = None) -> int:
     """catkin_make; its exit status."""
-    return run("catkin_make", lambda: _catkin_make("catkin_make", argv, ""))
+    return run("catkin_make", lambda: _catkin_make("catkin_make", argv, ""), INTERRUPTED)
 
 
 def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
     """catkin_make_isolated; its exit status."""
-    return run("catkin_make_isolated", lambda: _catkin_make("catkin_make_isolated", argv, "_isolated"))
+    name = "catkin_make_isolated"
+    return run(name, lambda: _catkin_make(name, argv, "_isolated"), INTERRUPTED)
 
 
 def catkin_init_workspace(argv: Sequence[str] | None = None) -> int:
@@ -82,7 +84,7 @@ def catkin(argv: Sequence[str] | None = None) -> int:
         Verb("run_tests", "Run the tests of packages", _run_tests),
         Verb("test", "Run the tests of packages", _run_tests),
     )
-    return Family("catkin", "catkin command", verbs).main(argv)
+    return Family("catkin", "catkin command", verbs, interrupted=INTERRUPTED).main(argv)
 
 
 # --- catkin_make
@@ -113,8 +115,7 @@ def _catkin_make(command: str, argv: Sequence[str] | None, suffix: str) -> int:
         raise BuildError(
             str(workspace.source),
             0,
-            "The specified source space does not exist: "
-            f"run {command} in the folder above src, or `mkdir src` first",
+            f"The specified source space does not exist: {_where_to_build(command, workspace)}",
         )
     if (root / "package.xml").is_file():
         raise BuildError(str(root), 0, "is a package, not a workspace: go to the folder above its src")
@@ -142,6 +143,17 @@ def _catkin_make(command: str, argv: Sequence[str] | None, suffix: str) -> int:
             workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)]
         )
     return 0
+
+
+def _where_to_build(command: str, workspace: Workspace) -> str:
+    """What to do where there is no folder src: most often one stands in it, or in devel."""
+    for above in workspace.root.parents:
+        source = above / workspace.source.name
+        if workspace.root.is_relative_to(source) or (
+            source.is_dir() and (above / ".catkin_workspace").is_file()
+        ):
+            return f"`cd {shlex.quote(str(above))}` first, the workspace's folder"
+    return f"run {command} in the folder above src, or `mkdir src` first"
 
 
 def _make_parser(command: str, suffix: str) -> Parser:
@@ -225,7 +237,8 @@ def _built(
     names = {plan.name for plan in plans}
     for name in (*chosen, *with_deps, *white):
         if name not in names:
-            raise NotFoundError("package", name, names, f"the workspace is {workspace.root}")
+            known = {*names, "clean", "install", *_TESTS}
+            raise NotFoundError("package", name, known, f"the workspace is {workspace.root}")
     only = {*chosen, *white, *_with_dependencies(plans, with_deps)}
     done = 0
     count = len(only or plans)
@@ -524,6 +537,8 @@ def _create(command: str, argv: Sequence[str] | None, parent: Path) -> None:
     for path in create_package(parent, package):
         print(f"Created {'folder' if path.is_dir() else 'file'} {path.relative_to(parent).as_posix()}")
     print(f"Successfully created files in {parent / options.name}. Please adjust the values in package.xml.")
+    if (parent / "src").is_dir() and (parent / "devel").is_dir():
+        warn(f"catkin_make builds what is in {parent / 'src'} alone: `mv {options.name} src`")
 
 
 def _user() -> str:

@@ -86,7 +86,7 @@ def _print_lines(wanted: Pattern[str], options: Any, arguments: Arguments | None
         topic = graph.resolve(options.topic)
         field = find_topic(graph, topic)
         if not field or field.path:
-            warn_unpublished(topic)
+            warn_unpublished(graph, topic)
         if not any(map(wanted.match, list_nodes(graph))):
             warn(f"no node's name begins as [{wanted.pattern}] yet")
     with tool_node("rosconsole", arguments) as node:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.cli.command import run
+from minirospy.cli.command import did_you_mean, run
 from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, crawl_times, package_name
@@ -90,7 +90,7 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             print(f"[{tool.name}] {kind}: {text}", file=sys.stderr)
 
     try:
-        line = _parse(words)
+        line = _parse(words, tool)
         if line.verb == "help":
             print(_help(tool, line.package))
             return 0
@@ -111,7 +111,7 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
     return 1
 
 
-def _parse(words: list[str]) -> _Line:
+def _parse(words: list[str], tool: _Tool) -> _Line:
     options: dict[str, str] = {}
     plain: list[str] = []
     rest = iter(words)
@@ -123,8 +123,10 @@ def _parse(words: list[str]) -> _Line:
         elif not word.startswith("-"):
             plain.append(word)
         elif not word.startswith("--") or name not in _OPTIONS | _FLAGS:
+            near = did_you_mean(word.partition("=")[0], (f"--{known}" for known in sorted(_OPTIONS | _FLAGS)))
             raise _RospackError(
-                f"failed to parse command-line options: unrecognised option '{word}' (`rospack -h` shows what there is)"
+                f"failed to parse command-line options: unrecognised option '{word}'{near} "
+                f"(`{tool.name} -h` shows what there is)"
             )
         else:
             options[name] = "" if name in _FLAGS else value if equals else next(rest, "")
@@ -142,11 +144,7 @@ def _checked(line: _Line, tool: _Tool) -> _Verb:
     """The verb of a line. Raises where the line does not suit it."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
-        import difflib
-
-        near = difflib.get_close_matches(line.verb, tool.verbs, n=2)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise _RospackError(f"command {line.verb} not implemented{hint}")
+        raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
     if set(line.options) - verb.takes or (line.package and not verb.takes_package):
         raise _RospackError("invalid option(s) given")
     return verb

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import run
-from minirospy.errors import UsageError
+from minirospy.errors import NotFoundError, UsageError
 from minirospy.workspace.packages import Packages
 
 __all__ = ["main"]
@@ -49,11 +49,7 @@ def _rosrun(words: list[str]) -> int:
             )
     packages = Packages()
     if len(words) < 2:
-        programs = ", ".join(packages.executables(words[0])) if words else ""
-        raise UsageError(
-            "type rosrun PACKAGE PROGRAM"
-            + (f": [{words[0]}] has {programs}" if programs else " (`rosrun -h` shows more)")
-        )
+        raise UsageError(f"type rosrun PACKAGE PROGRAM{_what_there_is(words, packages)}")
     package, program, *arguments = words
     commands = packages.find_executables(package, program)
     chosen = commands[0] if len(commands) == 1 else _choose(package, commands, packages)
@@ -63,6 +59,21 @@ def _rosrun(words: list[str]) -> int:
         print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)
     sys.stdout.flush()
     return _replace(command)
+
+
+def _what_there_is(words: list[str], packages: Packages) -> str:
+    """What is said where the program is missing, or the package. Raises NotFoundError where neither is known."""
+    if not words:
+        return " (`rosrun -h` shows more)"
+    try:
+        programs = packages.executables(words[0])
+    except NotFoundError:
+        program = words[0].rpartition("/")[2]
+        owner = next((name for name in packages.names() if program in packages.executables(name)), None)
+        if owner is None:
+            raise
+        return f", as `rosrun {owner} {program}`"
+    return f": [{words[0]}] has {', '.join(programs) or 'no programs'}"
 
 
 def _split(prefix: str) -> list[str]:

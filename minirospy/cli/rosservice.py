@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser, complain, one_argument, warn
+from minirospy.cli.command import Parser, complain, hint_near, one_argument, warn
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 from minirospy.introspect import services
@@ -90,9 +90,12 @@ def _call(argv: Sequence[str], arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         service = graph.resolve(options.service)
         if options.wait:
-            services.wait_for_service(
-                graph, service, lambda: warn(f"service [{service}] is not there yet", service)
-            )
+
+            def say_so() -> None:
+                warn(f"service [{service}] is not there yet", service)
+                hint_near(service, graph.state().services)
+
+            services.wait_for_service(graph, service, say_so)
         type_ = services.service_type(graph, service)
         for request in _requests(type_, options.args):
             if options.verbose:

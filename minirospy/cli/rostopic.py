@@ -151,7 +151,7 @@ def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> None:
         topic = graph.resolve(options.topic)
         if options.count is not None and options.count <= 0:
             return
-        field = wait_for_topic(graph, topic, lambda: warn_unpublished(topic))
+        field = wait_for_topic(graph, topic, lambda: warn_unpublished(graph, topic))
     printed = 0
     with tool_node("rostopic", arguments, ros_time=True) as node:
         echo = Echo(
@@ -293,7 +293,7 @@ def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list
             field = topics.find_topic(graph, name)
             found.append(field.topic if field else name)
             if not field:
-                warn_unpublished(name)
+                warn_unpublished(graph, name)
     return list(dict.fromkeys(found))
 
 

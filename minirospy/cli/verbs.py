@@ -28,7 +28,7 @@ class Family(NamedTuple):
     """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is.
 
     ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic" args="pub ..."/>`), with
-    `__name:=` and remappings among its words.
+    `__name:=` and remappings among its words. ``interrupted``: the exit status at Ctrl-C.
     """
 
     name: str
@@ -36,11 +36,12 @@ class Family(NamedTuple):
     verbs: tuple[Verb, ...]
     footer: str = ""
     is_node: bool = False
+    interrupted: int = 0
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the verb that was typed; the exit status as :func:`minirospy.cli.command.run` gives it."""
         words = list(sys.argv[1:] if argv is None else argv)
-        return run(self.name, lambda: self._dispatch(words))
+        return run(self.name, lambda: self._dispatch(words), self.interrupted)
 
     def help(self) -> str:
         """What `-h` prints."""

@@ -281,7 +281,7 @@ def _imported(name: str, kind: str) -> Any:
     package, separator, short = name.partition("/")
     if package == "Header" and not separator and kind == "msg":
         package, short = "std_msgs", "Header"
-    if not short or "/" in short:
+    if not short or "/" in short or package[:1] in ("", "."):
         return None
     try:
         module = importlib.import_module(f"{package}.{kind}")

@@ -5,6 +5,7 @@ Classes of types that are not installed are made from the definition in the publ
 
 from __future__ import annotations
 
+import itertools
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +76,7 @@ def fill(message: Any, values: Sequence[Any], keys: Mapping[str, Any] | None = N
     try:
         fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
     except (MessageException, ValueError, TypeError, AttributeError) as error:
-        raise _does_not_fit(message, error) from error
+        raise _does_not_fit(message, error, values) from error
     return message
 
 
@@ -94,10 +95,18 @@ def serialize(message: Any) -> bytes:
     return buffer.getvalue()
 
 
-def _does_not_fit(message: Any, error: Exception) -> MessageException:
-    """What is wrong with the values, on one line, and what the fields are."""
+def _does_not_fit(message: Any, error: Exception, values: Sequence[Any] = ()) -> MessageException:
+    """What is wrong with the ``values`` that were typed, on one line, and what the fields are."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())
     hint = next((hint for words, hint in _HINTS.items() if words in why), "")
+    if len(values) > 1 and isinstance(values[0], dict):
+        hint = ', quotes belong around the whole of a message, as in "data: True"'
+    words = [*values, *(getattr(message, name, None) for name in message.__slots__)]
+    words += itertools.chain(*(value for value in values if isinstance(value, dict)))
+    for word in words:
+        name, colon, rest = word.partition(":") if isinstance(word, str) else ("", "", "")
+        if colon and name in message.__slots__ and not rest.startswith(" "):
+            hint = f', behind the colon of "{name}:" belongs a blank'
     return MessageException(f"{why}{hint} ([{message._type}] has {shown})")

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from minirospy.environment import Environment
+from minirospy.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import NotExecutableError, Packages
@@ -57,6 +57,8 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
     """A node's command as `roslaunch --args` prints it, with the variables that it sets. Raises MinirospyError."""
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
+    if not os.environ.get("ROS_MASTER_URI"):
+        variables.insert(0, ("ROS_MASTER_URI", f"http://localhost:{DEFAULT_MASTER_PORT}/"))
     words = [f'{name}="{value}"' for name, value in (*variables, *node.env)]
     return " ".join([*words, *node_command(node, packages)])
 

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from minirospy import names
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.load import STDIN, Source, load_sources
-from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
+from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec, TestSpec
 from minirospy.launch.substitution import Substitution, SubstitutionError
 from minirospy.launch.summary import summary
 from minirospy.runtime.master_proxy import MasterProxy
@@ -275,12 +275,21 @@ class Test(Node):
         filename: str = "<unknown>",
     ) -> None:
         super().__init__(
-            package, node_type, name, namespace, machine_name, args, remap_args=remap_args, env_args=env_args, cwd=cwd,
-            launch_prefix=launch_prefix, filename=filename,
+            package, node_type, name, namespace, machine_name, args, remap_args=remap_args, env_args=env_args,
+            output="log", cwd=cwd, launch_prefix=launch_prefix, filename=filename,
         )  # fmt: skip
         self.test_name = test_name
         self.time_limit = float(TEST_TIME_LIMIT_DEFAULT if time_limit is None else time_limit)
         self.retry = retry or 0
+
+    @classmethod
+    def of_test(cls, spec: TestSpec) -> Test:
+        """The test that a launch file says."""
+        node = spec.node
+        return cls(
+            spec.test_name, node.package, node.type, node.base_name, node.namespace, None, node.args, node.remaps,
+            node.env, spec.time_limit, node.cwd, node.launch_prefix, spec.retry, node.file,
+        )  # fmt: skip
 
 
 class ROSLaunchConfig:
@@ -371,22 +380,7 @@ class ROSLaunchConfig:
         self._spec.default_machine = spec.default_machine or self._spec.default_machine
         for node in spec.nodes:
             self.add_node(Node.of(node))
-        for test in spec.tests:
-            node = test.node
-            words: Mapping[str, Any] = {
-                "name": node.base_name, "namespace": node.namespace, "args": node.args, "remap_args": node.remaps,
-                "env_args": node.env, "filename": node.file,
-            }  # fmt: skip
-            self.tests.append(
-                Test(
-                    test.test_name,
-                    node.package,
-                    node.type,
-                    time_limit=test.time_limit,
-                    retry=test.retry,
-                    **words,
-                )
-            )
+        self.tests += map(Test.of_test, spec.tests)
         self.params.update({name: Param(name, value) for name, value in spec.params.items()})
         for each in spec.machines.values():
             self.machines[each.name] = Machine(

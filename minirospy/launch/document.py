@@ -128,7 +128,10 @@ class Tag:
         """An attribute that has to be there. Raises LaunchError."""
         text = self.optional(key)
         if text is None:
-            raise self.error(f"<{self.name}> tag is missing required attribute: '{key}'")
+            unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
+            near = NotFoundError("attribute", key, unknown).nearest
+            hint = f" (there is '{near[0]}')" if near else ""
+            raise self.error(f"<{self.name}> tag is missing required attribute: '{key}'{hint}")
         if not text and not may_be_empty:
             raise self.error(f"<{self.name}> tag has an empty '{key}' attribute")
         return text

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -117,12 +118,13 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
         except NotFoundError as error:
             raise MinirospyError(
                 f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
-                f"file name: {error}"
+                f"file name: {error}{_package_with(file, packages)}"
             ) from error
     for file in what:
         if not Path(file).is_file():
             raise MinirospyError(
                 f"[{file}] is not a launch file name: type roslaunch PACKAGE FILE, or a path"
+                + (_near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages))
             )
     return what
 
@@ -176,6 +178,46 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
             if problems is None:
                 raise error
             problems.append(error)
+
+
+def _near_files(file: str) -> str:
+    """What is said behind a launch file that is not there: those of nearly its name in its folder, else its package."""
+    wanted = Path(file)
+    with suppress(OSError, ValueError):
+        if wanted.exists():
+            return ""
+        folder = wanted.parent
+        package = next((each for each in wanted.parents if (each / "package.xml").is_file()), None)
+        for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
+            # Without their endings, in which all are alike.
+            known: dict[str, Path] = {}
+            for path in files:
+                if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
+                    known.setdefault(path.name.partition(".")[0], path)
+            near = [
+                known[name] for name in NotFoundError("file", wanted.name.partition(".")[0], known).nearest
+            ]
+            if near:
+                shown = (path.name if path.parent == folder else str(path) for path in near)
+                return f"; did you mean {' or '.join(shown)}?"
+    return ""
+
+
+def _launch_files_of(package: str, packages: Packages) -> str:
+    """What is said of a package that stands alone: the launch files that it has."""
+    try:
+        files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
+    except NotFoundError:
+        return ""
+    return f"; package [{package}] has {', '.join(files) or 'no launch files'}"
+
+
+def _package_with(file: str, packages: Packages) -> str:
+    """What is said of a launch file whose package was not named, or is another one."""
+    for package, folder in sorted(packages.folders().items()):
+        if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
+            return f"; did you mean `roslaunch {package} {file}`?"
+    return ""
 
 
 def _read(file: str) -> bytes:
@@ -319,7 +361,7 @@ class _File:
             text = Path(file).read_bytes()
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            raise tag.error(f"cannot include [{file}]: {why}") from None
+            raise tag.error(f"cannot include [{file}]: {why}{_near_files(file)}") from None
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)
         _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)

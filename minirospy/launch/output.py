@@ -50,14 +50,14 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all that was and will be said into roslaunch-HOST-PID.log of ``folder``; its path."""
+        """Write all that was and will be said into roslaunch-HOST-PID.log of ``folder``; its path. Raises OSError."""
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
-        # A disk that is full or read-only must not stop the nodes.
-        with contextlib.suppress(OSError):
+        try:
             folder.mkdir(parents=True, exist_ok=True)
             path.write_text("".join(self._unlogged), encoding="utf-8")
             self._log = path
-        self._unlogged.clear()
+        finally:
+            self._unlogged.clear()
         return path
 
     def _write(self, text: str, colour: str, level: int) -> None:

@@ -122,6 +122,7 @@ class Launcher:
         self._master_process: Process | None = None
         self._has_begun = False
         self._has_run = False
+        self._has_logs = True
         self.run_id = ""
         """The folder of the log files, and /run_id at the master."""
         self.processes: list[Process] = []
@@ -247,8 +248,14 @@ class Launcher:
             self.run_id = self.run_id or str(uuid.uuid1())
             self._master.set_param("/run_id", self.run_id)
             self._output.say(f"setting /run_id to {self.run_id}", bold=True)
-        path = self._output.log_to(self._log_folder)
-        self._output.say(f"... logging to {path}")
+        try:
+            self._output.say(f"... logging to {self._output.log_to(self._log_folder)}")
+        except OSError as error:
+            # A disk that is full or read-only must not stop the nodes.
+            self._has_logs = False
+            if not self._master_process:  # which has said so itself
+                why = error.strerror or error
+                self._output.warn(f"WARNING: cannot write logs to {self._log_folder}: {why}; set ROS_LOG_DIR")
 
     def _start_master(self) -> None:
         if not self._environment.master_is_local:
@@ -315,11 +322,16 @@ class Launcher:
         stem = name.replace("/", "-")
         environ = node_environment(node, self._environment)
         screen = (self._options.screen or node.output == "screen") and not self._options.log
+        screen = screen or not self._has_logs
         if not screen or not sys.stdout.isatty():
             # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
             # writes whole lines, which those of another node do not cut in two.
             environ.setdefault("PYTHONUNBUFFERED", "1")
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = error.strerror or error
+            raise MinirospyError(f"the folder {folder} cannot be made: {why}; set ROS_HOME") from error
         self._ready_guardian()
         process = start_process(
             name,
@@ -329,7 +341,8 @@ class Launcher:
             stdout_file=None if screen else self._log_folder / f"{stem}-stdout.log",
             log_errors=self._options.log_errors,
         )
-        process.node, process.log_files = node, f"{self._log_folder / stem}*.log"
+        process.node = node
+        process.log_files = f"{self._log_folder / stem}*.log" if self._has_logs else "none"
         self._output.say(f"process[{name}]: started with pid [{process.pid}]", bold=True)
         if self._options.watch:
             self._files.add(node)

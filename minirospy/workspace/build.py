@@ -335,6 +335,7 @@ class _Builder:
                 self._check_typing(plan, name, known, line)
                 warnings.append(
                     f"{plan.cmake_lists}:{line}: package [{name}] is not installed; going on without it"
+                    + did_you_mean(name, sorted(known))
                 )
         return tuple(warnings)
 

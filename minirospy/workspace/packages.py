@@ -75,9 +75,10 @@ class Packages:
             for folder in self._crawled(root):
                 if package_name(folder) == name:
                     return folder
-        raise NotFoundError(
-            "package", name, self.folders(), "ROS_PACKAGE_PATH names the folders that are searched"
-        )
+        hint = "ROS_PACKAGE_PATH names the folders that are searched"
+        if self.roots == built_in_roots():
+            hint = "no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`"
+        raise NotFoundError("package", name, self.folders(), hint)
 
     def names(self) -> list[str]:
         """The names of all packages, sorted."""
@@ -132,14 +133,15 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """A file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
+        """A launch file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
         folder = self.find(package)
         if (folder / name).is_file():
             return folder / name
         for path in _files(folder):
             if path.name == name:
                 return path
-        same_kind = [path.name for path in _files(folder) if path.suffix == Path(name).suffix]
+        kinds = {Path(name).suffix} - {""} or {".launch", ".test"}
+        same_kind = [path.name for path in _files(folder) if path.suffix in kinds]
         raise NotFoundError("file", name, same_kind, f"package [{package}] is in {folder}")
 
     def _crawled(self, root: Path) -> list[Path]:
@@ -222,15 +224,21 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """The files of a package: its own folder first, then devel/lib of its workspace, where builds put programs."""
+    """The files of a package: its own folder first, then where its programs are put when it is built or installed."""
     for path, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name != "__pycache__")
         for name in sorted(names):
             yield Path(path, name)
-    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
-        built = Path(prefix, "lib", package_name(folder) or folder.name)
-        if prefix and built.is_dir():
-            yield from (path for path in sorted(built.iterdir()) if path.is_file())
+    prefixes = [
+        Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
+    ]
+    if folder.parent.name == "share":
+        # /usr/share/PKG has its programs in /usr/lib/PKG, whatever is sourced.
+        prefixes.append(folder.parents[1])
+    for prefix in dict.fromkeys(prefixes):
+        programs = prefix / "lib" / (package_name(folder) or folder.name)
+        if programs.is_dir():
+            yield from (path for path in sorted(programs.iterdir()) if path.is_file())
 
 
 def _is_program(path: Path) -> bool:

@@ -70,7 +70,10 @@ _HEAD = "# Made by minirospy: `source` it to work with the packages of this work
 
 _BASH = (
     _HEAD
-    + """_minirospy_prefix=$(builtin cd "$(dirname "${{BASH_SOURCE[0]}}")" >/dev/null && pwd)
+    + """if [ "${{BASH_SOURCE[0]}}" = "$0" ]; then
+  echo "a program sets nothing in your terminal; type: source '$0'" >&2
+fi
+_minirospy_prefix=$(builtin cd "$(dirname "${{BASH_SOURCE[0]}}")" >/dev/null && pwd)
 . "$_minirospy_prefix/{file}"
 . {functions}
 unset _minirospy_prefix

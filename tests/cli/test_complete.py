@@ -52,6 +52,12 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may answer late."""
+    monkeypatch.setattr(sources, "LIVE_SECONDS", 30.0)
+
+
 def tab(line: str) -> list[str]:
     """What is offered where ``line`` ends."""
     words = line.split(" ")
@@ -470,9 +476,11 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
 
     with socket.create_server(("localhost", 0)) as silent:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
+        monkeypatch.setattr(sources, "LIVE_SECONDS", 0.2)
         start = time.monotonic()
         assert tab("rostopic echo ") == []
-        assert time.monotonic() - start < sources.LIVE_SECONDS + 0.5
+        # A call gives up after five by itself.
+        assert time.monotonic() - start < 4
 
 
 def test_nodes_that_have_died_are_not_waited_for(master: str) -> None:
@@ -531,7 +539,7 @@ def test_nothing_is_an_error(argv: list[str], capsys: pytest.CaptureFixture[str]
 
 def test_the_command(workspace: Path) -> None:
     words = [sys.executable, "-m", "minirospy", "complete", "2", "rosrun", "my_robot", "-weird"]
-    assert subprocess.run(words, capture_output=True, check=True, timeout=20).stdout == b""
-    done = subprocess.run([*words[:-1], ""], capture_output=True, check=True, timeout=20)
+    assert subprocess.run(words, capture_output=True, check=True, timeout=30).stdout == b""
+    done = subprocess.run([*words[:-1], ""], capture_output=True, check=True, timeout=30)
     assert done.stdout == b"talker.py"
     assert done.stderr == b""

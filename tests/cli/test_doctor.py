@@ -197,5 +197,13 @@ def test_a_doctor_that_listens(robot: Any, command: Any, program: Start) -> None
     assert one.startswith("ok      both ways: this machine reaches ")
     assert "it reaches this machine, and this one reaches it" in listener.stdout.readline()
     listener.send_signal(signal.SIGTERM)
-    assert listener.wait(10) == 0
+    assert listener.wait(30) == 0
     assert command("rosnode", "list").out == "/robot\n"
+
+
+def test_a_name_that_is_nearly_a_published_one(
+    robot: Any, other: Callable[[str, InterfaceType], None], command: Any
+) -> None:
+    other("/buton_state", InterfaceType(Bool._type, Bool._md5sum))
+    (line,) = lines(command("doctor").out, "topics")
+    assert "/buton_state (/other; /button_state is published), /listen (/robot) -> " in line

@@ -459,15 +459,8 @@ def test_words_that_are_no_text(line: str, graph: Robot) -> None:
 # --- Ctrl-C
 
 
-@posix
-@pytest.mark.parametrize(
-    "line",
-    [f"{name} {row.good}" for name, row in ROWS.items() if row.streams]
-    + [f"{name} {row.unknown}" for name, row in ROWS.items() if row.waits]
-    + ["rosservice call --wait /nope", "rosnode ping /robot", "rostopic pub /t std_msgs/Bool 1"],
-)
-def test_ctrl_c(line: str, graph: Robot) -> None:
-    """Once the command has said something: it ends with 0, and says no more than a warning."""
+def _until_ctrl_c(line: str) -> Result:
+    """Run a command; Ctrl-C once it has said something."""
     main = threading.main_thread().ident
     assert main is not None
     once = partial(next, iter([True]), False)
@@ -477,7 +470,39 @@ def test_ctrl_c(line: str, graph: Robot) -> None:
             timer = threading.Timer(0.05, signal.pthread_kill, (main, signal.SIGINT))
             timer.start()
 
-    result = run(line, stdout=Told(interrupt), stderr=Told(interrupt))
+    return run(line, stdout=Told(interrupt), stderr=Told(interrupt))
+
+
+@posix
+@pytest.mark.parametrize(
+    "line",
+    [f"{name} {row.good}" for name, row in ROWS.items() if row.streams]
+    + [f"{name} {row.unknown}" for name, row in ROWS.items() if row.waits]
+    + ["rosservice call --wait /nope", "rosnode ping /robot", "rostopic pub /t std_msgs/Bool 1"],
+)
+def test_ctrl_c(line: str, graph: Robot) -> None:
+    """It ends with 0, and says no more than a warning."""
+    result = _until_ctrl_c(line)
     assert result.status == 0
     assert re.fullmatch(r"(WARNING: [^\n]*\n)*", result.err)
     assert run("rosnode list").out == "/ghost\n/robot\n"
+
+
+@posix
+@pytest.mark.parametrize("line", ["rostopic echo", "rostopic hz", "rostopic bw", "rostopic delay"])
+def test_the_nearest_of_a_topic_that_is_waited_for(line: str, graph: Robot) -> None:
+    """Below real ROS's own warning, which scripts may read."""
+    assert _until_ctrl_c(f"{line} /buton_state").err == (
+        "WARNING: topic [/buton_state] does not appear to be published yet\ndid you mean /button_state?\n"
+    )
+
+
+@posix
+def test_the_nearest_of_what_else_is_waited_for(graph: Robot) -> None:
+    assert _until_ctrl_c("rosservice call --wait /set_led_stat").err == (
+        "WARNING: service [/set_led_stat] is not there yet\ndid you mean /set_led_state?\n"
+    )
+    # A service that is known and does not answer is near nobody but itself.
+    assert (
+        _until_ctrl_c("rosservice call --wait /haunt").err == "WARNING: service [/haunt] is not there yet\n"
+    )

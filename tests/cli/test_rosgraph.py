@@ -39,7 +39,7 @@ def test_it_goes_on_until_ctrl_c(
             break
     if sys.platform != "win32":
         process.send_signal(signal.SIGINT)
-        assert process.wait(10) == 0
+        assert process.wait(30) == 0
 
 
 def test_an_empty_graph(master: str, command: Command) -> None:

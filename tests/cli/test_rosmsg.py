@@ -86,8 +86,8 @@ def test_help(command: Any) -> None:
 
 
 def test_the_programs(program: Start) -> None:
-    assert program(["rosmsg", "show", "std_msgs/Bool"]).communicate(timeout=20) == ("bool data\n\n", "")
-    assert program(["rossrv", "show", "std_srvs/Empty"]).communicate(timeout=20) == ("---\n\n", "")
+    assert program(["rosmsg", "show", "std_msgs/Bool"]).communicate(timeout=30) == ("bool data\n\n", "")
+    assert program(["rossrv", "show", "std_srvs/Empty"]).communicate(timeout=30) == ("---\n\n", "")
 
 
 def test_names_from_a_pipe(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:

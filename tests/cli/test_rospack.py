@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from minirospy.cli.rospack import main, rosstack
+
 DEPENDENCIES = {
     "a": "<depend>b</depend><depend>c</depend>",
     "b": "<depend>d</depend><depend>e</depend>",
@@ -121,8 +123,8 @@ def test_exports(command: Any, tree: Path, words: str, out: str) -> None:
         ("list a", "invalid option(s) given"),
         ("find --target=e a", "invalid option(s) given"),
         (
-            "find --nope a",
-            "failed to parse command-line options: unrecognised option '--nope' (`rospack -h` shows what there is)",
+            "find --frobnicate a",
+            "failed to parse command-line options: unrecognised option '--frobnicate' (`rospack -h` shows what there is)",
         ),
         (
             "find a b",
@@ -133,6 +135,15 @@ def test_exports(command: Any, tree: Path, words: str, out: str) -> None:
 def test_errors(command: Any, tree: Path, words: str, why: str) -> None:
     assert command("rospack", *words.split()) == (1, "", f"[rospack] Error: {why.format(tree=tree)}\n")
     assert command("rospack", "-q", *words.split()) == (1, "", "")
+
+
+def test_an_option_that_is_nearly_one(capsys: pytest.CaptureFixture[str]) -> None:
+    for tool, name in ((main, "rospack"), (rosstack, "rosstack")):
+        assert tool(["plugins", "--atrib=x", "rospy"]) == 1
+        assert capsys.readouterr().err == (
+            f"[{name}] Error: failed to parse command-line options: unrecognised option '--atrib=x'; did you mean "
+            f"--attrib? (`{name} -h` shows what there is)\n"
+        )
 
 
 def test_without_words_it_tells_where_help_is(command: Any) -> None:

@@ -158,8 +158,8 @@ def test_get_of_a_simple_value_imports_no_yaml(master: str, command: Any) -> Non
 
 
 def test_the_program(master: str, program: Start) -> None:
-    assert program(["rosparam", "set", "/a", "[1, 2]"]).communicate(timeout=20) == ("", "")
-    assert program(["rosparam", "get", "/a"]).communicate(timeout=20) == ("- 1\n- 2\n\n", "")
+    assert program(["rosparam", "set", "/a", "[1, 2]"]).communicate(timeout=30) == ("", "")
+    assert program(["rosparam", "get", "/a"]).communicate(timeout=30) == ("- 1\n- 2\n\n", "")
 
 
 def test_delete_of_everything(master: str, command: Any) -> None:

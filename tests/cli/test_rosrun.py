@@ -43,7 +43,7 @@ def rosrun_(*words: str, stdin: str = "", **environ: str) -> tuple[int, str, str
     """The exit status of the command, and what it and the program print."""
     done = subprocess.run(
         [str(BIN / "rosrun"), *words],
-        input=stdin, capture_output=True, text=True, timeout=20, check=False, env={**os.environ, **environ},
+        input=stdin, capture_output=True, text=True, timeout=30, check=False, env={**os.environ, **environ},
     )  # fmt: skip
     assert "Traceback" not in done.stderr
     return done.returncode, done.stdout, done.stderr
@@ -92,6 +92,21 @@ def test_what_a_build_has_put_in_devel_is_no_second_program(package: Path, tmp_p
 
 
 @posix
+def test_a_package_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """share/PKG has its programs in lib/PKG beside it: /usr/share and /usr/lib, or a workspace's install folder."""
+    share, programs = tmp_path / "share" / "theirs", tmp_path / "lib" / "theirs"
+    share.mkdir(parents=True)
+    programs.mkdir(parents=True)
+    (share / "package.xml").write_text("<package><name>theirs</name></package>")
+    (programs / "go").write_text('#!/bin/sh\necho went "$@"\n')
+    (programs / "go").chmod(0o755)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "share"))
+    for prefix in ("", str(tmp_path)):
+        assert rosrun_("theirs", "go", "1", CMAKE_PREFIX_PATH=prefix)[:2] == (0, "went 1\n")
+    assert "did you mean go?" in rosrun_("theirs", "goo")[2]
+
+
+@posix
 def test_prefix_and_debug(package: Path) -> None:
     assert rosrun_("--prefix", "echo 'a b'", "my", "down", "c")[1] == f"a b {package}/scripts/deep/down c\n"
     assert rosrun_("--prefix=echo", "my", "down")[1] == f"{package}/scripts/deep/down\n"
@@ -137,6 +152,12 @@ def test_a_program_that_cannot_be_run(
     assert said.startswith(f"cannot run {package}/scripts/{program}: {why}")
 
 
+def test_a_terminal_without_a_workspace(capsys: pytest.CaptureFixture[str]) -> None:
+    assert fails(capsys, "rpi_test", "x.py")[1].endswith(
+        "(no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`)"
+    )
+
+
 def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert fails(capsys, "my")[1].startswith("type rosrun PACKAGE PROGRAM: [my] has ")
     assert "talker.py" in fails(capsys, "my")[1]
@@ -145,6 +166,10 @@ def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "package [mi] not found; did you mean my? (ROS_PACKAGE_PATH names the folders that are searched)",
     )
     assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
+    # The package forgotten, or not set off by a blank.
+    for word in ("talker.py", "my/talker.py"):
+        assert fails(capsys, word) == (2, "type rosrun PACKAGE PROGRAM, as `rosrun my talker.py`")
+    assert fails(capsys, "nowhere.py")[1].startswith("package [nowhere.py] not found")
     # Where no name is near, those that there are; a path is one below the package.
     for wrong in ("zzz", "/etc/passwd"):
         status, said = fails(capsys, "my", wrong)
@@ -154,6 +179,7 @@ def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (package.parent / "none").mkdir()
     (package.parent / "none" / "package.xml").write_text("<package><name>none</name></package>")
     assert fails(capsys, "none", "x")[1].endswith("/none has no programs")
+    assert fails(capsys, "none")[1] == "type rosrun PACKAGE PROGRAM: [none] has no programs"
     assert fails(capsys, "--prefix") == (
         2,
         "option --prefix is unknown, or lacks its value (`rosrun -h` shows what there is)",

@@ -137,7 +137,7 @@ def test_help_and_no_master(command: Any) -> None:
 
 
 def test_the_program(robot: Any, program: Start) -> None:
-    out, err = program(["rosservice", "call", "/set_led_state", "data: True"]).communicate(timeout=20)
+    out, err = program(["rosservice", "call", "/set_led_state", "data: True"]).communicate(timeout=30)
     assert (out, err) == ('success: True\nmessage: "Successfully changed LED state."\n', "")
 
 
@@ -164,7 +164,7 @@ def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
             stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
     os.write(terminal, b"maybe\nTrue\n")
-    out, err = call.communicate(timeout=20)
+    out, err = call.communicate(timeout=30)
     os.close(terminal)
     assert call.returncode == 0
     assert out == "data (bool) [False]: " * 2 + 'success: True\nmessage: "Successfully changed LED state."\n'

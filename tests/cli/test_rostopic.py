@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -139,10 +140,10 @@ def test_echo_waits_for_a_publisher_and_follows_it(robot: Any, program: Start) -
     assert echo.stderr is not None
     assert echo.stderr.readline() == "WARNING: topic [/late] does not appear to be published yet\n"
     pub = program(["rostopic", "pub", "-r", "10", "/late", "std_msgs/Bool", "data: True"])
-    out, _ = echo.communicate(timeout=20)
+    out, _ = echo.communicate(timeout=30)
     assert (echo.returncode, out) == (0, "data: True\n---\ndata: True\n---\n")
     _interrupt(pub)
-    assert pub.communicate(timeout=10) == ("", "")
+    assert pub.communicate(timeout=30) == ("", "")
     assert pub.returncode == 0
 
 
@@ -153,20 +154,21 @@ def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
     _until(lambda: robot.heard == [b"\x01"])
     _interrupt(pub)
-    assert pub.communicate(timeout=10) == ("", "")
+    assert pub.communicate(timeout=30) == ("", "")
     assert pub.returncode == 0
 
 
 def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.5)
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 1.0)
     words = ("std_msgs/Bool", "data: True")
     assert command("rostopic", "pub", "-1", "/listen", *words).out == (
-        "publishing and latching message for 0.5 seconds\n"
+        "publishing and latching message for 1.0 seconds\n"
     )
     assert robot.heard == [b"\x01"]
     verbose = command("rostopic", "pub", "/listen", "-v", "std_msgs/Bool", "False", "--once")
-    assert verbose.out == "publishing and latching [data: False] for 0.5 seconds\n"
+    assert verbose.out == "publishing and latching [data: False] for 1.0 seconds\n"
     assert robot.heard == [b"\x01", b"\x00"]
+    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
     for words in (
         ("geometry_msgs/Point", "1", "-2.5", "-3"),
         ("std_msgs/Float32", "-0.5"),
@@ -198,6 +200,15 @@ def test_pub_from_standard_input_and_file(
         (["/t", "std_msgs/Bool", "datum: True"], 1, "No field name [datum] ([std_msgs/Bool] has bool data)"),
         (["/t", "std_msgs/Bool", "data: [1"], 1, "'data: [1': "),
         (["/t", "std_msgs/Int32", "hi"], 1, "([std_msgs/Int32] has int32 data)"),
+        (
+            ["/t", "std_msgs/Bool", "data:True"],
+            1,
+            'behind the colon of "data:" belongs a blank ([std_msgs/Bool]',
+        ),
+        (["/t", "geometry_msgs/Twist", "linear:{x: 1}"], 1, 'behind the colon of "linear:" belongs a blank'),
+        (["/t", "std_msgs/Bool", "data:", "True"], 1, "quotes belong around the whole of a message"),
+        (["/t", "/Bool", "True"], 1, "did you mean std_msgs/Bool?"),
+        (["-5", "/t", "std_msgs/Bool", "True"], 1, "message type [/t] not found"),
         (["/t", "std_msgs/String", "5"], 1, "in quotes of its own: \"'5'\""),
         (["/t", "std_msgs/Float64", "1e-3"], 1, "numbers like 1.0e-3"),
         (["/b-ad", "std_msgs/Bool", "True"], 2, "topic [/b-ad]: that is not a legal name"),
@@ -227,22 +238,35 @@ def test_hz_and_bw(robot: Any, program: Start) -> None:
     for stream in (rate, width):
         assert stream.stdout is not None
         assert stream.stdout.readline() == "subscribed to [/ns/chatter]\n"
-    for _ in range(30):
-        robot.publish("/ns/chatter", String("hello"))
-        time.sleep(0.05)
     assert rate.stdout is not None
     assert width.stdout is not None
-    line = rate.stdout.readline()
-    while not line.startswith("average rate: "):
-        assert line == "no new messages\n"
-        line = rate.stdout.readline()
-    assert 5.0 < float(line.split()[-1]) < 40.0
-    assert rate.stdout.readline().startswith("\tmin: 0.")
-    assert width.stdout.readline().startswith("average: ")
-    assert width.stdout.readline().startswith("\tmean: 9.00B min: 9.00B max: 9.00B window: ")
+    heard = threading.Event()
+
+    def publish_until_heard() -> None:
+        while not heard.wait(0.05):
+            robot.publish("/ns/chatter", String("hello"))
+
+    feeder = threading.Thread(target=publish_until_heard)
+    feeder.start()
+    try:
+        average = 0.0
+        # A machine that stands still for a moment makes an average wrong, but not for long.
+        while not 5.0 < average < 40.0:
+            line = rate.stdout.readline()
+            while not line.startswith("average rate: "):
+                assert line == "no new messages\n"
+                line = rate.stdout.readline()
+            average = float(line.split()[-1])
+            spread = rate.stdout.readline()
+        assert spread.startswith("\tmin: 0.")
+        assert width.stdout.readline().startswith("average: ")
+        assert width.stdout.readline().startswith("\tmean: 9.00B min: 9.00B max: 9.00B window: ")
+    finally:
+        heard.set()
+        feeder.join()
     for stream in (rate, width):
         _interrupt(stream)
-        assert stream.communicate(timeout=10)[1] == ""
+        assert stream.communicate(timeout=30)[1] == ""
         assert stream.returncode == 0
 
 
@@ -254,7 +278,7 @@ def test_a_closed_pipe_is_quiet(robot: Any, program: Start) -> None:
     assert echo.stderr is not None
     assert echo.stdout.readline() == "data: True\n"
     echo.stdout.close()
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 30
     while echo.poll() is None and time.monotonic() < deadline:
         robot.publish("/button_state", Bool(True))
         time.sleep(0.02)
@@ -269,7 +293,7 @@ def test_rosnode_kill_ends_a_stream(robot: Any, program: Start, command: Any) ->
     assert echo.stdout.readline() == "data: True\n"
     (name,) = [each for each in command("rosnode", "list").out.split() if each.startswith("/rostopic_")]
     assert command("rosnode", "kill", name).status == 0
-    assert echo.wait(10) == 0
+    assert echo.wait(30) == 0
 
 
 def test_list_imports_little(robot: Any) -> None:
@@ -289,7 +313,7 @@ def _interrupt(process: subprocess.Popen[str]) -> None:
 
 
 def _until(is_so: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 15
+    deadline = time.monotonic() + 30
     while not is_so():
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -345,7 +369,7 @@ def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, comm
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "True"])
     _until(lambda: robot.heard == [b"\x01"])
     pub.terminate()
-    assert pub.wait(10) == 0
+    assert pub.wait(30) == 0
     assert command("rosnode", "list").out == "/robot\n"
 
 
@@ -360,8 +384,8 @@ def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
     now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
     # A node goes by /clock and listens to it with one subscription.
     clock = program(["rostopic", "echo", "-n1", "/clock"])
-    assert clock.communicate(timeout=20)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
-    out, err = row.communicate(timeout=20)
+    assert clock.communicate(timeout=30)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
+    out, err = row.communicate(timeout=30)
     # The message may have come before the clock's.
     assert re.fullmatch(r"%time,field.data\n(100000000000|0),1\n", out)
     assert err == "WARNING: may be using simulated time\n"
@@ -403,7 +427,7 @@ def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: St
     _until(lambda: robot.heard == [b"\x01"])
     assert command("rosnode", "list").out == "/fake\n/robot\n"
     _interrupt(pub)
-    assert pub.wait(10) == 0
+    assert pub.wait(30) == 0
 
 
 def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:

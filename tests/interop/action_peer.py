@@ -14,7 +14,7 @@ from actionlib.msg import TestAction, TestFeedback, TestGoal, TestResult
 from actionlib_msgs.msg import GoalStatus
 
 NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and value}
-SECONDS = 20.0
+SECONDS = 40.0
 
 
 def say(*words):

@@ -10,7 +10,7 @@ from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.graph.goals import GoalState
 
-SECONDS = 20.0
+SECONDS = 40.0
 
 
 def say(*words):

@@ -574,7 +574,7 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
         status: int | str = program.returncode
     except subprocess.TimeoutExpired:
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=10)
+        out, err = program.communicate(timeout=40)
         status = "never"
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
         # Nodes come in the order of a set there, which no two runs share.
@@ -586,7 +586,7 @@ def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
     assert program.stdout
     lines = "".join(_until_filled(program.stdout, count))
     program.send_signal(signal.SIGINT)
-    _, err = program.communicate(timeout=25)
+    _, err = program.communicate(timeout=40)
     # The numbers, and the width of columns that hold them, are those of the moment.
     text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", _STREAM_NUMBERS.sub("0", lines)))
     return Ended(program.returncode, text, err)

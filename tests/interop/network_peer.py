@@ -58,19 +58,19 @@ def tick(beat):
 
 
 def laptop():
-    say("beat", rospy.wait_for_message("/beat", Int32, timeout=10).data >= 0)
+    say("beat", rospy.wait_for_message("/beat", Int32, timeout=40).data >= 0)
     order = rospy.Publisher("/order", String, queue_size=1, latch=True)
     order.publish("forward")
-    say(rospy.wait_for_message("/heard", String, timeout=10).data)
-    rospy.wait_for_service("/flag", timeout=10)
+    say(rospy.wait_for_message("/heard", String, timeout=40).data)
+    rospy.wait_for_service("/flag", timeout=40)
     response = rospy.ServiceProxy("/flag", SetBool)(True)
     say("flag", response.success, response.message)
     rospy.set_param("/robot/wheels", 4)
     say("param", sorted(rospy.get_param("/robot").items()))
     client = actionlib.SimpleActionClient("/count", TestAction)
-    if not client.wait_for_server(rospy.Duration(10)):
+    if not client.wait_for_server(rospy.Duration(40)):
         sys.exit("no action server")
-    client.send_goal_and_wait(TestGoal(41), rospy.Duration(10))
+    client.send_goal_and_wait(TestGoal(41), rospy.Duration(40))
     say("count", client.get_result().result)
 
 

@@ -89,7 +89,7 @@ def run(request: pytest.FixtureRequest) -> Iterator[Run]:
         # A server ends with its input.
         if program.poll() is None:
             try:
-                program.communicate(timeout=10)
+                program.communicate(timeout=40)
             except subprocess.TimeoutExpired:
                 program.kill()
         program.communicate()

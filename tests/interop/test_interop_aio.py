@@ -34,7 +34,7 @@ services = [
 ]
 print("ready", flush=True)
 for line in sys.stdin:
-    rospy.wait_for_service("/aio_flag", timeout=10)
+    rospy.wait_for_service("/aio_flag", timeout=40)
     for persistent in (False, True):
         proxy = rospy.ServiceProxy("/aio_flag", SetBool, persistent=persistent)
         print(proxy(True).message, proxy(False).message, rospy.get_param("/aio/speed"), flush=True)
@@ -56,7 +56,7 @@ def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
     assert program.stdout.readline() == "ready\n"
     yield program
     # Its input ends, and with it the program.
-    program.communicate(timeout=10)
+    program.communicate(timeout=40)
 
 
 async def set_flag(request: SetBoolRequest) -> tuple[bool, str]:
@@ -97,4 +97,4 @@ def test_topics_services_and_parameters(any_master: str, peer: subprocess.Popen[
                 line = await asyncio.to_thread(peer.stdout.readline)
                 assert line == "flag=True flag=False 2.5\n"
 
-    asyncio.run(asyncio.wait_for(main(), 30))
+    asyncio.run(asyncio.wait_for(main(), 50))

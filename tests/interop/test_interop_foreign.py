@@ -82,7 +82,7 @@ class Peer:
     async def line(self) -> str:
         """The next line."""
         assert self._process.stdout
-        return (await asyncio.wait_for(self._process.stdout.readline(), 15)).decode().rstrip()
+        return (await asyncio.wait_for(self._process.stdout.readline(), 40)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
         """What it says, now or before, of ``what``."""
@@ -107,7 +107,7 @@ class Peer:
 
 
 def run(scene: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(asyncio.wait_for(scene, 40))
+    asyncio.run(asyncio.wait_for(scene, 55))
 
 
 def scan() -> LaserScan:
@@ -125,7 +125,7 @@ async def offer(node: Node) -> None:
 
 async def check_scan(node: Node) -> None:
     """The foreign node's scan has come as it was sent."""
-    got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=10)
+    got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=40)
     assert (got.header.frame_id, list(got.ranges), got.range_max) == tuple(SCAN.values())
     assert got.header.stamp == Time(1234567890, 987654321)
 
@@ -133,7 +133,7 @@ async def check_scan(node: Node) -> None:
 async def check_beats(node: Node, peer: Peer) -> None:
     """A stream of ours arrives whole and in order."""
     beats = await node.advertise("/ours/beat", Int32, queue_size=0)
-    await beats.wait_for_subscribers(timeout=10)
+    await beats.wait_for_subscribers(timeout=40)
     for number in range(100):
         await beats.publish(number)
     assert [await peer.says("beat") for _ in range(100)] == list(range(100))
@@ -219,7 +219,7 @@ def test_our_nodes_over_the_master_of_foxglove(modules: Path) -> None:
             uri = await master.line()
             async with Node("ours", master_uri=uri) as node, Node("others", master_uri=uri) as others:
                 await offer(node)
-                got = await others.wait_for_message("/ours/scan", LaserScan, timeout=10)
+                got = await others.wait_for_message("/ours/scan", LaserScan, timeout=40)
                 assert list(got.ranges) == SCAN["ranges"]
                 await node.serve("/ours/flag", SetBool, set_flag)
                 assert (await others.call("/ours/flag", SetBool, data=True)).success

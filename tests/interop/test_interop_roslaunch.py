@@ -94,7 +94,7 @@ def read_until(process: subprocess.Popen[str], *words: str) -> str:
 
 def end(process: subprocess.Popen[str]) -> str:
     process.send_signal(signal.SIGINT)
-    said, _ = process.communicate(timeout=25)
+    said, _ = process.communicate(timeout=40)
     return said
 
 
@@ -157,7 +157,7 @@ def test_a_node_over_a_real_sshd(package: Path, real_master: str, tmp_path: Path
     )
     try:
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
-        refused, _ = process.communicate(timeout=25)
+        refused, _ = process.communicate(timeout=40)
         assert "Host key verification failed" in refused
         assert "unable to start remote roslaunch child" in refused
         process = launch(

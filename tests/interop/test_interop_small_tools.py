@@ -66,6 +66,10 @@ def test_rosrun(workspace: Path) -> None:
                   ["--prefix", "echo in front", "my", "status", "x"]):  # fmt: skip
         ours, real = both("rosrun", *words)
         assert ours == real, words
+    # /usr/lib/topic_tools/relay
+    ours, real = both("rosrun", "topic_tools", "relay")
+    assert ours == real
+    assert "usage: relay" in ours[1]
     for choice in ("1\n", "2\n"):
         ours, real = both("rosrun", "my", "twin", stdin=choice)
         assert ours == real
@@ -75,6 +79,19 @@ def test_rosversion(workspace: Path) -> None:
     for words in (["my"], ["-s", "my"]):
         ours, real = both("rosversion", *words)
         assert ours == real
+
+
+def test_rosversion_of_the_packages_that_both_bring_along() -> None:
+    ours, real = (
+        dict(line.split(": ") for line in run("rosversion", "-a", path=path)[1].splitlines())
+        for path in (OUR_BIN, REAL_BIN)
+    )
+    both_have = ours.keys() & real.keys()
+    assert {"std_msgs", "sensor_msgs", "roscpp", "catkin"} <= both_have
+    # ros_comm is that of the end of Noetic, and one release throughout.
+    assert {name: ours[name] for name in both_have} == {
+        name: "1.17.0" if real[name] == real["rosmaster"] else real[name] for name in both_have
+    }
 
 
 def test_rosclean(workspace: Path) -> None:

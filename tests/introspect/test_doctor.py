@@ -37,11 +37,13 @@ AFAR = MasterPlace("robot", 11311, ["192.0.2.7"])
 
 
 def test_what_takes_too_long_is_not_waited_for() -> None:
+    end = threading.Event()
     start = time.monotonic()
-    found = in_parallel(lambda seconds: time.sleep(seconds) or seconds, [0.0, 5.0], 0.3)
-    assert found[0] == 0.0
+    found = in_parallel(end.wait, [0.0, 60.0], 0.5)
+    assert time.monotonic() - start < 20
+    end.set()
+    assert found[0] is False
     assert isinstance(found[1], TimeoutError)
-    assert time.monotonic() - start < 3
 
 
 def test_many_are_asked_side_by_side() -> None:
@@ -50,7 +52,7 @@ def test_many_are_asked_side_by_side() -> None:
             raise OSError("no")
         return number * 2
 
-    found = in_parallel(ask, range(100), 5.0)
+    found = in_parallel(ask, range(100), 30.0)
     assert isinstance(found[3], OSError)
     assert [each for each in found if not isinstance(each, Exception)] == [
         2 * n for n in range(100) if n != 3
@@ -59,11 +61,11 @@ def test_many_are_asked_side_by_side() -> None:
 
 def test_names_are_looked_up_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     end = threading.Event()
-    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: end.wait(20) and [])
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: end.wait(60) and [])
     start = time.monotonic()
     found = addresses_of([f"robot{number}" for number in range(20)], 0.3)
     end.set()
-    assert time.monotonic() - start < 3
+    assert time.monotonic() - start < 20
     assert found == {f"robot{number}": [] for number in range(20)}
 
 
@@ -138,9 +140,9 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             {"ROS_HOSTNAME": "nowhere.invalid"},
             HERE,
             "problem",
-            "a name that this machine itself does not know",
+            "ROS_HOSTNAME=nowhere.invalid is no name that this machine itself knows",
         ),
-        ({"ROS_IP": "192.0.2.1"}, AFAR, "warning", "no address of this machine"),
+        ({"ROS_IP": "192.0.2.1"}, AFAR, "warning", "ROS_IP=192.0.2.1 is no address of this machine"),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_IP": "192.0.2.1"},
             HERE,
@@ -153,7 +155,12 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             "warning",
             "are both set: ROS_HOSTNAME counts",
         ),
-        ({"ROS_IP": "localhost"}, HERE, "warning", "ROS_IP=localhost is no address"),
+        ({"ROS_IP": "localhost"}, HERE, "warning", "ROS_IP=localhost is a name, not an IP address"),
+        ({"ROS_IP": "127.1"}, HERE, "warning", "ROS_IP=127.1 is not a whole IP address"),
+        ({"ROS_IP": "X.invalid"}, HERE, "problem", "ROS_IP=X.invalid is neither an IP address nor a name"),
+        ({"ROS_IP": "0.0.0.0"}, HERE, "problem", "ROS_IP=0.0.0.0 is every address and none"),
+        ({"ROS_IP": "::1"}, HERE, "problem", "ROS_IP=::1 is an IPv6 address, and nodes listen on IPv4 alone"),
+        ({"ROS_IP": "::1", "ROS_IPV6": "on"}, HERE, "ok", "ROS_IP=::1"),
         ({"ROS_HOSTNAME": "localhost", "ROS_IPV6": "1"}, HERE, "warning", "ROS_IPV6=1 has no effect"),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_NAMESPACE": "a b"},
@@ -167,7 +174,12 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             "warning",
             "which is no folder",
         ),
-        ({"ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": "/dev/null/log"}, HERE, "problem", "cannot be written"),
+        (
+            {"ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": "/dev/null/log"},
+            HERE,
+            "problem",
+            "logs cannot be written to /dev/null/log: /dev/null is a file, no folder",
+        ),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_PYTHON_LOG_CONFIG_FILE": "/nowhere"},
             HERE,
@@ -180,6 +192,17 @@ def test_variables(environ: dict[str, str], place: MasterPlace, status: str, tex
     (finding,) = said(environ, place)
     assert (finding.status.value, text in finding.text) == (status, True), finding
     assert bool(finding.advice) == (status != "ok")
+
+
+def test_a_folder_of_somebody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What `sudo roscore` leaves behind; nobody is told to take over a folder above the one that was named."""
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path) != tmp_path)
+    environ = {"ROS_HOSTNAME": "localhost", "ROS_HOME": str(tmp_path)}
+    (finding,) = said(environ, HERE)
+    assert finding.text == f"logs cannot be written to {tmp_path}: {tmp_path} may not be written by this user"
+    assert finding.advice == f"export ROS_HOME=<a folder of your own>, or `sudo chown -R $USER {tmp_path}`"
+    (finding,) = said({**environ, "ROS_HOME": f"{tmp_path}/a/b"}, HERE)
+    assert finding.advice == "export ROS_HOME=<a folder of your own>"
 
 
 def test_a_variable_that_cannot_be_read_ends_the_examination() -> None:

@@ -104,7 +104,7 @@ def test_rosnode(node: ToolNode) -> None:
     assert rosnode.rosnode_ping_all() == ([node.name], [])
     assert rosnode.get_machines_by_nodes() == ["localhost"]
     assert rosnode.kill_nodes([node.name, "/nope"]) == ([node.name], ["/nope"])
-    assert node.ended.wait(5)
+    assert node.ended.wait(30)
 
 
 def test_rosservice(node: ToolNode) -> None:

@@ -50,7 +50,7 @@ def tell(*values):
 
 
 def until(condition):
-    end = time.time() + 20
+    end = time.time() + 30
     while not condition() and time.time() < end:
         time.sleep(0.02)
     return bool(condition())
@@ -116,7 +116,7 @@ tell("spins", parent.spin_once(), parent.pm.has_process("b-4"), parent.pm.has_pr
 tell(
     "killed",
     parent.pm.kill_process("b-4") in (True, None),
-    listener.died.wait(10),
+    listener.died.wait(30),
     listener.what and listener.what[0],
 )
 parent.shutdown()

@@ -65,7 +65,7 @@ def test_the_table_on_a_terminal(package: Path, master: str) -> None:
             said += os.read(above, 4096)
     except OSError:
         pass
-    assert process.wait(10) == 0
+    assert process.wait(30) == 0
     os.close(above)
 
 

@@ -135,6 +135,7 @@ def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
     ("body", "says"),
     [
         ('<node name="x"/>', "missing required attribute: 'pkg'"),
+        ('<node nam="x" pkg="p" type="t"/>', r"missing required attribute: 'name' \(there is 'nam'\)"),
         ('<node name="a/b" pkg="p" type="t"/>', "cannot contain a namespace"),
         ('<node name="" pkg="p" type="t"/>', "empty 'name'"),
         ('<node name="x" pkg="p" type="t" ns=""/>', "empty 'ns'"),
@@ -199,6 +200,32 @@ def test_errors_name_the_line(packages: Packages, body: str, says: str) -> None:
         load(packages, body)
     assert raised.value.file == "<stdin>"
     assert raised.value.line == (4 if "multiple" in says else 2)
+
+
+@pytest.mark.parametrize(
+    ("file", "near"),
+    [
+        ("launch/bringp.launch", "bringup.launch"),
+        ("launch/bringup.lauch", "bringup.launch"),
+        ("bringup.launch", "{package}/launch/bringup.launch"),
+        ("lanch/bringup.launch", "{package}/launch/bringup.launch"),
+        ("launch/arm_left.launch", "arm_right.launch.xml"),
+        ("launch/x.launch", ""),
+        ("launch", ""),
+    ],
+)
+def test_an_include_that_is_not_there_has_the_nearest_names(
+    packages: Packages, tmp_path: Path, file: str, near: str
+) -> None:
+    (tmp_path / "launch").mkdir()
+    (tmp_path / "package.xml").touch()
+    for name in ("bringup.launch", "camera.launch", "arm_right.launch.xml", "notes.txt"):
+        (tmp_path / "launch" / name).touch()
+    with pytest.raises(LaunchError) as raised:
+        load(packages, f'<include file="{tmp_path / file}"/>')
+    assert str(raised.value).startswith(f"<stdin>:2: cannot include [{tmp_path / file}]: ")
+    hint = str(raised.value).partition("; ")[2]
+    assert hint == (near and f"did you mean {near.format(package=tmp_path)}?")
 
 
 def test_unused_args_of_an_include_are_refused(packages: Packages, tmp_path: Path) -> None:

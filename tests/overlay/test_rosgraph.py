@@ -80,7 +80,7 @@ def test_a_server_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
     handler = Handler()
     node = rosgraph.xmlrpc.XmlRpcNode(0, handler)
     node.start()
-    assert ready.wait(10)
+    assert ready.wait(30)
     assert handler.uri == node.uri == f"http://localhost:{node.port}/"
     with ServerProxy(str(node.uri)) as proxy:
         assert proxy.double(21) == 42
@@ -94,13 +94,13 @@ def test_a_port_that_is_taken_is_told_to_who_asked() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         rosgraph.xmlrpc.XmlRpcNode(port, None, on_run_error=lambda error: told.set()).start()
-        assert told.wait(10)
+        assert told.wait(30)
 
 
 def test_connection_headers_over_a_socket() -> None:
     one, other = socket.socketpair()
     with one, other:
-        other.settimeout(5.0)
+        other.settimeout(30)
         sent = rosgraph.network.write_ros_handshake_header(one, {"topic": "/t", "tcp_nodelay": 1})
         one.sendall(b"rest")
         buffer = BytesIO()

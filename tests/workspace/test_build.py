@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.cli.catkin import catkin_make, catkin_make_isolated
+from minirospy.cli.catkin import catkin, catkin_make, catkin_make_isolated
 from minirospy.errors import BuildError, DefinitionError, ManifestError, SourceError
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
 from minirospy.workspace.packages import Packages, built_in_roots
@@ -616,10 +617,35 @@ def test_typed_wrong(
     assert error.count("\n") == 1
 
 
+def test_in_the_wrong_folder(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    """In src, in a folder of it, in devel: the folder to go to is named."""
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    for below in ("src", "src/led_msgs/msg", "devel"):
+        assert catkin_make(["-C", str(scene.root / below)]) == 1
+        assert f"`cd {shlex.quote(str(scene.root))}` first" in capsys.readouterr().err
+    assert catkin_make(["-C", str(scene.root.parent)]) == 1
+    assert "run catkin_make in the folder above src, or `mkdir src` first" in capsys.readouterr().err
+    assert catkin_make(["-C", str(scene.root), "clena"]) == 1
+    assert "did you mean clean?" in capsys.readouterr().err
+
+
 def test_not_in_the_package(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
     folder = scene.package("p")
     assert catkin_make(["-C", str(folder)]) == 1
-    assert "run catkin_make in the folder above src" in capsys.readouterr().err
+    assert f"`cd {shlex.quote(str(scene.root))}` first" in capsys.readouterr().err
+
+
+def test_ctrl_c_in_a_setup(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    """`catkin_make && roslaunch ...` goes no further; the next build does what is left."""
+    folder = scene.package("tools", "catkin_python_setup()", "", {"setup.py": "raise KeyboardInterrupt\n"})
+    words = ["-C", str(scene.root)]
+    for command in (catkin_make, catkin_make_isolated):
+        assert command(words) == 130
+    assert catkin(["build", "-w", str(scene.root)]) == 130
+    assert capsys.readouterr().err == ""
+    (folder / "setup.py").write_text(SETUP.format(""))
+    assert catkin_make(words) == 0
 
 
 def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:

@@ -31,6 +31,21 @@ def test_a_new_package(
     assert [name for name, _ in read_plan(tmp_path / "rpi_test").needs] == ["rospy", "std_msgs"]
 
 
+def test_beside_src(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Made in the workspace's folder, where catkin_make would never see it."""
+    for folder in ("src", "devel"):
+        (tmp_path / folder).mkdir()
+    for folder, warning in (
+        (tmp_path / "src", ""),
+        (tmp_path, f"WARNING: catkin_make builds what is in {tmp_path / 'src'} alone: `mv p src`\n"),
+    ):
+        monkeypatch.chdir(folder)
+        assert catkin_create_pkg(["p", "rospy"]) == 0
+        assert capsys.readouterr().err == warning
+
+
 def test_all_that_can_be_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     words = [

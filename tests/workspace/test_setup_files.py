@@ -73,6 +73,16 @@ def test_the_variables(scene: Scene, shell: str, ending: str) -> None:
     assert variables(shell, f"{once}\n{once}", scene.root) == expected
 
 
+def test_run_instead_of_sourced(scene: Scene) -> None:
+    scene.build()
+    file = str(scene.devel / "setup.bash")
+    done = subprocess.run(["bash", file], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == (
+        "",
+        f"a program sets nothing in your terminal; type: source '{file}'\n",
+    )
+
+
 @pytest.mark.parametrize(("shell", "ending"), SHELLS)
 def test_what_was_set_before_stays(scene: Scene, shell: str, ending: str) -> None:
     scene.build()

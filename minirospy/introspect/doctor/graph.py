@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError, RpcFault, RpcProtocolError, RpcRefused
+from minirospy.errors import MinirospyError, NotFoundError, RpcFault, RpcProtocolError, RpcRefused
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
@@ -149,8 +149,9 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
                 f"{topic} has nodes of different types, which never connect: {told}",
                 "use one type, or two names",
             )
+    published = {topic for topic, nodes in state.publishers.items() if nodes} - {"/rosout", "/rosout_agg"}
     alone = [
-        f"{topic} ({', '.join(sorted(nodes))})"
+        f"{topic} ({', '.join(sorted(nodes))}{_near(topic, published)})"
         for topic, nodes in sorted(state.subscribers.items())
         if topic != "/rosout" and not state.publishers.get(topic) and not _is_of_action(topic, state)
     ]
@@ -162,6 +163,11 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
         yield ok(
             "topics", f"{len({*state.publishers, *state.subscribers})}, every type the same at both ends"
         )
+
+
+def _near(topic: str, published: set[str]) -> str:
+    nearest = NotFoundError("topic", topic, published).nearest
+    return f"; {nearest[0]} is published" if nearest else ""
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:

@@ -85,11 +85,29 @@ def _host_findings(
             + ": ROS_HOSTNAME counts",
             "unset ROS_HOSTNAME" if is_own_address(ip) else "unset ROS_IP",
         )
-    if ip and not hostname and not _is_address(ip):
-        yield warning("variables", f"ROS_IP={ip} is no address", f"export ROS_HOSTNAME={ip}; unset ROS_IP")
     own = known[host]
+    by_ip, is_address = bool(ip and not hostname), _is_address(host)
+    if by_ip and own and not is_address:
+        # `192.168.1` has an address, too: 192.168.0.1.
+        is_name = not ip.replace(".", "").isdigit()
+        yield warning(
+            "variables",
+            f"ROS_IP={ip} is {'a name, not an IP address' if is_name else 'not a whole IP address'}",
+            f"export ROS_HOSTNAME={ip}; unset ROS_IP" if is_name else export,
+        )
     if not own:
-        yield problem("variables", f"{variable} is a name that this machine itself does not know", correct)
+        what = "neither an IP address nor a" if by_ip else "no"
+        yield problem("variables", f"{variable} is {what} name that this machine itself knows", correct)
+    elif host in ("0.0.0.0", "::"):
+        yield problem(
+            "variables", f"{variable} is every address and none: nobody can connect to a node there", correct
+        )
+    elif is_address and ":" in host and not environment.ipv6:
+        yield problem(
+            "variables",
+            f"{variable} is an IPv6 address, and nodes listen on IPv4 alone",
+            "export ROS_IPV6=on",
+        )
     elif is_loopback(host) and not master.is_local:
         yield problem(
             "variables",
@@ -105,7 +123,8 @@ def _host_findings(
     elif not any(map(is_own_address, own)):
         yield warning(
             "variables",
-            f"{variable} is {' '.join(own)}, no address of this machine: right only behind NAT or in a container",
+            f"{variable} is {'' if is_address else ' '.join(own) + ', '}no address of this machine: right only behind NAT "
+            "or in a container",
             correct,
         )
 
@@ -134,8 +153,13 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
+            why = "may not be written by this user" if there.is_dir() else "is a file, no folder"
             yield problem(
-                "variables", f"{folder} cannot be written", f"set {variable}, or change who owns {there}"
+                "variables",
+                f"logs cannot be written to {folder}: {there} {why}",
+                f"export {variable}=<a folder of your own>"
+                # What `sudo roscore` has left behind.
+                + (f", or `sudo chown -R $USER {there}`" if there == folder and there.is_dir() else ""),
             )
             break
 

@@ -53,7 +53,7 @@ def get_topic_type(
         if field is None and blocking:
             from minirospy.cli.command import warn_unpublished
 
-            warn_unpublished(name)
+            warn_unpublished(graph, name)
             while field is None and not _is_shutdown():
                 time.sleep(0.1)
                 field = topics.find_topic(graph, name)
