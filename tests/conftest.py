@@ -24,7 +24,7 @@ def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         import psutil
 
         servers = [p for p in psutil.process_iter(["cmdline"]) if str(folder) in (p.info["cmdline"] or ())]
-        _, left = psutil.wait_procs(servers, timeout=10)
+        _, left = psutil.wait_procs(servers, timeout=30)
         assert not left, f"board servers without clients: {left}"
 
 
@@ -66,5 +66,5 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     try:
         yield uri
     finally:
-        loop.run(serving.close(), 5.0)
+        loop.run(serving.close(), 30.0)
         loop.close()

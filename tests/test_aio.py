@@ -34,7 +34,7 @@ from minirospy.errors import (
 from minirospy.runtime.master_proxy import MasterProxy, SlaveProxy
 from minirospy.times import Duration, Time
 
-SECONDS = 20.0
+SECONDS = 40.0
 
 Main = Callable[[], Coroutine[Any, Any, None]]
 
@@ -123,11 +123,14 @@ def test_a_command_line_may_be_given(graph: MasterProxy) -> None:
 
 def test_it_waits_for_a_master(caplog: pytest.LogCaptureFixture) -> None:
     async def main() -> None:
-        with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(Node("n").start(), 0.4)
+        starting = asyncio.ensure_future(Node("n").start())
+        await until(lambda: "no ROS master answers" in caplog.text)
+        await asyncio.sleep(0.1)
+        assert not starting.done()
+        starting.cancel()
+        await asyncio.gather(starting, return_exceptions=True)
 
     run(main)
-    assert "no ROS master answers" in caplog.text
 
 
 def test_an_outside_shutdown_ends_what_waits(graph: MasterProxy) -> None:
@@ -198,7 +201,7 @@ def test_ctrl_c_takes_the_node_out_of_the_graph(graph: MasterProxy) -> None:
     assert process.stdout.readline() == "ready\n"
     graph.lookup_node("/program")
     os.kill(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=5)
+    _, errors = process.communicate(timeout=30)
     assert errors.rstrip().endswith("KeyboardInterrupt")
     with pytest.raises(RpcRefused):
         graph.lookup_node("/program")
@@ -385,11 +388,11 @@ def test_a_message_that_does_not_fit_is_told_of(master: str, caplog: pytest.LogC
         async with Node("a") as a, Node("b") as b:
             publisher = a.advertise("/t", String, latch=True)
             await publisher.publish("x")
-            with pytest.raises(TimeoutError, match="waiting for message on topic /t"):
-                await b.wait_for_message("/t", Wrong, 0.3)
+            while "a message on /t from /a does not fit std_msgs/String: no such bytes" not in caplog.text:
+                with pytest.raises(TimeoutError, match="waiting for message on topic /t"):
+                    await b.wait_for_message("/t", Wrong, 0.3)
 
     run(main)
-    assert "a message on /t from /a does not fit std_msgs/String: no such bytes" in caplog.text
 
 
 def test_waiting_can_be_cancelled(master: str) -> None:
@@ -719,7 +722,7 @@ def test_with_a_node_of_the_rospy_api(master: str) -> None:
             await until(lambda: answers.num_connections == 1)
             await publisher.publish("this")
             assert (await answers.next()).data == "heard this"
-            await node.wait_for_service("/peer_flag", 5)
+            await node.wait_for_service("/peer_flag", 30)
             assert (await node.call("/peer_flag", SetBool, True)).message == "peer"
             peer.stdin.write(b"call\n")
             assert await peer.stdout.readline() == b"flag: True\n"

@@ -34,7 +34,7 @@ class Sleeping(threading.Thread):
 
         clock._changed.wait = wait  # type: ignore[method-assign]
         self.start()
-        assert self.waits.acquire(timeout=5)
+        assert self.waits.acquire(timeout=30)
 
     def run(self) -> None:
         try:
@@ -45,10 +45,10 @@ class Sleeping(threading.Thread):
     def at(self, now: int) -> None:
         """Set the time, and return when the thread has looked at it and waits on."""
         self.clock.set(now)
-        assert self.waits.acquire(timeout=5)
+        assert self.waits.acquire(timeout=30)
 
     def end(self) -> object:
-        self.join(5)
+        self.join(30)
         assert not self.is_alive()
         return self.outcome
 
@@ -73,7 +73,7 @@ def lines_until_set(step: int, is_set: bool) -> int:
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
-    thread.join(5)
+    thread.join(30)
     assert not thread.is_alive(), f"the handler waits for itself, line {step} of what runs"
     assert event.is_set() or lines < step
     return lines
@@ -89,7 +89,8 @@ def test_a_signal_may_set_an_event_at_any_moment(is_set: bool) -> None:
 
 
 def test_wall_clock_tells_the_time() -> None:
-    assert abs(WallClock().now() / 1e9 - time.time()) < 1
+    before = time.time_ns()
+    assert before <= WallClock().now() <= time.time_ns()
 
 
 def test_wall_clock_sleeps() -> None:

@@ -51,6 +51,8 @@ def course(tmp_path_factory: pytest.TempPathFactory, _board_folder: Path) -> Cou
     return Course(tmp_path_factory.mktemp("student"), _board_folder)
 
 
+# The pages before it may have to be played first, on a machine that has other things to do.
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("page", PAGES)
 def test_the_page_shows_what_happens(course: Course, page: str) -> None:
     course.play_up_to(page)

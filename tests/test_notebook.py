@@ -11,19 +11,17 @@ import sys
 KERNEL = """
 import asyncio, os, signal, threading
 
-def cell(code):
+def cell(code, interrupted=False):
     "Blocking code in the loop's thread, with Python's own handler for Ctrl-C, as ipykernel runs a cell."
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
+        if interrupted:
+            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
         print(eval(code, globals()), flush=True)
     except KeyboardInterrupt:
         print("interrupted", flush=True)
     finally:
         signal.signal(signal.SIGINT, before)
-
-def interrupted(code):
-    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-    cell(code)
 
 async def kernel():
     import rospy
@@ -32,17 +30,17 @@ async def kernel():
     globals().update(rospy=rospy, String=String, got=[])
     cell("rospy.init_node('notebook')")
     cell("rospy.Subscriber('/t', String, lambda message: got.append(message.data)) and None")
-    cell("globals().update(p=rospy.Publisher('/t', String, queue_size=1)) or p.wait_for_subscribers(timeout=5)")
+    cell("globals().update(p=rospy.Publisher('/t', String, queue_size=1)) or p.wait_for_subscribers(timeout=30)")
     for code in ("rospy.sleep(30)", "rospy.wait_for_message('/none', String)", "rospy.wait_for_service('/none')",
                  "rospy.Rate(0.01).sleep()"):
-        interrupted(code)
+        cell(code, interrupted=True)
     cell("rospy.is_shutdown(), p.publish('still here')")
     async with Node("cells") as node:
         publisher = await node.advertise("/async", String, latch=True)
         await publisher.publish("from a cell")
         async with Node("others") as others:
-            print((await others.wait_for_message("/async", String, timeout=5)).data)
-    interrupted("rospy.spin()")
+            print((await others.wait_for_message("/async", String, timeout=30)).data)
+    cell("rospy.spin()", interrupted=True)
     cell("rospy.is_shutdown(), got")
     await asyncio.sleep(0.01)
     print("the kernel goes on")
@@ -53,7 +51,7 @@ asyncio.run(kernel())
 
 def test_interrupts_end_cells_and_not_the_kernel(master: str) -> None:
     ended = subprocess.run(
-        [sys.executable, "-c", KERNEL], capture_output=True, text=True, timeout=40, check=False
+        [sys.executable, "-c", KERNEL], capture_output=True, text=True, timeout=50, check=False
     )
     assert ended.stdout.splitlines() == [
         "None",

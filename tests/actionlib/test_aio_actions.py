@@ -20,7 +20,7 @@ from minirospy.graph.goals import GoalState
 
 pytestmark = pytest.mark.usefixtures("master")
 
-SECONDS = 20.0
+SECONDS = 40.0
 Client = ActionClient[msg.TestGoal, msg.TestResult, msg.TestFeedback]
 Server = ActionServer[msg.TestGoal, msg.TestResult, msg.TestFeedback]
 Goal = ServerGoal[msg.TestGoal, msg.TestFeedback]

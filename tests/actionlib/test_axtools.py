@@ -45,7 +45,7 @@ def server(master: str) -> Iterator[None]:
     assert process.stdout
     assert process.stdout.readline() == "ready\n"
     yield
-    process.communicate(timeout=10)
+    process.communicate(timeout=30)
 
 
 def command(name: str) -> list[str]:
@@ -96,7 +96,7 @@ class TestClient:
         assert process.stdout
         assert any("Feedback: feedback: 1" in line for line in process.stdout)
         os.kill(process.pid, signal.SIGINT)
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=30)
         assert output == "Cancelling (Ctrl-C again: leave)\nPreempted: stopped\nresult: 1\n"
         assert process.returncode == 1
 
@@ -121,7 +121,7 @@ def test_a_person_serves(master: str) -> None:
     # The next goal finds nobody to answer it.
     said, _, status = ask("", "/ask", "{goal: 6}")
     assert "Aborted: the person who answered has left\n" in said
-    assert process.wait(20) == 0
+    assert process.wait(30) == 0
     assert "Goal:\ngoal: 5\n" in process.stdout.read()
     process.stdout.close()
     assert process.stderr

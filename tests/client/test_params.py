@@ -28,7 +28,7 @@ def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
     try:
         yield master
     finally:
-        loop.run(master.close(), 5.0)
+        loop.run(master.close(), 30.0)
         loop.close()
 
 
@@ -67,7 +67,7 @@ from minirospy.runtime.rpc_client import RpcClient
 rospy.init_node("case", disable_rosout=True)
 other = MasterProxy(os.environ["ROS_MASTER_URI"], "/other")
 def eventually(name, value):
-    for _ in range(500):
+    for _ in range(3000):
         if rospy.get_param_cached(name, None) == value:
             return True
         threading.Event().wait(0.01)

@@ -16,7 +16,7 @@ def run(program: str) -> list[str]:
         [sys.executable, "-c", "import rospy, threading\n" + program],
         capture_output=True,
         text=True,
-        timeout=15,
+        timeout=30,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
@@ -28,11 +28,11 @@ def test_a_timer_that_is_shut_down_ends_at_once() -> None:
 rospy.init_node("case")
 timer = rospy.Timer(rospy.Duration(1000), print)
 timer.shutdown()
-timer.join(5)
+timer.join(30)
 print(timer.is_alive())
 other = rospy.Timer(rospy.Duration(1000), print)
 rospy.signal_shutdown("")
-other.join(5)
+other.join(30)
 print(other.is_alive())
 """
     assert run(program) == ["False", "False"]
@@ -74,7 +74,7 @@ thread = threading.Thread(target=rospy.sleep, args=[1], daemon=True)
 thread.start()
 thread.join(0.1)
 rospy.rostime.switch_to_wallclock()
-thread.join(5)
+thread.join(30)
 print(thread.is_alive(), rospy.get_time() > 1e9)
 """
     assert run(program) == ["False True"]
@@ -88,9 +88,9 @@ rospy.set_param("/use_sim_time", True)
 rospy.init_node("case")
 rospy.rostime._set_rostime(rospy.Time(5))
 timer = rospy.Timer(rospy.Duration(1), print)
-timer.join(0.1)
-rospy.rostime._set_rostime(rospy.Time(4))
-timer.join(5)
-print(timer.is_alive())
+while timer.is_alive():  # it may not have begun
+    for second in (5, 4):
+        rospy.rostime._set_rostime(rospy.Time(second))
+        timer.join(0.05)
 """
-    assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards", "False"]
+    assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards"]

@@ -22,7 +22,7 @@ from geometry_msgs.msg import PointStamped
 
 def eventually(condition):
     waiting = threading.Event()
-    for _ in range(1000):
+    for _ in range(3000):
         if condition():
             return True
         waiting.wait(0.01)
@@ -101,7 +101,7 @@ got, arrived = [], threading.Event()
 threading.Timer(0.1, lambda: rospy.Subscriber("/t", Int32, lambda m: (got.append(m.data), arrived.set()))).start()
 print(publisher.wait_for_subscribers())
 publisher.publish(5)
-print(arrived.wait(10), got)
+print(arrived.wait(30), got)
 threading.Timer(0.1, rospy.signal_shutdown, ["test"]).start()
 try:
     publisher.wait_for_subscribers(2)
@@ -241,10 +241,11 @@ while len(ages) < 15:
     image.header.stamp = rospy.Time.now()
     publisher.publish(image)
     rospy.sleep(0.005)
-print(max(ages))
+print(sorted(ages)[7])
 """)
     )
-    # An image every 5 ms, a callback of 100 ms: kept in order, the last would be 1.4 s old.
+    # An image every 5 ms, a callback of 100 ms: kept in order, the eighth of fifteen would be 0.7 s old. One of them may
+    # be older, on a machine that stands still for a moment.
     assert float(output) < 0.4
 
 
@@ -291,7 +292,7 @@ print("alone", flush=True)
 """)
     assert line(talker) == "connected"
     listener.kill()
-    output, errors = talker.communicate("go\n", timeout=20)
+    output, errors = talker.communicate("go\n", timeout=30)
     assert (output, talker.returncode) == ("alone\n", 0)
     # Python 3.13 shows the line too.
     (warning,) = [text for text in errors.splitlines() if not text.startswith(" ")]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,7 +38,7 @@ def servers(place: Place) -> list[psutil.Process]:
 
 
 def wait_until_gone(place: Place) -> None:
-    _, left = psutil.wait_procs(servers(place), timeout=10)
+    _, left = psutil.wait_procs(servers(place), timeout=30)
     assert not left
 
 
@@ -74,11 +76,12 @@ def test_closed(board: Board) -> None:
 
 
 def test_watch_hears_the_chosen_pins_until_the_time_is_up(board: Board) -> None:
-    edges = board.watch([12], timeout=0.2)
+    edges = board.watch([12], timeout=30)
     board.press(11)
     board.press(12)
     board.release(12)
-    assert [(edge.pin, edge.level) for edge in edges] == [(12, 1), (12, 0)]
+    assert [(edge.pin, edge.level) for edge in itertools.islice(edges, 2)] == [(12, 1), (12, 0)]
+    assert not list(board.watch([12], timeout=0.05))
 
 
 # It listens before it says so: an edge that comes before wait_for_edge() begins would be lost, as on hardware.
@@ -91,7 +94,7 @@ GPIO.setup(7, GPIO.OUT)
 pressed = threading.Event()
 GPIO.add_event_detect(11, GPIO.RISING, callback=lambda channel: pressed.set())
 print("ready", flush=True)
-pressed.wait(20)
+pressed.wait(30)
 GPIO.output(7, GPIO.input(11))
 """
 
@@ -100,10 +103,10 @@ def test_two_processes_share_a_board_and_the_pins_outlive_them(board: Board) -> 
     with subprocess.Popen([sys.executable, "-c", CHILD], stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         child.stdout.readline()
-        edges = board.watch([7], timeout=20)
+        edges = board.watch([7], timeout=40)
         board.press(11)
         assert next(edges).level == 1
-        assert child.wait(20) == 0
+        assert child.wait(30) == 0
     assert board.get(7) == 1
     assert board.state().pins[7].function is Function.OUT
 
@@ -121,20 +124,22 @@ def test_many_start_one_server() -> None:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(20)
+        thread.join(30)
     for child in children:
         assert child.stdout is not None
         assert child.stdout.readline().startswith("test-")
     assert len(opened) == 4
     opened[0].press(11)
-    edges = opened[1].watch([12], timeout=10)
+    edges = opened[1].watch([12], timeout=40)
     opened[2].press(12)
     assert next(edges).level == 1
     # Those that lost the race may still be on their way out; one stays.
-    _, alive = psutil.wait_procs(servers(Place.find()), timeout=1)
-    assert len(alive) == 1
+    deadline = time.monotonic() + 30
+    while len(servers(Place.find())) > 1 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert len(servers(Place.find())) == 1
     for child in children:
-        child.communicate("\n", timeout=20)
+        child.communicate("\n", timeout=30)
         assert child.returncode == 0
     for board in opened:
         board.close()
@@ -144,7 +149,7 @@ def test_a_killed_server_is_replaced_unnoticed(board: Board) -> None:
     gpio = Gpio()
     gpio.setmode(BCM)
     gpio.setup(7, OUT, initial=1)
-    edges = board.watch([12], timeout=20)
+    edges = board.watch([12], timeout=40)
     for server in servers(Place.find()):
         server.kill()
     gpio.output(7, 0)
@@ -185,7 +190,7 @@ def test_by_tcp_where_the_path_is_too_long_for_a_socket(
     place = Place.find()
     assert not place.uses_unix_socket
     with Board() as board, Board() as other:
-        edges = other.watch([11], timeout=10)
+        edges = other.watch([11], timeout=40)
         board.press(11)
         assert next(edges).level == 1
         if sys.platform != "win32":
@@ -214,4 +219,4 @@ def test_a_server_that_a_ctrl_c_killed_is_started_again(monkeypatch: pytest.Monk
     monkeypatch.setattr(link, "_start_server", first_one_is_killed)
     with Board() as board:
         assert board.get(7) == 0
-    assert [process.wait(10) for process in started] == [-signal.SIGINT, 0]
+    assert [process.wait(30) for process in started] == [-signal.SIGINT, 0]

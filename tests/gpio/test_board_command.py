@@ -209,7 +209,7 @@ def test_keys_press_buttons_and_move_the_person(kind: str, monkeypatch: pytest.M
         os.write(ours, b"q")
         drawing = threading.Thread(target=_read_all, args=(ours,))
         drawing.start()
-        assert child.wait(10) == 0
+        assert child.wait(30) == 0
         drawing.join()
         os.close(ours)
 

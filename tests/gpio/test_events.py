@@ -56,7 +56,7 @@ def test_callbacks_run_in_order_on_one_thread_and_an_error_is_printed(
     thread = CallbackThread()
     thread.schedule(detector)
     thread.schedule(detector)
-    assert done.wait(5)
+    assert done.wait(30)
     thread.close()
     assert [entry[:2] for entry in ran] == [("note", 11)] * 2
     assert len({entry[2] for entry in ran}) == 1

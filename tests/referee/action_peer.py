@@ -60,12 +60,12 @@ class Story:
             self._lines.append(" ".join(map(str, values)))
             self._changed.notify_all()
 
-    def wait(self, count, seconds=10):
+    def wait(self, count, seconds=30):
         """Whether callbacks come to have said so many things since the last tell."""
         with self._changed:
             return self._changed.wait_for(lambda: self._said >= count, seconds)
 
-    def wait_log(self, text, seconds=10):
+    def wait_log(self, text, seconds=30):
         """Whether a line with this text comes to be logged, or has been since the last tell."""
         with self._changed:
             return self._changed.wait_for(lambda: any(text in line for line in self._lines), seconds)
@@ -130,22 +130,22 @@ class RawClient:
             message.stamp = stamp
         self.cancel_pub.publish(message)
 
-    def wait_status(self, id, status, seconds=10):
+    def wait_status(self, id, status, seconds=30):
         """Whether the list of statuses comes to tell this of a goal."""
         with self._changed:
             return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
 
-    def wait_gone(self, id, seconds=10):
+    def wait_gone(self, id, seconds=30):
         """Whether the list of statuses comes to leave a goal out."""
         with self._changed:
             return self._changed.wait_for(lambda: self.arrays and id not in self.statuses, seconds)
 
-    def wait_results(self, count, seconds=10):
+    def wait_results(self, count, seconds=30):
         """Whether there come to be so many results."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.results) >= count, seconds)
 
-    def wait_feedback(self, count, seconds=10):
+    def wait_feedback(self, count, seconds=30):
         """Whether there come to be so many messages of feedback."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.feedback) >= count, seconds)
@@ -212,12 +212,12 @@ class RawServer:
         ends = [self.status_pub, self.result_pub, self.feedback_pub, *self.subscribers]
         return eventually(lambda: all(end.get_num_connections() for end in ends))
 
-    def wait_goals(self, count, seconds=10):
+    def wait_goals(self, count, seconds=30):
         """Whether there come to be so many goals."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.goals) >= count, seconds)
 
-    def wait_cancels(self, count, seconds=10):
+    def wait_cancels(self, count, seconds=30):
         """Whether there come to be so many cancels."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.cancels) >= count, seconds)

@@ -105,7 +105,19 @@ class Other:
             self.process.stdout.close()
 
 
-def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+def of_three_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
+    """What ``look()`` finds, at the first of three looks where all of it is true.
+
+    For what takes a certain time: on a machine that stands still for a moment it takes longer, but not thrice.
+    """
+    for _ in range(3):
+        found = look()
+        if all(found):
+            break
+    return found
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> bool:
     """Whether a condition holds within some time."""
     waiting = threading.Event()
     for _ in range(int(seconds / 0.02)):

@@ -28,7 +28,7 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
     text = "".join(
         [
             graph.replace("</launch>", ""),
-            subscribed.format("subscribed", "/orders", 10),
+            subscribed.format("subscribed", "/orders", 30),
             subscribed.format("not_subscribed", "orders/nobody", 0.2),
             subscribed.format("no_list", "''", 0.2),
             "</launch>",

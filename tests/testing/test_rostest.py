@@ -133,11 +133,11 @@ def test_ctrl_c_ends_all_tests(tmp_path: Path) -> None:
         for name in "ab"
     )
     popen = start("rostest", "--package=p", "--pkgdir=/", write_test(tmp_path / "x.test", text))
-    end = time.monotonic() + 20
+    end = time.monotonic() + 30
     while not list((tmp_path / "log").glob("rostest-*/a-1-stdout.log")) and time.monotonic() < end:
         time.sleep(0.02)
     os.kill(popen.pid, signal.SIGINT)
-    out, err = popen.communicate(timeout=20)
+    out, err = popen.communicate(timeout=30)
     assert popen.returncode == 1
     assert "interrupted by SIGINT" in out
     assert "testb" not in out
@@ -149,11 +149,11 @@ def test_ctrl_c_is_no_success_of_rosunit(tmp_path: Path) -> None:
     begun, file = tmp_path / "begun", tmp_path / "slow.py"
     file.write_text(f"import time\nopen({str(begun)!r}, 'w')\ntime.sleep(60)\n")
     popen = start("rosunit", "--package=p", file)
-    end = time.monotonic() + 20
+    end = time.monotonic() + 30
     while not begun.exists() and popen.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
     os.kill(popen.pid, signal.SIGINT)
-    _, err = popen.communicate(timeout=20)
+    _, err = popen.communicate(timeout=30)
     assert popen.returncode == 1
     assert "rosunit: ERROR: interrupted: how the test went is not known\n" in err
 

@@ -7,7 +7,7 @@ import rospy
 from action_peer import RawClient, Story
 from actionlib.msg import TestAction
 from actionlib_msgs.msg import GoalStatus
-from referee import outcome, show
+from referee import eventually, of_three_looks, outcome, show
 
 rospy.init_node("case", argv=[], disable_rosout=True)
 story = Story()
@@ -26,19 +26,25 @@ server.start()
 show(server.action_server.status_frequency, server.action_server.status_list_timeout.to_sec())
 show(server.action_server.pub_queue_size, server.action_server.sub_queue_size)
 client = RawClient("server")
+# By default it would be five seconds.
+before = time.monotonic()
 client.goal("a", 1)
 show(client.wait_status("a", GoalStatus.SUCCEEDED))
+show(client.wait_gone("a"), 0.3 < time.monotonic() - before < 4.5)
 before = time.monotonic()
-show(client.wait_gone("a"), 0.3 < time.monotonic() - before < 1.5)
 client.cancel("b")
 show(client.wait_status("b", GoalStatus.RECALLING))
-before = time.monotonic()
-show(client.wait_gone("b"), 0.3 < time.monotonic() - before < 1.5)
+show(client.wait_gone("b"), 0.3 < time.monotonic() - before < 4.5)
 
-count, before = client.arrays, time.monotonic()
-client.wait_status("never", 1, seconds=1)
-rate = (client.arrays - count) / (time.monotonic() - before)
-show("about 50 Hz", 35 < rate < 60)
+
+def about_50_hz():
+    count, before = client.arrays, time.monotonic()
+    client.wait_status("never", 1, seconds=1)
+    return (35 < (client.arrays - count) / (time.monotonic() - before) < 60,)
+
+
+show("about 50 Hz", *of_three_looks(about_50_hz))
+eventually(lambda: client.array.header.seq > 50)
 array = client.array
 show(repr(array.header.frame_id), array.header.seq > 50, abs(array.header.stamp.to_sec() - time.time()) < 5)
 connection = array._connection_header

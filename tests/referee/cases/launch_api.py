@@ -350,6 +350,7 @@ show(
     test.namespace,
     test.args,
     test.time_limit,
+    test.output,
     test.retry,
     roslaunch.core.TEST_TIME_LIMIT_DEFAULT,
 )

@@ -111,7 +111,8 @@ BODIES = [
     '<machine name="m" address="a" timeout="x"/>', '<machine name="m" address="a" timeout="0"/>', '<machine name="m" address="a" ros-root="x"/>',
     '<machine name="m" address="a" default="x"/>', '<machine name="m" address="a"><env name="A" value="b"/></machine>',
     '<machine name="m" address="a"/><machine name="m" address="b"/>', '<machine name="m" address="a" env-loader="/e"/><machine name="m" address="a" env-loader="/e"/>',
-    '<test test-name="t1" pkg="robot" type="t" time-limit="5" retry="2" args="a"/>', '<master auto="start"/>',
+    '<test test-name="t1" pkg="robot" type="t" time-limit="5" retry="2" args="a"/>',
+    '<test test-name="t2" pkg="robot" type="t" cwd="node" launch-prefix="nice -n 1" ns="q"/>', '<master auto="start"/>',
     "".join(f'<group ns="robot{i}"><node name="n{i % 7}" pkg="robot" type="t" args="{i}"/><param name="i" value="{i}"/></group>' for i in range(200)),
 ]  # fmt: skip
 TEXTS = [

@@ -154,5 +154,5 @@ ends = threading.Thread(
 ends.start()
 rospy.sleep(0.2)
 rospy.signal_shutdown("done")
-ends.join(5.0)
+ends.join(30.0)
 show(waited)

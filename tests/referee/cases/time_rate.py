@@ -3,7 +3,7 @@
 import time
 
 import rospy
-from referee import outcome, show
+from referee import of_three_looks, outcome, show
 
 rospy.init_node("case", argv=[])
 for hz in (
@@ -37,21 +37,45 @@ def took(call):
 
 rate = rospy.Rate(10)
 show(type(rate.last_time).__name__, type(rate.remaining()).__name__, sorted(vars(rate)))
-show("no drift", 0.95 < took(lambda: [(time.sleep(0.03), rate.sleep()) for _ in range(10)]) < 1.2)
-time.sleep(0.13)
-show("late by little: two short turns", took(rate.sleep) < 0.04, took(rate.sleep) < 0.09)
-time.sleep(0.55)
-show("late by much: one, and a new beginning", took(rate.sleep) < 0.04, took(rate.sleep) > 0.06)
+
+
+def ten_turns():
+    for _ in range(10):
+        time.sleep(0.03)
+        rate.sleep()
+
+
+def late_by_little():
+    time.sleep(0.13)
+    return took(rate.sleep) < 0.04, took(rate.sleep) < 0.09
+
+
+def late_by_much():
+    time.sleep(0.55)
+    return took(rate.sleep) < 0.04, took(rate.sleep) > 0.06
+
+
+def remaining():
+    rate = rospy.Rate(1)
+    time.sleep(0.3)
+    return (0.5 < rate.remaining().to_sec() < 0.71,)
+
+
+def another_turn():
+    rate.last_time = rospy.Time.now()
+    return (0.03 < took(rate.sleep) < 0.2,)
+
+
+show("no drift", *of_three_looks(lambda: (0.95 < took(ten_turns) < 1.2,)))
+show("late by little: two short turns", *of_three_looks(late_by_little))
+show("late by much: one, and a new beginning", *of_three_looks(late_by_much))
+show("remaining", *of_three_looks(remaining))
 rate = rospy.Rate(1)
-time.sleep(0.3)
-show("remaining", 0.5 < rate.remaining().to_sec() < 0.71)
 time.sleep(1)
 show("none remaining", rate.remaining() < rospy.Duration(0))
 rate.last_time = rospy.Time.now() + rospy.Duration(100)
 show("from the future", 0.9 < rate.remaining().to_sec() <= 1.0)
 rate.sleep_dur = rospy.Duration(0, 50_000_000)
-rate.last_time = rospy.Time.now()
-show("another turn", 0.03 < took(rate.sleep) < 0.2)
-rate = rospy.Rate(5, reset=True)
-show("reset", 0.15 < took(rate.sleep) < 0.4)
+show("another turn", *of_three_looks(another_turn))
+show("reset", *of_three_looks(lambda: (0.15 < took(rospy.Rate(5, reset=True).sleep) < 0.4,)))
 outcome("by name", lambda: rospy.Rate(hz=5, reset=False).sleep_dur)

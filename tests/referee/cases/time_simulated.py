@@ -52,7 +52,7 @@ class Sleeper(threading.Thread):
         show("  ", self.label, "sleeps", self.is_alive())
 
     def end(self):
-        self.join(5)
+        self.join(30)
         show("  ", self.label, self.outcome, rospy.get_time())
 
 
@@ -84,7 +84,7 @@ threading.Event().wait(0.3)
 at(5)
 for sleeper in sleepers:
     sleeper.end()
-timer.join(2)
+timer.join(30)
 show("Timer", timer.is_alive(), len(events), errors)
 show("Timer with reset", timer_again.is_alive(), eventually(lambda: len(again) == 1))
 for count, seconds in enumerate((6, 7, 8.5), 2):

@@ -40,20 +40,27 @@ show(taken((4, "own"), (4,)))
 
 class Listener(rospy.SubscribeListener):
     def peer_subscribe(self, topic_name, topic_publish, peer_publish):
-        show("has come", topic_name)
+        heard.append(("has come", topic_name))
 
     def peer_unsubscribe(self, topic_name, num_peers):
-        show("has gone", topic_name, num_peers)
+        heard.append(("has gone", topic_name, num_peers))
 
 
+def show_heard():
+    """What the listener has heard, which is told in a thread of its own."""
+    eventually(lambda: heard)
+    show(*heard.pop())
+
+
+heard = []
 listener = Listener()
 show(publisher.impl.add_subscriber_listener(listener), publisher.impl.subscriber_listeners == [listener])
 subscriber.unregister()
+show_heard()
 show(eventually(lambda: not publisher.impl.has_connections()))
-rospy.sleep(0.1)
 subscriber = rospy.Subscriber("c", Int32, take)
+show_heard()
 show(taken((4,)))
-rospy.sleep(0.1)
 publisher.impl.subscriber_listeners.remove(listener)
 subscriber.unregister()
 show(eventually(lambda: not publisher.impl.has_connections()))

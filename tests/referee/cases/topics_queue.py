@@ -15,19 +15,19 @@ def slow(topic, count, **arguments):
     def callback(message):
         got.append(message.data)
         begun.set()
-        go_on.wait(10)
+        go_on.wait(30)
         if message.data == count:
             done.set()
 
     subscriber = rospy.Subscriber(topic, Int32, callback, **arguments)
     eventually(lambda: publisher.get_num_connections() == 1)
     publisher.publish(0)
-    begun.wait(10)
+    begun.wait(30)
     for number in range(1, count + 1):
         publisher.publish(number)
-    rospy.sleep(0.2)
+    rospy.sleep(0.5)
     go_on.set()
-    show(topic, arguments, done.wait(10), got[0], got[1:4], "...", got[-3:], len(got))
+    show(topic, arguments, done.wait(30), got[0], got[1:4], "...", got[-3:], len(got))
     subscriber.unregister()
     publisher.unregister()
 

@@ -11,7 +11,7 @@ from std_msgs.msg import String
 class Listens(unittest.TestCase):
     def test_hears(self):
         rospy.init_node("listens")
-        self.assertEqual(rospy.wait_for_message("/chatter", String, 10).data, "hello")
+        self.assertEqual(rospy.wait_for_message("/chatter", String, 30).data, "hello")
         self.assertTrue(rostest.is_publisher("/chatter", "/talker"))
         self.assertTrue(rostest.is_subscriber("/orders", "/talker"))
         self.assertFalse(rostest.is_subscriber("/chatter", "/talker"))
