@@ -29,6 +29,8 @@ __all__ = ["EndWatch", "is_over"]
 _TICK, _LATE_TICK = 0.02, 0.002
 _LOOK_SECONDS = 2 * _TICK
 """The watch looks at the time at least so often, where the process runs."""
+_MOST_STALLED = 1.0
+"""What is granted for all stalls together."""
 _BEGIN_SECONDS = 0.1
 """How long the main thread may take to run its handler, before another runs the hooks."""
 _HEAR_SECONDS, _TURN_SECONDS, _LONG_TURN_SECONDS = 0.4, 0.7, 1.2
@@ -196,11 +198,11 @@ class EndWatch:
         """Seconds, by a clock that stands still while the process is stopped or the machine gives it no time.
 
         What the program is granted to hear, and to clean up, is time in which it can run. A look that comes late while
-        the process used the processor is no stall: C code held Python's lock.
+        the process used the processor is no stall: C code held Python's lock. C code that sleeps with it looks like one.
         """
         wall, cpu = time.monotonic(), time.process_time()
         idle = (wall - self._looked[0]) - (cpu - self._looked[1])
-        self._stalled += max(0.0, idle - _LOOK_SECONDS)
+        self._stalled = min(self._stalled + max(0.0, idle - _LOOK_SECONDS), _MOST_STALLED)
         self._looked = (wall, cpu)
         return wall - self._stalled
 
@@ -213,9 +215,11 @@ class EndWatch:
             if now >= until:
                 return False
             if late := self._late():
+                number = signal.Signals(late)
                 self._own += 1
+                # Nothing between the two: the handler of the nudge before may run, and take this one's flag.
                 self._has_nudged = True
-                _thread.interrupt_main(signal.Signals(late))
+                _thread.interrupt_main(number)
                 self._take(_LATE_TICK)
             else:
                 self._take(_TICK)

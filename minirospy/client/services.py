@@ -257,7 +257,6 @@ class ServiceProxy(Generic[_S]):
         )
 
     def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
-        before = self.uri
         try:
             self.uri = uri = process.master.lookup_service(self.resolved_name)
         except RpcRefused as error:
@@ -265,7 +264,7 @@ class ServiceProxy(Generic[_S]):
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
-            if ahead and uri == before:
+            if ahead and ahead.uri == uri:
                 # It may have begun with a server that was about to end: then once more. One that is silent may have
                 # the request by now.
                 with contextlib.suppress(ConnectionError, WireError):

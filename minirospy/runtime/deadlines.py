@@ -44,12 +44,16 @@ class Deadlines(Generic[_T]):
 
     def close(self) -> None:
         """Nothing is late any more. Idempotent."""
+        self._ends.clear()
+        self._stop_timer()
+
+    def _stop_timer(self) -> None:
         if self._timer:
             self._timer.cancel()
             self._timer = None
 
     def _watch(self, loop: asyncio.AbstractEventLoop, end: float) -> None:
-        self.close()
+        self._stop_timer()
         self._next = end
         self._timer = loop.call_at(end, self._end_late)
 

@@ -352,9 +352,9 @@ def read_frames(
     ``keeps.newest``: of what lies ready when the thread comes to read, only so many frames, the newest, are
     delivered (0: all), so that a slow receiver sees the present. Raises OSError or WireError.
     """
+    source = _Source(sock, readers)
     try:
         sock.setblocking(True)
-        source = _Source(sock, readers)
         with contextlib.suppress(_Ended):
             while True:
                 frames = source.read()
@@ -364,6 +364,8 @@ def read_frames(
                     for frame in frames:
                         deliver(frame)
     finally:
+        if readers.last is source:
+            readers.last = None
         sock.close()
 
 
@@ -427,11 +429,14 @@ class _Source:
 
     def _receive(self, space: memoryview) -> int:
         """Wait for bytes; without falling asleep, where the last ones let wait no longer than waking up takes."""
+        begun = time.perf_counter()
+        count = None
         if self._is_lively and self._readers.last is self:
             with contextlib.suppress(BlockingIOError):
-                return receive_awake(self.sock, space)
-        begun = time.perf_counter()
-        count = self.sock.recv_into(space)
+                count = receive_awake(self.sock, space)
+        if count is None:
+            count = self.sock.recv_into(space)
+        # Also where the bytes were there, but the interpreter was not: others of this process need it.
         self._is_lively = self._may_look and time.perf_counter() - begun < EXPECTED_SECONDS
         self._readers.last = self
         return count

@@ -34,14 +34,14 @@ class LogFile(RotatingFileHandler):
 
     def line(self, text: str) -> None:
         """A line of level INFO (on the loop)."""
-        self._lines.append(f"{self._line_head}{self._stamp(time.time())}: {text}\n")
+        self._add(f"{self._line_head}{self._stamp(time.time())}: {text}\n")
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
         """As logging wants it; from any thread."""
         try:
-            self._lines.append(self.format(record) + "\n")
+            self._add(self.format(record) + "\n")
         except Exception:  # noqa: BLE001 - as every handler of logging
             self.handleError(record)
         if record.levelno >= logging.WARNING or len(self._lines) > 1000:
@@ -57,6 +57,10 @@ class LogFile(RotatingFileHandler):
         if self._timer:
             self._timer.cancel()
         super().close()
+
+    def _add(self, line: str) -> None:
+        with self._guard:
+            self._lines.append(line)
 
     def _stamp(self, now: float) -> str:
         second, stamp = self._second

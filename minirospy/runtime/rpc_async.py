@@ -333,6 +333,10 @@ class Call:
             except OSError as error:
                 self.fail(error)
             else:
+                if not self._done:
+                    # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the connection.
+                    sock.close()
+                    return
                 self._use(self._connected_by(sock))
                 self._send()
 

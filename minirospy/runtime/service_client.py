@@ -62,7 +62,7 @@ class ServiceClient:
         """
         self.header: Header = {}
         self._is_asked = False
-        self._uri = uri
+        self.uri = uri
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
@@ -135,7 +135,7 @@ class ServiceClient:
         try:
             (length,) = LENGTH.unpack(self._reader.take(4))
             if length > MAX_HEADER:
-                raise WireError(f"{self._uri} does not speak TCPROS")
+                raise WireError(f"{self.uri} does not speak TCPROS")
             return parse_header(self._reader.take(length))
         except PeerEndedError as error:
             raise WireError(

@@ -38,8 +38,8 @@ EXPECTED_SECONDS = 0.0002
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between questions, questions. macOS calls the first TCP_KEEPALIVE."""
 
-
 _PEER = struct.Struct("iII")
+"""What the system says of a peer, see Peer."""
 
 
 class Peer(NamedTuple):

@@ -221,6 +221,38 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
     assert looked == looks
 
 
+def test_a_reader_that_looked_in_vain_or_waited_for_the_interpreter_falls_asleep(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A gap is as long as the look and the sleep together; bytes that were there late are no quick ones either."""
+    one, other = socket.socketpair()
+    looks: list[str] = []
+    clock = SimpleNamespace(now=0.0)
+
+    def recv_into(_: Any) -> int:
+        clock.now += 0.0001
+        return 4
+
+    def receive_awake(sock: socket.socket, space: memoryview) -> int:
+        looks.append("look")
+        if len(looks) == 1:
+            clock.now += links.EXPECTED_SECONDS
+            raise BlockingIOError
+        clock.now += 0.005
+        return 4
+
+    monkeypatch.setattr(links, "may_expect", lambda _: True)
+    monkeypatch.setattr(links, "receive_awake", receive_awake)
+    monkeypatch.setattr(links, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    with one, other:
+        sock: Any = SimpleNamespace(recv_into=recv_into)
+        source = links._Source(sock, links.Readers())
+        space = memoryview(bytearray(8))
+        for expected in (0, 1, 1, 2, 2):  # asleep, in vain, asleep, late, asleep
+            source._receive(space)
+            assert len(looks) == expected
+
+
 # --- large messages
 
 

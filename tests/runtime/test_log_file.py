@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -41,3 +43,26 @@ def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
         file.close()
 
     asyncio.run(scene())
+
+
+def test_no_line_is_lost_where_several_threads_log(tmp_path: Path) -> None:
+    file = LogFile(tmp_path / "master.log", 10_000_000, "master")
+    stop = threading.Event()
+
+    def write_out() -> None:
+        while not stop.is_set():
+            file.flush()
+
+    flusher = threading.Thread(target=write_out)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        flusher.start()
+        for number in range(3000):
+            file.handle(logging.LogRecord("x", logging.INFO, "", 0, f"line {number}", None, None))
+    finally:
+        sys.setswitchinterval(before)
+        stop.set()
+        flusher.join()
+        file.close()
+    assert (tmp_path / "master.log").read_text().count("\n") == 3000
