@@ -76,6 +76,8 @@ __all__ = [
     "UsageError",
     "ValueTextError",
     "WireError",
+    "did_you_mean",
+    "nearest",
 ]
 
 
@@ -99,14 +101,7 @@ class NotFoundError(MinirospyError):
         self.kind = kind
         self.name = name
         self.hint = hint
-        names = sorted(set(known))
-        # A name without its package or namespace is what people forget most.
-        tails = [each for each in names if each.rpartition("/")[2] == name]
-        if not tails:
-            import difflib
-
-            tails = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-        self.nearest = tails[:3]
+        self.nearest = nearest(name, known)
 
     def __str__(self) -> str:
         text = f"{self.kind} [{self.name}] not found"
@@ -313,3 +308,23 @@ class SerializationError(MessageException):
 
 class DeserializationError(MessageException):
     """Bytes that are not a message of this type."""
+
+
+def nearest(name: str, known: Iterable[str]) -> list[str]:
+    """Up to three of the ``known`` names that may have been meant."""
+    names = sorted(set(known))
+    # A name without its package or namespace is what people forget most.
+    tails = [each for each in names if each.rpartition("/")[2] == name]
+    if not tails:
+        import difflib
+
+        tails = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    return tails[:3]
+
+
+def did_you_mean(word: str, known: Iterable[str], most: int = 2) -> str:
+    """What is said behind a word that does not exist: those of the ``known`` that look like it, "" where none does."""
+    import difflib
+
+    near = difflib.get_close_matches(word, list(known), n=most)
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -24,7 +24,14 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from minirospy.errors import MessageException, MinirospyError, ROSException, ServiceException, UsageError
+from minirospy.errors import (
+    MessageException,
+    MinirospyError,
+    ROSException,
+    ServiceException,
+    UsageError,
+    did_you_mean,
+)
 
 if TYPE_CHECKING:
     from minirospy.introspect.graph import Graph
@@ -35,7 +42,6 @@ __all__ = [
     "INTERRUPTED",
     "Parser",
     "complain",
-    "did_you_mean",
     "hint_near",
     "one_argument",
     "refuse_bag",
@@ -90,14 +96,6 @@ class Parser(argparse.ArgumentParser):
                 self.error(
                     f"unrecognized arguments: {word}{did_you_mean(option, self._option_string_actions, 1)}"
                 )
-
-
-def did_you_mean(word: str, known: Iterable[str], most: int = 2) -> str:
-    """What is said behind a word that does not exist: the nearest that do, "" where none is near."""
-    import difflib
-
-    near = difflib.get_close_matches(word, list(known), n=most)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def one_argument(prog: str, description: str, name: str, help_: str, argv: Sequence[str]) -> str:

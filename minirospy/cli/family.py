@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import minirospy
-from minirospy.cli.command import did_you_mean, run
-from minirospy.errors import UsageError
+from minirospy.cli.command import run
+from minirospy.errors import UsageError, did_you_mean
 
 __all__ = ["main"]
 

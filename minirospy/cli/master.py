@@ -161,8 +161,10 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
         for line in (*where, *master.news):
             logging.getLogger("minirospy.master").warning(line)
         rosout_file = log_file.with_name("rosout.log") if log_file else None
-        rosout = RosoutNode(environment._replace(master_uri=master.uri), rosout_file)
-        await _run(master, stop, None if options.no_rosout else rosout, run_id, quiet=options.quiet)
+        rosout = None
+        if not options.no_rosout:
+            rosout = RosoutNode(environment._replace(master_uri=master.uri), rosout_file)
+        await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
         await master.close(keep_journal=keep)

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from minirospy.cli.command import did_you_mean, run
-from minirospy.errors import UsageError
+from minirospy.cli.command import run
+from minirospy.errors import UsageError, did_you_mean
 from minirospy.names import parse_arguments
 
 __all__ = ["Family", "Verb"]

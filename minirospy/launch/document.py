@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from minirospy.errors import LaunchError, NotFoundError
+from minirospy.errors import LaunchError, NotFoundError, nearest
 from minirospy.launch.substitution import Substitution, SubstitutionError
 
 __all__ = ["ATTRIBUTES", "Element", "Tag", "parse_document"]
@@ -129,7 +129,7 @@ class Tag:
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
-            near = NotFoundError("attribute", key, unknown).nearest
+            near = nearest(key, unknown)
             hint = f" (there is '{near[0]}')" if near else ""
             raise self.error(f"<{self.name}> tag is missing required attribute: '{key}'{hint}")
         if not text and not may_be_empty:
@@ -181,7 +181,7 @@ class Tag:
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:
-                near = NotFoundError("attribute", key, known).nearest
+                near = nearest(key, known)
                 hint = f": did you mean {' or '.join(near)}?" if near else ""
                 warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from minirospy import names
-from minirospy.errors import LaunchError, MinirospyError, NotFoundError
+from minirospy.errors import LaunchError, MinirospyError, NotFoundError, nearest
 from minirospy.launch.document import Tag, parse_document
 from minirospy.launch.parameters import param_value, rosparam_values
 from minirospy.launch.spec import ArgDoc, LaunchSpec, MachineSpec, NodeSpec, ParameterCommand, TestSpec
@@ -194,9 +194,7 @@ def _near_files(file: str) -> str:
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
                     known.setdefault(path.name.partition(".")[0], path)
-            near = [
-                known[name] for name in NotFoundError("file", wanted.name.partition(".")[0], known).nearest
-            ]
+            near = [known[name] for name in nearest(wanted.name.partition(".")[0], known)]
             if near:
                 shown = (path.name if path.parent == folder else str(path) for path in near)
                 return f"; did you mean {' or '.join(shown)}?"
@@ -281,7 +279,7 @@ class _File:
         """Read a tag; the scope for those after it."""
         reader = self._tags.get(tag.name)
         if reader is None or (allowed is not None and tag.name not in allowed):
-            near = [] if reader else NotFoundError("tag", tag.name, allowed or self._tags).nearest
+            near = [] if reader else nearest(tag.name, allowed or self._tags)
             hint = f": did you mean <{near[0]}>?" if near else ""
             where = "" if allowed is None else " here"
             self._spec.warnings.append(tag.error(f"unrecognized tag <{tag.name}>{where}{hint}"))

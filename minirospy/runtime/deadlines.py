@@ -34,10 +34,6 @@ class Deadlines(Generic[_T]):
         if self._timer is None or end < self._next:
             self._watch(loop, end)
 
-    def get(self, each: _T) -> float | None:
-        """Until when it has to be done, on the loop's clock."""
-        return self._ends.get(each)
-
     def drop(self, each: _T) -> None:
         """It is done. Idempotent."""
         self._ends.pop(each, None)

@@ -96,7 +96,7 @@ def is_readable(sock: socket.socket) -> bool:
 
 
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Whether the socket takes something within so long; for most of the time a look, see expect_answer."""
+    """Whether the socket takes something within so long; first it is looked at awake, as in expect_answer."""
     if hasattr(select, "poll"):
         return (may_expect(sock) and _expect(sock, select.POLLOUT)) or bool(
             _poll(sock, select.POLLOUT).poll(milliseconds)

@@ -15,12 +15,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from minirospy.errors import BuildError, DefinitionError, NotFoundError
+from minirospy.errors import BuildError, DefinitionError, NotFoundError, did_you_mean
 from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
 from minirospy.idl.spec import MessageSpec
 from minirospy.workspace.manifest import Kind
 from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
-from minirospy.workspace.plan import DIST_PACKAGES, Plan, did_you_mean, read_plan
+from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
 
@@ -335,7 +335,7 @@ class _Builder:
                 self._check_typing(plan, name, known, line)
                 warnings.append(
                     f"{plan.cmake_lists}:{line}: package [{name}] is not installed; going on without it"
-                    + did_you_mean(name, sorted(known))
+                    + did_you_mean(name, sorted(known), 1)
                 )
         return tuple(warnings)
 
@@ -354,7 +354,7 @@ class _Builder:
                     str(plan.cmake_lists),
                     _line_of(plan.cmake_lists, name),
                     f"generate_messages(DEPENDENCIES {name}): no such package"
-                    + did_you_mean(name, sorted(self._folders)),
+                    + did_you_mean(name, sorted(self._folders), 1),
                 )
         allowed = {plan.name, *self._closure(plan.message_depends)}
         for file in plan.definitions:

@@ -7,22 +7,21 @@ http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/index.html.
 
 from __future__ import annotations
 
-import difflib
 import fnmatch
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.errors import BuildError, ManifestError
+from minirospy.errors import BuildError, ManifestError, did_you_mean
 from minirospy.workspace.cmake import keyword_arguments
 from minirospy.workspace.cmake_run import Command, run_cmake
 from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest, read_manifest
 
-__all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "did_you_mean", "read_plan"]
+__all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
 """Where Python packages lie below a devel or install folder, as ROS on Debian and Ubuntu has it."""
@@ -91,7 +90,9 @@ class Install(NamedTuple):
         for name in self.sources:
             source = folder / name
             if not source.exists() and not self.optional:
-                near = did_you_mean(source.name, os.listdir(source.parent) if source.parent.is_dir() else ())
+                near = did_you_mean(
+                    source.name, os.listdir(source.parent) if source.parent.is_dir() else (), 1
+                )
                 raise _error(self.command, f"{self.command.name}: there is no [{name}]{near}")
 
 
@@ -284,7 +285,7 @@ class _Collector:
             if path.suffix != f".{kind}":
                 raise _error(command, f"{command.name}: [{name}] does not end in .{kind}")
             if not path.is_file():
-                hint = did_you_mean(name, there)
+                hint = did_you_mean(name, there, 1)
                 raise _error(command, f"{command.name}: there is no [{name}] in folder [{place}]{hint}")
             if not _TYPE_NAME.match(path.stem):
                 raise _error(
@@ -381,12 +382,6 @@ class _Collector:
     def _rule(self, command: Command, names: list[str], place: str) -> Install:
         sources = tuple(self._path(command, name) for name in names)
         return Install(command, sources, place, optional="OPTIONAL" in command.arguments)
-
-
-def did_you_mean(name: str, known: Collection[str]) -> str:
-    """``; did you mean X?``, or nothing."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _error(command: Command, text: str) -> BuildError:

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from minirospy.errors import ManifestError, NotFoundError
+from minirospy.errors import ManifestError, nearest
 from minirospy.workspace.dependencies import Dependencies
 from minirospy.workspace.packages import Packages, built_in_roots, package_name
 
@@ -170,8 +170,7 @@ class ManifestManager:
         """The folder of one. Raises ResourceNotFound."""
         folders = self._folders()
         if name not in folders:
-            near = NotFoundError("package", name, folders).nearest
-            raise ResourceNotFound(name, self._ros_paths, near)
+            raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
         return str(folders[name])
 
     def get_manifest(self, name: str) -> Manifest:

@@ -29,6 +29,13 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+def launched(file: Path) -> subprocess.CompletedProcess[str]:
+    """roslaunch of a file whose nodes end by themselves."""
+    return subprocess.run(
+        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
+    )
+
+
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> int:
     """A free port, which ROS_MASTER_URI names."""
@@ -227,9 +234,7 @@ def test_a_required_node_ends_all(master: str, package: Path, code: int, status:
         f'<launch><node name="r" pkg="pkg" type="stop.py" args="{code}" required="true" output="screen"/>'
         '<node name="w" pkg="pkg" type="wait.py"/></launch>'
     )
-    done = subprocess.run(
-        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
-    )
+    done = launched(file)
     assert done.returncode == status
     assert "REQUIRED process [r-1] has died!" in done.stderr
     assert "[w-2] killing on exit" in done.stdout
@@ -244,9 +249,7 @@ def test_nodes_run_without_log_files(
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "file"))
     file = package / "stops.launch"
     file.write_text('<launch><node name="s" pkg="pkg" type="stop.py" args="0"/></launch>')
-    done = subprocess.run(
-        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
-    )
+    done = launched(file)
     assert done.returncode == 0
     assert re.fullmatch(
         rf"WARNING: cannot write logs to {tmp_path}/file/\S+: Not a directory; set ROS_LOG_DIR\n", done.stderr
@@ -262,9 +265,7 @@ def test_a_node_whose_folder_cannot_be_made(
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
     file = package / "stops.launch"
     file.write_text('<launch><node name="s" pkg="pkg" type="stop.py" args="0"/></launch>')
-    done = subprocess.run(
-        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
-    )
+    done = launched(file)
     assert done.stderr == (
         "ERROR: cannot launch node of type [pkg/stop.py]: "
         f"the folder {tmp_path}/file cannot be made: File exists; set ROS_HOME\n"
@@ -274,9 +275,7 @@ def test_a_node_whose_folder_cannot_be_made(
 def test_a_node_that_dies_is_reported(master: str, package: Path) -> None:
     file = package / "dies.launch"
     file.write_text('<launch><node name="d" pkg="pkg" type="stop.py" args="3"/></launch>')
-    done = subprocess.run(
-        [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=30, check=False
-    )
+    done = launched(file)
     assert done.returncode == 0
     assert "[d-1] process has died [pid " in done.stderr
     assert "exit code 3, cmd " in done.stderr

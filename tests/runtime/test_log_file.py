@@ -19,6 +19,7 @@ def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
 ) -> None:
     monkeypatch.setattr(log_file, "_SECONDS", 0.05)
     written: list[int] = []
+    again = asyncio.Event()
 
     async def scene() -> None:
         file = LogFile(tmp_path / "master.log", 1_000_000, "master")
@@ -26,6 +27,7 @@ def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
         def write_out() -> None:
             written.append(len(written))
             LogFile._write_out(file)
+            again.set()
 
         monkeypatch.setattr(file, "_write_out", write_out)
         for number in range(20):
@@ -35,9 +37,10 @@ def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
         assert (tmp_path / "master.log").read_text().count("\n") == 40
         at_once = len(written)
         file.line("the last")
-        while len(written) == at_once:
-            await asyncio.sleep(0.01)
-        await asyncio.sleep(0.1)
+        again.clear()
+        await again.wait()
+        # A timer of each line and warning would have gone off by then.
+        await asyncio.sleep(2 * log_file._SECONDS)
         assert len(written) == at_once + 1
         assert (tmp_path / "master.log").read_text().endswith(": the last\n")
         file.close()

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError, NotFoundError, RpcFault, RpcProtocolError, RpcRefused
+from minirospy.errors import MinirospyError, RpcFault, RpcProtocolError, RpcRefused, nearest
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import (
     CONNECT_SECONDS,
@@ -166,8 +166,8 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def _near(topic: str, published: set[str]) -> str:
-    nearest = NotFoundError("topic", topic, published).nearest
-    return f"; {nearest[0]} is published" if nearest else ""
+    near = nearest(topic, published)
+    return f"; {near[0]} is published" if near else ""
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
