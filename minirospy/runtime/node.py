@@ -200,7 +200,7 @@ class Node:
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
-        subscription.publishers_changed(await self.master(*self._registration(subscription)))
+        subscription.publishers_changed(await self._register_subscription(subscription))
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """Stop listening."""
@@ -312,6 +312,19 @@ class Node:
             return "registerSubscriber", part.topic, part.type.name, self.uri
         return "registerService", part.name, self.service_uri, self.uri
 
+    async def _register_subscription(self, subscription: Subscription) -> list[str]:
+        """Tell the master of a subscription; its publishers.
+
+        A publisherUpdate comes by another connection, and may overtake the answer, which is then the older list.
+        Where one came, the master is asked again.
+        """
+        while True:
+            lists = subscription.lists
+            uris: list[str] = await self.master(*self._registration(subscription))
+            is_wanted = self.subscriptions.get(subscription.topic) is subscription
+            if subscription.lists == lists or not is_wanted:
+                return uris
+
     async def _watch_master(self) -> None:
         """Notice a master that has restarted and forgotten this node, and register again.
 
@@ -356,13 +369,14 @@ class Node:
         is_known = False
         for part in parts:
             try:
-                value = await self.master(*self._registration(part))
+                if isinstance(part, Subscription):
+                    part.registered_again(await self._register_subscription(part))
+                else:
+                    await self.master(*self._registration(part))
             except (MasterUnreachableError, RpcError) as error:
                 _log.debug("registering again: %s", error)
                 continue
             is_known = True
-            if isinstance(part, Subscription):
-                part.registered_again(value)
         return is_known
 
     async def _unregister_all(self) -> None:

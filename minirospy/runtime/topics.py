@@ -221,6 +221,8 @@ class Subscription:
         self._workers = workers
         self._readers = readers
         self._on_loop = on_loop
+        self.lists = 0
+        """How many lists of publishers have come."""
         self._plan = SubscriptionPlan()
         self._named: list[str] = []
         self._settling: asyncio.TimerHandle | None = None
@@ -236,6 +238,7 @@ class Subscription:
         """The master's list of publishers has come (on the loop)."""
         if self._closed:
             return
+        self.lists += 1
         self._named = list(uris)
         for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
             if isinstance(action, Disconnect):

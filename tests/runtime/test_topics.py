@@ -407,6 +407,25 @@ def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
     run(scene)
 
 
+def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            ask = b.master
+
+            async def answer_late(method: str, *args: Any) -> Any:
+                answer = await ask(method, *args)
+                if not a.publications:
+                    await publish(a, "/t")
+                    await eventually(lambda: b.subscriptions["/t"].links)
+                return answer
+
+            monkeypatch.setattr(b, "master", answer_late)
+            subscription = await listen(b, "/t", Box())
+            assert [(link.uri, link.closed) for link in subscription.links] == [(a.uri, False)]
+
+    run(scene)
+
+
 def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCaptureFixture) -> None:
     async def scene() -> None:
         async with graph("/a", "/b", watch_seconds=0.05) as (master, (a, b)):
