@@ -143,7 +143,7 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
 
 
 def _write_list(value: Sequence[Any], parts: list[str], depth: int) -> None:
-    parts.append("<value><array><data>\n")
+    parts.append("<value><array><data>")
     for item in value:
         # Most lists are of strings.
         if type(item) is str:
