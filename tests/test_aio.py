@@ -395,6 +395,90 @@ def test_a_message_that_does_not_fit_is_told_of(master: str, caplog: pytest.LogC
     run(main)
 
 
+def test_a_topic_that_is_left_and_joined_at_once(graph: MasterProxy) -> None:
+    """By several tasks, before the master has heard of it, or while it hears of the end."""
+
+    async def main() -> None:
+        async with Node("a") as node, Node("b") as other:
+            for again in range(20):
+
+                async def come_and_go(again: int = again) -> None:
+                    for turn in range(3):
+                        async with node.subscribe("t", String), node.advertise("u", String):
+                            await asyncio.sleep(0.001 * ((turn + again) % 3))
+                        subscription, publisher = node.subscribe("t", String), node.advertise("u", String)
+                        await asyncio.gather(subscription.close(), publisher.close())
+
+                await asyncio.gather(*(come_and_go() for _ in range(3)))
+            for join in (lambda: node.subscribe("t", String), lambda: node.advertise("u", String)):
+                closing = asyncio.ensure_future(join().close())
+                await asyncio.sleep(0)
+                async with join():
+                    await closing
+            assert not {"/t", "/u"} & {topic for topic, _ in graph.get_published_topics()}
+            assert "/t" not in graph.get_system_state().subscribers
+            async with other.advertise("t", String, latch=True) as publisher:
+                await publisher.publish("x")
+                assert (await node.wait_for_message("t", String, 10)).data == "x"
+
+    run(main)
+
+
+def test_who_is_cancelled_while_it_leaves_has_left(
+    graph: MasterProxy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def main() -> None:
+        async with Node("n") as node:
+            ask = node._node.master
+            slowly = asyncio.Event()
+
+            async def answer_late(method: str, *args: Any) -> Any:
+                answer = await ask(method, *args)
+                await slowly.wait()
+                return answer
+
+            monkeypatch.setattr(node._node, "master", answer_late)
+            for handle in (node.subscribe("t", String), node.advertise("u", String)):
+                await until(lambda: bool(graph.get_system_state().subscribers.get("/t")))
+                with pytest.raises(asyncio.TimeoutError):
+                    await asyncio.wait_for(handle.close(), 0.01)
+            slowly.set()
+            await until(lambda: not graph.get_system_state().subscribers.get("/t"))
+            await until(lambda: not graph.get_system_state().publishers.get("/u"))
+            async with node.subscribe("t", String), node.advertise("u", String):
+                assert graph.get_system_state().publishers["/u"] == ["/n"]
+
+    run(main)
+
+
+def test_the_end_of_the_node_ends_waiting_for_peers(master: str) -> None:
+    async def main() -> None:
+        async with Node("n") as node:
+            publisher, subscription = node.advertise("t", String), node.subscribe("u", String)
+            waits = [
+                asyncio.ensure_future(publisher.wait_for_subscribers()),
+                asyncio.ensure_future(subscription.wait_for_publishers()),
+            ]
+            await publisher
+            await subscription
+            node.shutdown()
+            for wait in waits:
+                with pytest.raises(ROSInterruptException):
+                    await asyncio.wait_for(wait, 5)
+
+    run(main)
+
+
+def test_messages_that_are_published_first_at_once_all_arrive(master: str) -> None:
+    async def main() -> None:
+        async with Node("a") as talker, Node("b") as listener:
+            subscription = await listener.subscribe("t", String)
+            await asyncio.gather(*(talker.publish("t", String(text)) for text in "abc"))
+            assert [(await subscription.next(10)).data for _ in "abc"] == ["a", "b", "c"]
+
+    run(main)
+
+
 def test_waiting_can_be_cancelled(master: str) -> None:
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -479,6 +563,23 @@ def test_what_goes_wrong_in_a_call(master: str, caplog: pytest.LogCaptureFixture
 
     run(main)
     assert "Error processing request: bad thing" in caplog.text
+
+
+def test_a_service_is_offered_once_and_ends_when_it_is_told_to(graph: MasterProxy) -> None:
+    """Before the master has heard of it, too."""
+
+    async def main() -> None:
+        async with Node("n") as node:
+            service = node.serve("s", SetBool, set_flag)
+            with pytest.raises(ServiceException, match="already registered"):
+                node.serve("s", SetBool, set_flag)
+            await service.close()
+            assert "/s" not in graph.get_system_state().services
+            async with node.serve("s", SetBool, set_flag):
+                assert (await node.call("s", SetBool, True)).success
+            assert "/s" not in graph.get_system_state().services
+
+    run(main)
 
 
 def test_calls_run_at_the_same_time(master: str) -> None:

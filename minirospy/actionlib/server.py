@@ -44,6 +44,9 @@ _SECONDS_A_STATUS = 1e-4
 _SEND_SECONDS = 1e-3
 """A client of actionlib in Python drops what comes before its send_goal has returned: a result, too."""
 
+_CANCEL_SECONDS = 3 * _SEND_SECONDS
+"""A cancel waits so long: the goal that was sent before it comes by another connection, and waits itself."""
+
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
     """The cancel callback of a server that has none."""
@@ -210,6 +213,7 @@ class ActionServer:
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
         """A client wants goals canceled: the one of the id, all up to a stamp, or all."""
+        time.sleep(_CANCEL_SECONDS)
         with self.lock:
             if not self.started:
                 return

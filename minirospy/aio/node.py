@@ -96,7 +96,8 @@ class Node:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stopping = asyncio.Event()
         self._published: dict[str, PublishedTopic] = {}
-        self._kept: dict[str, Publisher[Any]] = {}
+        self._kept: dict[str, tuple[Publisher[Any], asyncio.Task[None]]] = {}
+        self._served: set[str] = set()
         self._subscribed: dict[str, SubscribedTopic] = {}
         self._tasks: set[asyncio.Task[Any]] = set()
         self._simulated: SimulatedTime | None = None
@@ -259,11 +260,13 @@ class Node:
         The first message of a topic waits up to a second for the subscribers that the master knows.
         """
         resolved = self.resolve(topic)
-        publisher = self._kept.get(resolved)
-        if publisher is None:
-            publisher = self._kept[resolved] = self.advertise(resolved, type(message))
-            await publisher
-            await publisher._wait_for_expected()
+        kept = self._kept.get(resolved)
+        if kept is None:
+            publisher: Publisher[Any] = self.advertise(resolved, type(message))
+            kept = self._kept[resolved] = (publisher, self._spawn(publisher._wait_for_expected()))
+        publisher, expected = kept
+        # Others that publish meanwhile wait, too.
+        await asyncio.wait([expected])
         await publisher.publish(message)
 
     # --- services
@@ -303,7 +306,7 @@ class Node:
         Raises ServiceException where this node offers the service already.
         """
         resolved = self.resolve(service)
-        if resolved in self._node.services:
+        if resolved in self._served:
             raise ServiceException(f"service [{resolved}] already registered")
         return Service(self, resolved, service_class, handler)
 
@@ -396,6 +399,8 @@ class Node:
         self._stopping.set()
         for state in self._subscribed.values():
             state.end()
+        for published in self._published.values():
+            published.links_changed()
 
     def _spawn(self, work: Coroutine[Any, Any, _M]) -> asyncio.Task[_M]:
         """A task of this node's own, cancelled when it closes."""

@@ -100,8 +100,8 @@ class ServiceProxy(Generic[_Response_co]):
         node = self._node
         try:
             uri = await node._node.master("lookupService", self.name)
-        except RpcRefused as error:
-            raise ServiceException(f"service [{self.name}] unavailable") from error
+        except RpcRefused:
+            raise ServiceException(f"service [{self.name}] unavailable") from None
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
@@ -115,7 +115,7 @@ class ServiceProxy(Generic[_Response_co]):
                 nearby=node._node.environment.nearby,
             )
         except HandshakeRefused as error:
-            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error
+            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from None
         except (OSError, WireError) as error:
             raise ServiceException(f"unable to connect to service: {error}") from error
 
@@ -159,12 +159,16 @@ class Service(Handle):
             )
         else:
             self._server = runtime.make_service(name, type_, self._handle_in_worker, **types)
+        node._served.add(name)
         self._registration = node._spawn(
             registered(runtime.serve, self._server, f"service [{name}]", node.log)
         )
 
     async def close(self) -> None:
         """Stop offering the service; calls under way get their answers. Idempotent."""
+        await asyncio.wait([self._registration])
+        if self._node._node.services.get(self.name) is self._server:
+            self._node._served.discard(self.name)
         with contextlib.suppress(MasterUnreachableError, RpcError):
             await self._node._node.unserve(self._server)
 

@@ -87,7 +87,10 @@ class Subscription(Handle, Generic[_M]):
         return len(self._state.subscription.links)
 
     async def wait_for_publishers(self, count: int = 1, timeout: float | None = None) -> None:
-        """Wait until so many publishers are connected. Raises TimeoutError after ``timeout`` seconds."""
+        """Wait until so many publishers are connected.
+
+        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
+        """
         connected = asyncio.Event()
         told = self._state.subscription.on_connected
         told.append(connected.set)
@@ -106,6 +109,8 @@ class Subscription(Handle, Generic[_M]):
 
     async def _wait_for(self, count: int, connected: asyncio.Event) -> None:
         while self.num_connections < count:
+            if self._ended:
+                raise ROSInterruptException("rospy shutdown")
             await connected.wait()
             connected.clear()
 
@@ -118,6 +123,9 @@ class Subscription(Handle, Generic[_M]):
     def _end(self) -> None:
         self._ended = True
         self._arrived.set()
+        # Who waits for publishers looks again.
+        for tell in self._state.subscription.on_connected:
+            tell()
 
     def _deserialized(self, frame: bytes | memoryview, header: Header) -> _M | None:
         message: Any = self._message_class()
@@ -169,7 +177,10 @@ class Publisher(Handle, Generic[_M]):
         return len(self._state.publication.links) if self._state else 0
 
     async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:
-        """Wait until so many subscribers are connected. Raises TimeoutError after ``timeout`` seconds."""
+        """Wait until so many subscribers are connected.
+
+        Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends.
+        """
         try:
             await asyncio.wait_for(self._wait_for(count), timeout)
         except asyncio.TimeoutError:
@@ -184,11 +195,14 @@ class Publisher(Handle, Generic[_M]):
 
     async def _wait_for(self, count: int) -> None:
         while self._state and self.num_connections < count:
+            if self._node.is_shutdown:
+                raise ROSInterruptException("rospy shutdown")
             await self._state.next_change()
 
     async def _wait_for_expected(self) -> None:
+        await self
         assert self._state
-        with contextlib.suppress(asyncio.TimeoutError):
+        with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
             await asyncio.wait_for(self._wait_for(self._state.publication.expected), _JOIN_SECONDS)
 
 
@@ -215,18 +229,23 @@ class SubscribedTopic:
 
     async def leave(self, handle: Subscription[Any]) -> None:
         self._handles.discard(handle)
-        await self._leave_if_empty()
+        try:
+            await self._leave_if_empty()
+        except asyncio.CancelledError:
+            self._node._later(self._leave_if_empty)
+            raise
 
     def end(self) -> None:
         for handle in list(self._handles):
             handle._end()
 
     async def _leave_if_empty(self) -> None:
+        # Meanwhile another may join.
+        await asyncio.wait([self._registration])
         if self._handles or self._node._subscribed.get(self.topic) is not self:
             return
         del self._node._subscribed[self.topic]
         with contextlib.suppress(MasterUnreachableError, RpcError):
-            await self._registration
             await self._node._node.unsubscribe(self.subscription)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
@@ -256,15 +275,24 @@ class PublishedTopic:
 
     async def leave(self, handle: Publisher[Any]) -> None:
         self._handles.discard(handle)
+        self.links_changed()
+        try:
+            await self._leave_if_empty()
+        except asyncio.CancelledError:
+            self._node._later(self._leave_if_empty)
+            raise
+
+    async def _leave_if_empty(self) -> None:
+        # Meanwhile another may join.
+        await asyncio.wait([self._registration])
+        for link in self.publication.links:
+            if not self._handles:
+                await link.drain(_JOIN_SECONDS)
         topic = self.publication.topic
         if self._handles or self._node._published.get(topic) is not self:
             return
         del self._node._published[topic]
-        self.links_changed()
         with contextlib.suppress(MasterUnreachableError, RpcError):
-            await self._registration
-            for link in self.publication.links:
-                await link.drain(_JOIN_SECONDS)
             await self._node._node.unadvertise(self.publication)
 
     def publish(self, message: Any) -> None:

@@ -96,11 +96,23 @@ class NodeProcess(Identity, Life):
 
     def run(self, coroutine: Coroutine[Any, Any, _T]) -> _T:
         """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
+        return self.begin(coroutine)()
+
+    def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[], _T]:
+        """The first half of :meth:`run`, which does not wait, under a lock that orders who begins. What is returned waits.
+
+        Raises as that does.
+        """
+        assert self._loop is not None
+        loop = self._loop
+        wait = self._or_interrupted(lambda: loop.begin(coroutine))
+        return lambda: self._or_interrupted(lambda: wait(None))
+
+    def _or_interrupted(self, function: Callable[[], _T]) -> _T:
         from minirospy.runtime.loop import LoopClosedError
 
-        assert self._loop is not None
         try:
-            return self._loop.run(coroutine)
+            return function()
         except LoopClosedError as error:
             self.tell_shutdown()
             raise self.interrupted("rospy shutdown") from error

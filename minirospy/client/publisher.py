@@ -166,21 +166,26 @@ class Published(Shared):
 
     def register(self) -> None:
         """Tell the master, once."""
-        if self._registered or not self._handles or not process.node or process.is_shutdown():
-            return
-        self._registered = True
-        # Before the master knows: a subscriber may come at once, and a publish() before it answers counts.
-        register_with_master("publication", self.publication.topic, process.node.advertise(self.publication))
+        with process.lock:
+            if self._registered or not self._handles or not process.node or process.is_shutdown():
+                return
+            # Before the master knows: a subscriber may come at once, and a publish() before it answers counts.
+            self._registered = True
+            wait = process.begin(process.node.advertise(self.publication))
+        register_with_master("publication", self.publication.topic, wait)
 
     def leave(self, handle: Publisher[Any]) -> None:
         with process.lock:
             self._handles.discard(handle)
             # A process that has forked, or is another node by now, has forgotten it.
-            is_last = not self._handles and process.published.get(self.resolved_name) is self
-            if is_last:
-                del process.published[self.resolved_name]
-        if is_last and process.node and not process.is_shutdown():
-            unregister_from_master(process.node.unadvertise(self.publication))
+            if self._handles or process.published.get(self.resolved_name) is not self:
+                return
+            del process.published[self.resolved_name]
+            if not process.node or process.is_shutdown():
+                return
+            # Begun before another thread can publish the topic anew.
+            wait = process.begin(process.node.unadvertise(self.publication))
+        unregister_from_master(wait)
 
     @property
     def is_latch(self) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.process import process
+from minirospy.client.topic import unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import (
     CallFailed,
@@ -98,15 +99,15 @@ class Service(Generic[_S]):
         """Stop offering the service; a call under way gets its answer."""
         self._ended.set()
         with process.lock:
-            is_offered = process.offered.get(self.resolved_name) is self
-            if is_offered:
-                del process.offered[self.resolved_name]
-        server, self._server = self._server, None
-        if server and is_offered and process.node and not process.is_shutdown():
-            try:
-                process.run(process.node.unserve(server))
-            except (MasterUnreachableError, RpcError) as error:
-                _log.debug("unregistering service %s: %s", self.resolved_name, error)
+            server, self._server = self._server, None
+            if process.offered.get(self.resolved_name) is not self:
+                return
+            del process.offered[self.resolved_name]
+            if not server or not process.node or process.is_shutdown():
+                return
+            # Begun before another thread can offer the service anew.
+            wait = process.begin(process.node.unserve(server))
+        unregister_from_master(wait)
 
     def spin(self) -> None:
         """Wait until the service or the node shuts down."""
@@ -117,18 +118,20 @@ class Service(Generic[_S]):
                 process.signal_shutdown("keyboard interrupt")
 
     def _register(self) -> None:
-        node = process.node
-        if node is None or self.done or process.is_shutdown():
-            return
-        self._server = node.make_service(
-            self.resolved_name,
-            InterfaceType(self.type, self.md5sum),
-            self._handle,
-            request_type=self.request_class._type,
-            response_type=self.response_class._type,
-        )
+        with process.lock:
+            node = process.node
+            if node is None or self.done or process.is_shutdown():
+                return
+            self._server = node.make_service(
+                self.resolved_name,
+                InterfaceType(self.type, self.md5sum),
+                self._handle,
+                request_type=self.request_class._type,
+                response_type=self.response_class._type,
+            )
+            wait = process.begin(node.serve(self._server))
         try:
-            process.run(node.serve(self._server))
+            wait()
         except (MasterUnreachableError, RpcError) as error:
             _log.critical("unable to register service [%s] with master: %s", self.resolved_name, error)
 
@@ -259,8 +262,8 @@ class ServiceProxy(Generic[_S]):
     def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
         try:
             self.uri = uri = process.master.lookup_service(self.resolved_name)
-        except RpcRefused as error:
-            raise ServiceException(f"service [{self.resolved_name}] unavailable") from error
+        except RpcRefused:
+            raise ServiceException(f"service [{self.resolved_name}] unavailable") from None
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
@@ -272,7 +275,7 @@ class ServiceProxy(Generic[_S]):
                     return ahead
             return self._client_of(uri, waits=True)
         except HandshakeRefused as error:
-            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from error
+            raise ServiceException(f"unable to connect to service: remote error reported: {error}") from None
         except (OSError, WireError) as error:
             raise ServiceException(f"unable to connect to service: {error}") from error
 
@@ -286,7 +289,7 @@ class ServiceProxy(Generic[_S]):
             keeping = keep
             raise ServiceException(
                 f"service [{self.resolved_name}] responded with an error: {error.text!r}"
-            ) from error
+            ) from None
         except (OSError, WireError) as error:
             if process.is_shutdown():
                 raise process.interrupted("node shutdown interrupted service call") from error

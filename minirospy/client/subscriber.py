@@ -70,13 +70,13 @@ class Subscriber(Topic[_M]):
             state = process.subscribed.get(self.resolved_name)
             if state is None:
                 state = process.subscribed[self.resolved_name] = Subscribed(self.resolved_name, data_class)
-            # Looked up before joining: what comes from now on is delivered in the usual way.
-            latched = state.latched()
+            # Looked up before joining: what connects from now on is delivered in the usual way.
+            links = state.connections
             state.join(self, tcp_nodelay)
         self.impl = state
         process.when_ready(state.register)
         if callback is not None:
-            state.replay(data_class, _Callback(callback, callback_args), latched)
+            state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
         """Stop listening; the connections end with the last Subscriber of the topic in this process."""
@@ -158,20 +158,23 @@ class Subscribed(Shared):
         with process.lock:
             self._handles.remove(handle)
             self._update()
-            is_last = not self._handles and process.subscribed.get(self.resolved_name) is self
-            if is_last:
-                del process.subscribed[self.resolved_name]
-        if is_last and process.node and self.subscription and not process.is_shutdown():
-            unregister_from_master(process.node.unsubscribe(self.subscription))
+            if self._handles or process.subscribed.get(self.resolved_name) is not self:
+                return
+            del process.subscribed[self.resolved_name]
+            if not process.node or not self.subscription or process.is_shutdown():
+                return
+            # Begun before another thread can subscribe to the topic anew.
+            wait = process.begin(process.node.unsubscribe(self.subscription))
+        unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
         """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
         callback = _Callback(cb, cb_args)
         with process.lock:
-            latched = self.latched()
+            links = self.connections
             self._added.append(callback)
             self._update()
-        self.replay(self.data_class, callback, latched)
+        self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
         """Call ``cb`` no more, which add_callback or a Subscriber was given. Raises KeyError."""
@@ -194,19 +197,22 @@ class Subscribed(Shared):
 
     def register(self) -> None:
         """Tell the master, once."""
-        if self._registered or not self._handles or not process.node or process.is_shutdown():
-            return
-        self._registered = True
-        self.subscription = process.node.make_subscription(
-            self.resolved_name,
-            interface_type(self.data_class),
-            self._deliver,
-            newest=self._newest(),
-            tcp_nodelay=self._tcp_nodelay,
-        )
+        with process.lock:
+            node = process.node
+            if self._registered or not self._handles or not node or process.is_shutdown():
+                return
+            self._registered = True
+            self.subscription = node.make_subscription(
+                self.resolved_name,
+                interface_type(self.data_class),
+                self._deliver,
+                newest=self._newest(),
+                tcp_nodelay=self._tcp_nodelay,
+            )
+            wait = process.begin(node.subscribe(self.subscription))
         if self.resolved_name not in _WITHOUT_STATISTICS:
-            process.node.workers.start(self._look_for_statistics)
-        register_with_master("subscription", self.resolved_name, process.node.subscribe(self.subscription))
+            node.workers.start(self._look_for_statistics)
+        register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
         """How many messages to keep: as many as the Subscriber that asks for most."""
@@ -240,15 +246,18 @@ class Subscribed(Shared):
             if callbacks
         )
 
-    def latched(self) -> list[tuple[Frame, Header]]:
-        """The last message of each latched publisher, with the header of its link."""
-        return [(link.latched, link.header) for link in self.connections if link.latched is not None]
-
-    def replay(self, data_class: type[Any], callback: _Callback, latched: list[tuple[Frame, Header]]) -> None:
-        """Give a callback the messages that came before it did."""
-        receiver = _Receiver(data_class, False, (callback,))
-        for frame, header in latched:
-            self._deliver(frame, header, (receiver,))
+    def replay(self, data_class: type[Any], callback: _Callback, links: tuple[InLink, ...]) -> None:
+        """Give a callback, which has joined, the last message of each latched publisher that was there before it."""
+        receivers = (_Receiver(data_class, False, (callback,)),)
+        for link in links:
+            frame = link.latched
+            if frame is None:
+                continue
+            self._deliver(frame, link.header, receivers)
+            newest = link.latched
+            if newest is not None and newest is not frame:
+                # It came meanwhile, and may have been delivered before the older one: rather twice than not last.
+                self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Any]:
         for handle in self._handles:

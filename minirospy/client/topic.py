@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
@@ -82,7 +83,8 @@ class Topic(Generic[_M]):
 
         As with rospy the handle then keeps its ``name`` only.
         """
-        shared, self.impl = self.impl, None
+        with process.lock:
+            shared, self.impl = self.impl, None
         if shared:
             shared.leave(self)
             self.resolved_name = self.type = self.md5sum = self.data_class = None  # type: ignore[assignment]
@@ -123,19 +125,19 @@ def interface_type(data_class: type[Any]) -> InterfaceType:
     return InterfaceType(data_class._type, data_class._md5sum, getattr(data_class, "_full_text", ""))
 
 
-def register_with_master(what: str, topic: str, registration: Any) -> None:
-    """Run a registration; a master that says no is logged, as in rospy, and the program goes on."""
+def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:
+    """Wait for a registration; a master that says no is logged, as in rospy, and the program goes on."""
     try:
-        process.run(registration)
+        wait()
     except MasterUnreachableError as error:
         _log.critical("unable to register %s [%s] with master: %s. Will keep trying.", what, topic, error)
     except RpcError as error:
         _log.critical("unable to register %s [%s] with master: %s", what, topic, error)
 
 
-def unregister_from_master(unregistration: Any) -> None:
-    """Run the end of a registration; a master that is not there has forgotten it anyway."""
+def unregister_from_master(wait: Callable[[], object]) -> None:
+    """Wait for the end of a registration; a master that is not there is told later, or has forgotten it."""
     try:
-        process.run(unregistration)
+        wait()
     except (MasterUnreachableError, RpcError) as error:
         _log.debug("unregistering: %s", error)

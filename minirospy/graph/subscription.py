@@ -39,12 +39,8 @@ class SubscriptionPlan:
 
     def __init__(self) -> None:
         self._failures: dict[str, int] = {}
+        """By the URIs that the master named last, in its order."""
         self._refusals: set[str] = set()
-
-    @property
-    def publishers(self) -> tuple[str, ...]:
-        """The URIs that the master named last, in its order."""
-        return tuple(self._failures)
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
         """The master's list has come: the full one, or with ``keep`` one that lacks some who are still there."""

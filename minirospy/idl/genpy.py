@@ -104,8 +104,8 @@ def isstring(s: object) -> bool:
 def _checked(type_: str) -> str:
     if type_ == "Header":
         return "std_msgs/Header"
-    if "/" not in type_:
-        raise ValueError(f"message type is missing package name: {type_}")
     if type_.count("/") > 1:
         raise ValueError(f"invalid name [{type_}]")
+    if "/" not in type_[1:]:
+        raise ValueError(f"message type is missing package name: {type_}")
     return type_

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import contextlib
+import functools
 import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
@@ -28,6 +29,9 @@ class LoopThread:
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
+        # A signal's handler may find its thread holding it.
+        self._lock = threading.RLock()
+        self._is_ending = False
         self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
         self._thread.start()
 
@@ -37,14 +41,21 @@ class LoopThread:
         Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
         and RuntimeError on the loop's own thread, where waiting would never end.
         """
+        return self.begin(coroutine)(timeout)
+
+    def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[float | None], _T]:
+        """The first half of :meth:`run`: coroutines begin in the order of these calls. What is returned waits."""
         if threading.current_thread() is self._thread:
             coroutine.close()
             raise RuntimeError("a blocking call on the event loop's thread would wait for itself")
-        try:
+        with self._lock:
+            if self._is_ending:
+                coroutine.close()
+                raise LoopClosedError("the event loop is closed")
             future = asyncio.run_coroutine_threadsafe(coroutine, self.loop)
-        except RuntimeError as error:
-            coroutine.close()
-            raise LoopClosedError("the event loop is closed") from error
+        return functools.partial(self._wait, future)
+
+    def _wait(self, future: concurrent.futures.Future[_T], timeout: float | None) -> _T:
         try:
             return future.result(timeout)
         except concurrent.futures.CancelledError as error:
@@ -74,9 +85,14 @@ class LoopThread:
         try:
             self.loop.run_forever()
         finally:
+            with self._lock:
+                self._is_ending = True
+            # What was begun by then becomes a task here, and what has just ended tells so: else callers would wait for ever.
+            self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:
                 task.cancel()
             if tasks:
                 self.loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+            self.loop.run_until_complete(asyncio.sleep(0))
             self.loop.close()

@@ -10,8 +10,9 @@ import asyncio
 import contextlib
 import logging
 import socket
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+from weakref import WeakValueDictionary
 
 from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable, WireError
@@ -23,7 +24,7 @@ from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.services import Handler, ServiceServer
 from minirospy.runtime.slave import SlaveApi
 from minirospy.runtime.topics import Deliver, Publication, Subscription
-from minirospy.runtime.workers import Workers
+from minirospy.runtime.workers import InOrder, Workers
 from minirospy.wire.tcpros import InterfaceType
 
 __all__ = ["Node"]
@@ -34,14 +35,22 @@ _UNREGISTER_SECONDS = 1.0
 _MOST_IDLE = 200
 """Clients of the Slave API that are connected and ask nothing; a graph has about as many as this node has peers."""
 
+_STALE_SECONDS = 5.0
+"""So long a master may still send a list of publishers to one who has unsubscribed."""
+
+_ASK_AGAIN_SECONDS = 0.5
+
+_Part: TypeAlias = Publication | Subscription | ServiceServer
+_Key: TypeAlias = tuple[str, str]
+"""What a part is to the master, as the names of its calls have it ("Publisher"), and its topic or name."""
+
 
 class Node:
     """A node of the computation graph, named globally (``/talker``).
 
     ``await start()`` opens its servers; ``advertise``, ``subscribe`` and ``serve`` register with the master
     and raise MasterUnreachableError or RpcRefused where that fails, with the topic or service in place all
-    the same, so that a retry or a later registration finds it. Methods are called on the loop, unless they
-    say otherwise.
+    the same: the master is told later. Methods are called on the loop, unless they say otherwise.
     """
 
     def __init__(
@@ -65,9 +74,23 @@ class Node:
         self.services: dict[str, ServiceServer] = {}
         self.parameters: set[str] = set()
         """The parameters of whose changes the master tells this node: subscribed to by whoever put them here."""
+        self._tables: Mapping[str, dict[str, Any]] = {
+            "Publisher": self.publications,
+            "Subscriber": self.subscriptions,
+            "Service": self.services,
+        }
+        self._known: dict[_Key, _Part | None] = {}
+        """What the master has of this node; None where a call failed, or has no answer yet."""
+        self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
+        self._telling: set[asyncio.Task[None]] = set()
+        self._left: dict[str, asyncio.TimerHandle] = {}
+        """Topics of which subscriptions have ended of late."""
+        self._asking: dict[str, asyncio.TimerHandle] = {}
+        """Topics whose publishers the master is to be asked for again."""
         self.uri = ""
         self._on_shutdown = on_shutdown
         self._on_parameter = on_parameter
+        self._parameters_told = InOrder(self.workers)
         self._watch_seconds = watch_seconds
         self.when_registered_again: list[Callable[[], object]] = []
         """Called in workers when the master had forgotten this node: for what else it has to be told."""
@@ -105,7 +128,11 @@ class Node:
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.nearby else (),
         )
-        await self._server.start()
+        try:
+            await self._server.start()
+        except BaseException:
+            await self.close()
+            raise
         self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
         self._watching = asyncio.ensure_future(self._watch_master())
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
@@ -120,6 +147,8 @@ class Node:
         watching = [self._watching] if self._watching else []
         for task in watching:
             task.cancel()
+        for timer in [*self._left.values(), *self._asking.values()]:
+            timer.cancel()
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
             asyncio.wait_for(self._unregister_all(), _UNREGISTER_SECONDS),
@@ -136,6 +165,10 @@ class Node:
         if self._server:
             await self._server.close()
         await self._rpc.close()
+        # A master that does not answer has had its time.
+        for telling in self._telling:
+            telling.cancel()
+        await asyncio.gather(*self._telling, return_exceptions=True)
 
     async def master(self, method: str, *args: Any) -> Any:
         """Call the master as this node; the value of its answer.
@@ -159,14 +192,14 @@ class Node:
         """Publish a topic from now on. One publication a topic: a second is a ValueError."""
         if self.publications.setdefault(publication.topic, publication) is not publication:
             raise ValueError(f"{self.name} publishes {publication.topic} already")
-        publication.expected = len(await self.master(*self._registration(publication)))
+        await self._tell(("Publisher", publication.topic))
 
     async def unadvertise(self, publication: Publication) -> None:
         """Stop publishing."""
         if self.publications.get(publication.topic) is publication:
             del self.publications[publication.topic]
             try:
-                await self.master("unregisterPublisher", publication.topic, self.uri)
+                await self._tell(("Publisher", publication.topic))
             finally:
                 publication.close()
 
@@ -200,14 +233,19 @@ class Node:
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
-        subscription.publishers_changed(await self._register_subscription(subscription))
+        await self._tell(("Subscriber", topic))
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """Stop listening."""
-        if self.subscriptions.get(subscription.topic) is subscription:
-            del self.subscriptions[subscription.topic]
+        topic = subscription.topic
+        if self.subscriptions.get(topic) is subscription:
+            del self.subscriptions[topic]
             subscription.close()
-            await self.master("unregisterSubscriber", subscription.topic, self.uri)
+            if topic in self._left:
+                self._left[topic].cancel()
+            loop = asyncio.get_running_loop()
+            self._left[topic] = loop.call_later(_STALE_SECONDS, self._left.pop, topic)
+            await self._tell(("Subscriber", topic))
 
     def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
@@ -227,14 +265,14 @@ class Node:
         """Offer a service from now on. One of a name: a second is a ValueError."""
         if self.services.setdefault(server.name, server) is not server:
             raise ValueError(f"service [{server.name}] already registered")
-        await self.master(*self._registration(server))
+        await self._tell(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
         """Stop offering a service; calls under way are ended."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()
-            await self.master("unregisterService", server.name, self.service_uri)
+            await self._tell(("Service", server.name))
 
     @property
     def service_uri(self) -> str:
@@ -246,16 +284,27 @@ class Node:
         subscription = self.subscriptions.get(topic)
         if subscription:
             subscription.publishers_changed(uris)
+            if topic in self._left and topic not in self._asking:
+                # It may have been meant for the subscription before: rosmaster's lists wait in a queue.
+                loop = asyncio.get_running_loop()
+                self._asking[topic] = loop.call_later(_ASK_AGAIN_SECONDS, self._ask_again, topic)
 
     def parameter_changed(self, key: str, value: Any) -> None:
         """The master told of a parameter's new value."""
         if self._on_parameter:
-            self.workers.start(self._on_parameter, key, value)
+            self._parameters_told.start(self._on_parameter, key, value)
 
     def request_shutdown(self, reason: str) -> None:
         """Somebody outside asks this node to stop."""
         if self._on_shutdown:
             self.workers.start(self._on_shutdown, reason)
+
+    def _ask_again(self, topic: str) -> None:
+        del self._asking[topic]
+        key = ("Subscriber", topic)
+        if self._known.get(key):
+            self._known[key] = None
+            self._start_telling(key)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
         """A peer has connected: its header says which topic or service it wants."""
@@ -304,13 +353,55 @@ class Node:
                 environment.master_uri,
             )
 
-    def _registration(self, part: Publication | Subscription | ServiceServer) -> tuple[str, ...]:
-        """The call that tells the master of a part of this node."""
+    async def _tell(self, key: _Key, *, again: bool = False) -> None:
+        """Tell the master what this node has of one name, a part or nothing, where it does not know.
+
+        One call after the other for each name, and what is on its way is not taken back: a registration could overtake
+        the end of the one before, which would undo it, or the end of the node could overtake a registration.
+        """
+        await asyncio.shield(self._start_telling(key, again=again))
+
+    def _start_telling(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
+        task = asyncio.ensure_future(self._tell_in_turn(key, again=again))
+        self._telling.add(task)
+        task.add_done_callback(self._has_told)
+        return task
+
+    def _has_told(self, task: asyncio.Task[None]) -> None:
+        self._telling.discard(task)
+        if not task.cancelled():
+            # Whoever waits gets its error; nobody has to, since it is tried again.
+            task.exception()
+
+    async def _tell_in_turn(self, key: _Key, *, again: bool) -> None:
+        async with self._turns.setdefault(key, asyncio.Lock()):
+            part = self._wanted(key)
+            if part is not None and self._known.get(key) is not part:
+                self._known[key] = None
+                await self._register(part, again=again)
+                self._known[key] = part
+            elif part is None and key in self._known:
+                self._known[key] = None
+                kind, name = key
+                uri = self.service_uri if kind == "Service" else self.uri
+                await self.master(f"unregister{kind}", name, uri)
+                # A look at a master that has restarted may have come first.
+                self._known.pop(key, None)
+
+    def _wanted(self, key: _Key) -> _Part | None:
+        """What the master is to have of one name."""
+        kind, name = key
+        return None if self._closed else self._tables[kind].get(name)
+
+    async def _register(self, part: _Part, *, again: bool) -> None:
         if isinstance(part, Publication):
-            return "registerPublisher", part.topic, part.type.name, self.uri
-        if isinstance(part, Subscription):
-            return "registerSubscriber", part.topic, part.type.name, self.uri
-        return "registerService", part.name, self.service_uri, self.uri
+            subscribers = await self.master("registerPublisher", part.topic, part.type.name, self.uri)
+            part.expected = len(subscribers)
+        elif isinstance(part, Subscription):
+            uris = await self._register_subscription(part)
+            (part.registered_again if again else part.publishers_changed)(uris)
+        else:
+            await self.master("registerService", part.name, self.service_uri, self.uri)
 
     async def _register_subscription(self, subscription: Subscription) -> list[str]:
         """Tell the master of a subscription; its publishers.
@@ -320,77 +411,73 @@ class Node:
         """
         while True:
             lists = subscription.lists
-            uris: list[str] = await self.master(*self._registration(subscription))
-            is_wanted = self.subscriptions.get(subscription.topic) is subscription
+            uris: list[str] = await self.master(
+                "registerSubscriber", subscription.topic, subscription.type.name, self.uri
+            )
+            is_wanted = self._wanted(("Subscriber", subscription.topic)) is subscription
             if subscription.lists == lists or not is_wanted:
                 return uris
 
     async def _watch_master(self) -> None:
-        """Notice a master that has restarted and forgotten this node, and register again.
+        """Notice a master that has restarted and forgotten this node, and register again; say what it missed.
 
-        The master is asked for this node's own name: its process id tells nothing in a container, where each
-        has the same, nor of a master that kept its tables.
+        The master is asked for a service of this node, or else for its name, by which it may know it again on account
+        of a topic that is newer than the restart. Its process id tells nothing in a container, where each has the same,
+        nor of a master that kept its tables.
         """
-        failures, is_known = 0, True
+        failures = 0
         while True:
             await asyncio.sleep(self._watch_seconds)
-            if not (self.publications or self.subscriptions or self.services):
+            if not (self._known or any(self._tables.values())):
                 continue
+            known = [key for key, part in self._known.items() if part]
+            asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
+            has_forgotten = False
             try:
-                await self.master("lookupNode", self.name)
+                if asked and asked[0] == "Service":
+                    await self.master("lookupService", asked[1])
+                else:
+                    await self.master("lookupNode", self.name)
             except MasterUnreachableError as error:
                 failures += 1
                 if failures == 2:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
+                continue
             except RpcRefused:
-                failures = 0
-                # A node that the master never accepted is not told of each time.
-                was_known, is_known = is_known, await self._register_all()
-                if is_known:
-                    _log.warning(
-                        "the master at %s has restarted: registered again", self.environment.master_uri
-                    )
-                    for function in self.when_registered_again:
-                        self.workers.start(function)
-                elif was_known:
-                    _log.warning("the master does not know this node, and refuses to")
+                # What was ended meanwhile is unknown for good reason.
+                has_forgotten = asked is not None and self._known.get(asked) is not None
             except RpcError as error:
                 _log.debug("asking the master for this node: %s", error)
-            else:
-                failures, is_known = 0, True
-
-    async def _register_all(self) -> bool:
-        """Tell the master of everything; whether it took any of it."""
-        parts: list[Publication | Subscription | ServiceServer] = [
-            *self.publications.values(),
-            *self.subscriptions.values(),
-            *self.services.values(),
-        ]
-        is_known = False
-        for part in parts:
-            try:
-                if isinstance(part, Subscription):
-                    part.registered_again(await self._register_subscription(part))
-                else:
-                    await self.master(*self._registration(part))
-            except (MasterUnreachableError, RpcError) as error:
-                _log.debug("registering again: %s", error)
                 continue
-            is_known = True
-        return is_known
+            failures = 0
+            if has_forgotten:
+                self._known.clear()
+            with contextlib.suppress(MasterUnreachableError):
+                await self._tell_all(again=has_forgotten)
+            if has_forgotten and any(self._known.values()):
+                _log.warning("the master at %s has restarted: registered again", self.environment.master_uri)
+                for function in self.when_registered_again:
+                    self.workers.start(function)
+            elif has_forgotten:
+                # Once: it is not taken for one that knows this node any more.
+                _log.warning("the master does not know this node, and refuses to")
+
+    async def _tell_all(self, *, again: bool = False) -> None:
+        """Tell the master of all that it does not know. Raises MasterUnreachableError."""
+        keys = [(kind, name) for kind, table in self._tables.items() for name in table]
+        for key in dict.fromkeys([*keys, *self._known]):
+            # One that the master never accepts must not keep the others from it.
+            try:
+                await self._tell(key, again=again)
+            except RpcError as error:
+                _log.debug("telling the master of %s: %s", key, error)
 
     async def _unregister_all(self) -> None:
-        calls = [
-            *(("unregisterPublisher", topic, self.uri) for topic in self.publications),
-            *(("unregisterSubscriber", topic, self.uri) for topic in self.subscriptions),
-            *(("unregisterService", name, self.service_uri) for name in self.services),
-            *(("unsubscribeParam", self.uri, key) for key in list(self.parameters)),
-        ]
         with contextlib.suppress(MasterUnreachableError):
-            for call in calls:
-                # One that the master never accepted must not keep the others registered.
+            await self._tell_all()
+            for parameter in list(self.parameters):
                 with contextlib.suppress(RpcError):
-                    await self.master(*call)
+                    await self.master("unsubscribeParam", self.uri, parameter)
 
 
 def _is_loopback(host: str) -> bool:

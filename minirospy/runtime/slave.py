@@ -27,7 +27,10 @@ class _Refusal(Exception):
 
 
 class SlaveApi:
-    """One method per call of the API; ``dispatch`` is what the XML-RPC server calls (on the loop)."""
+    """One method per call of the API; ``dispatch`` is what the XML-RPC server calls (on the loop).
+
+    Those that only tell may be called from any thread.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -78,7 +81,7 @@ class SlaveApi:
                 sum(link.sent_bytes for link in publication.links),
                 [[link.number, link.sent_bytes, link.sent, True] for link in publication.links],
             ]
-            for publication in self._node.publications.values()
+            for publication in list(self._node.publications.values())
         ]
         subscriptions = [
             [
@@ -86,7 +89,7 @@ class SlaveApi:
                 # How many were lost on the way, nobody knows: -1.
                 [[link.number, link.received_bytes, link.received, -1, True] for link in subscription.links],
             ]
-            for subscription in self._node.subscriptions.values()
+            for subscription in list(self._node.subscriptions.values())
         ]
         return [_SUCCESS, "", [publications, subscriptions, []]]
 
@@ -94,11 +97,11 @@ class SlaveApi:
         """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
         rows: list[list[Any]] = []
         port = self._node.tcpros_port
-        for publication in self._node.publications.values():
+        for publication in list(self._node.publications.values()):
             for out in publication.links:
                 what = _connection_text(out, port)
                 rows.append([out.number, out.peer, "o", out.transport, publication.topic, True, what])
-        for subscription in self._node.subscriptions.values():
+        for subscription in list(self._node.subscriptions.values()):
             for link in subscription.links:
                 what = _connection_text(link, link.local_port)
                 rows.append([link.number, link.uri, "i", link.transport, subscription.topic, True, what])
@@ -122,12 +125,12 @@ class SlaveApi:
 
     def get_publications(self, caller_id: str) -> list[Any]:
         """[topic, type] of each topic that this node publishes."""
-        rows = [[p.topic, p.type.name] for p in self._node.publications.values()]
+        rows = [[p.topic, p.type.name] for p in list(self._node.publications.values())]
         return [_SUCCESS, "publications", rows]
 
     def get_subscriptions(self, caller_id: str) -> list[Any]:
         """[topic, type] of each topic that this node subscribes to."""
-        rows = [[s.topic, s.type.name] for s in self._node.subscriptions.values()]
+        rows = [[s.topic, s.type.name] for s in list(self._node.subscriptions.values())]
         return [_SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: Any) -> list[Any]:

@@ -214,7 +214,7 @@ class Subscription:
         self.newest = newest
         self._this_host = this_host
         self.tcp_nodelay = tcp_nodelay
-        self.links: tuple[InLink, ...] = ()
+        self._links: dict[str, InLink] = {}
         self._caller_id = caller_id
         self._deliver = deliver
         self._rpc = rpc
@@ -233,6 +233,11 @@ class Subscription:
         self.on_connected: list[Callable[[], object]] = []
         """Called on the loop when a publisher is connected."""
         self._closed = False
+
+    @property
+    def links(self) -> tuple[InLink, ...]:
+        """The connections to publishers, one to each at most."""
+        return tuple(self._links.values())
 
     def publishers_changed(self, uris: Iterable[str]) -> None:
         """The master's list of publishers has come (on the loop)."""
@@ -264,31 +269,29 @@ class Subscription:
             self._settling.cancel()
         for task in self._connecting.values():
             task.cancel()
-        # At once: a link itself ends when its reader has noticed.
-        ended, self.links = self.links, ()
-        for link in ended:
-            link.close()
+        for uri in list(self._links):
+            self._disconnect(uri)
 
     def _settle(self) -> None:
         """Forget whom the master does not name, unless the link is up: nodes of rospy never register again."""
         self._settling = None
-        linked = {link.uri for link in self.links}
         for action in self._plan.publishers_changed(self._named):
             if isinstance(action, Connect):
                 self._start_connecting(action)
-            elif action.uri not in linked:
+            elif action.uri not in self._links:
                 self._disconnect(action.uri)
 
     def _disconnect(self, uri: str) -> None:
         task = self._connecting.pop(uri, None)
         if task:
             task.cancel()
-        for link in self.links:
-            if link.uri == uri:
-                link.close()
+        # At once: a link itself ends when its reader has noticed.
+        link = self._links.pop(uri, None)
+        if link:
+            link.close()
 
     def _start_connecting(self, action: Connect) -> None:
-        if any(link.uri == action.uri and not link.closed for link in self.links):
+        if action.uri in self._links:
             return
         task = asyncio.ensure_future(self._connect(action.uri, action.delay))
         self._connecting[action.uri] = task
@@ -302,21 +305,26 @@ class Subscription:
     async def _connect(self, uri: str, delay: float) -> None:
         if delay:
             await asyncio.sleep(delay)
+        lists = self.lists
         try:
             link = await self._open_link(uri)
         except HandshakeRefused as error:
             _log.warning("publisher %s of %s refused the connection: %s", uri, self.topic, error)
-            self._plan.refused(uri)
+            if self.lists == lists:
+                self._plan.refused(uri)
+            else:
+                # The next list, which may be the last, has come already, and may be due to what it refuses no more.
+                self._retry(uri, error)
         except _NoPublisher as error:
             self._complaints.warning("no connection for %s: %s", self.topic, error)
         except (RpcError, WireError, OSError) as error:
             self._retry(uri, error)
         else:
-            if self._closed or uri not in self._plan.publishers:
+            if self._closed or self._connecting.get(uri) is not asyncio.current_task():
                 # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the last byte.
                 link.sock.close()
                 return
-            self.links += (link,)
+            self._links[uri] = link
             for tell in self.on_connected:
                 tell()
             if self._on_loop:
@@ -395,9 +403,9 @@ class Subscription:
                 loop.call_soon_threadsafe(self._link_ended, link)
 
     def _link_ended(self, link: InLink) -> None:
-        self.links = tuple(other for other in self.links if other is not link)
         if link.closed:
             return
+        del self._links[link.uri]
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
             # Once is enough to tell: what follows in such a stream is garbage too.

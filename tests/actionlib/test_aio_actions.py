@@ -167,6 +167,20 @@ def test_a_newer_goal_takes_the_place_of_the_one_that_runs() -> None:
     run(main)
 
 
+def test_goals_that_come_at_once_each_have_an_end() -> None:
+    """One that makes way before its work has begun, too."""
+
+    async def main(client: Client, server: Server) -> None:
+        await client.wait_for_server()
+        await client.send(msg.TestGoal(1))
+        goals = [client.send(msg.TestGoal(1)) for _ in range(5)]
+        ends = await asyncio.wait_for(asyncio.gather(*goals, return_exceptions=True), 5)
+        assert ends[-1].result == 1  # type: ignore[union-attr]
+        assert {goal.state for goal in goals[:-1]} <= {GoalState.PREEMPTED, GoalState.RECALLED}
+
+    run(main)
+
+
 def test_goals_side_by_side() -> None:
     async def main(client: Client, _: Server) -> None:
         long = client.send(msg.TestGoal(3))
@@ -236,13 +250,34 @@ def test_a_cancel_where_somebody_only_looks_on() -> None:
     asyncio.run(main(), debug=True)
 
 
-def test_a_cancel_that_comes_before_its_goal() -> None:
+def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.actionlib.aio.server._CANCEL_SECONDS", 0)
+
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()
         goal = client.send(msg.TestGoal(3))
         await server._take_cancel(GoalID(id=goal.id))
         with pytest.raises(GoalError, match="recalled: it was cancelled before it came"):
             await goal
+
+    run(main)
+
+
+def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A goal of a client that is no minirospy's waits a moment before it is taken."""
+    monkeypatch.setattr("minirospy.actionlib.aio.server._SEND_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.actionlib.aio.server._CANCEL_SECONDS", 0.3)
+
+    async def main(_: Client, server: Server) -> None:
+        async with (
+            Node("other", rosout=False) as other,
+            other.advertise("act/goal", msg.TestActionGoal) as goals,
+        ):
+            await goals.wait_for_subscribers()
+            await goals.publish(goal_id=GoalID(id="other-1"), goal=msg.TestGoal(3))
+            await asyncio.sleep(0.05)
+            await server._take_cancel(GoalID())
+            assert server._goals["other-1"].is_cancel_requested
 
     run(main)
 

@@ -26,6 +26,15 @@ GUARD = 45.0
 """Seconds after which a program hangs; a machine that tests may stand still for some."""
 
 
+def read_line(process: subprocess.Popen[str]) -> str:
+    """A line that a program prints. What came with it would be lost to communicate(), so nothing else is read."""
+    assert process.stdout
+    line = b""
+    while not line.endswith(b"\n") and (byte := os.read(process.stdout.fileno(), 1)):
+        line += byte
+    return line.decode().replace("\r\n", "\n")
+
+
 def start(script: str, *arguments: str) -> subprocess.Popen[str]:
     """A program that has said "ready"."""
     process = subprocess.Popen(
@@ -35,8 +44,7 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
         stdin=subprocess.PIPE,
         text=True,
     )
-    assert process.stdout
-    line = process.stdout.readline()
+    line = read_line(process)
     assert line == "ready\n", process.communicate()[1]
     return process
 
@@ -374,8 +382,7 @@ for _ in range(10):
     time.sleep(0.02)
 print("done", flush=True)
 """)
-    assert process.stdout
-    assert process.stdout.readline() == "hook\n"
+    assert read_line(process) == "hook\n"
     process.send_signal(signal.SIGSTOP)
     time.sleep(1.0)
     process.send_signal(signal.SIGCONT)

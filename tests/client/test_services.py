@@ -161,3 +161,54 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
         ok, length = struct.unpack("<BI", answer.read(5))
         assert ok == 0
         assert answer.read(length).startswith(b"error processing request: ")
+
+
+def test_a_call_of_what_is_not_there_fails_with_one_error(started: list[Program]) -> None:
+    """rospy tells of its own insides before it."""
+    client = start(
+        started,
+        """
+import rospy
+from std_srvs.srv import Trigger
+
+rospy.init_node("n")
+try:
+    rospy.ServiceProxy("/nobody", Trigger)()
+except rospy.ServiceException as error:
+    print(error, error.__suppress_context__ and error.__cause__, flush=True)
+""",
+    )
+    assert hear(client) == "service [/nobody] unavailable None"
+    assert client.wait(30) == 0
+
+
+def test_a_service_that_one_thread_ends_another_may_offer_at_that_moment(started: list[Program]) -> None:
+    node = start(
+        started,
+        """
+import threading
+import minirospy.client.services as module
+import rospy
+from std_srvs.srv import Trigger
+
+rospy.init_node("n")
+offered = []
+
+def offer():
+    offered.append(rospy.Service("/s", Trigger, lambda request: (True, str(len(offered)))))
+
+def let_another_begin(wait):
+    other = threading.Thread(target=offer)
+    other.start()
+    other.join(20)
+    unregister_from_master(wait)
+
+unregister_from_master = module.unregister_from_master
+module.unregister_from_master = let_another_begin
+offer()
+offered[0].shutdown()
+print(rospy.ServiceProxy("/s", Trigger)().message, flush=True)
+""",
+    )
+    assert hear(node) == "2"
+    assert node.wait(30) == 0

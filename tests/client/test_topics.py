@@ -264,6 +264,105 @@ sys.stdin.read()
 """
 
 
+AT_ONCE = """
+import minirospy.client.{module} as module
+
+rospy.init_node("n")
+arrived = threading.Event()
+ends = []
+
+def begin():
+    ends.append(rospy.{begin})
+
+def let_another_begin(wait):
+    module.unregister_from_master = unregister_from_master
+    other = threading.Thread(target=begin)
+    other.start()
+    other.join(20)
+    unregister_from_master(wait)
+
+unregister_from_master = module.unregister_from_master
+module.unregister_from_master = let_another_begin
+begin()
+ends[0].unregister()
+peer = rospy.{peer}
+eventually(ends[1].get_num_connections)
+print(ends[1].get_num_connections())
+"""
+
+
+@pytest.mark.parametrize("kind", ["Publisher", "Subscriber"])
+def test_a_topic_that_one_thread_leaves_another_may_join_at_that_moment(start: Start, kind: str) -> None:
+    calls = ['Subscriber("/t", Bool)', 'Publisher("/t", Bool, queue_size=1)']
+    begin, peer = calls if kind == "Subscriber" else calls[::-1]
+    assert finished(start(AT_ONCE.format(module=kind.lower(), begin=begin, peer=peer))) == ("1\n", "")
+
+
+FIRST_AT_ONCE = """
+rospy.init_node("n")
+sys.setswitchinterval(1e-6)
+for number in range(40):
+    gate = threading.Barrier(4)
+
+    def begin():
+        gate.wait()
+        ends.append(rospy.{begin})
+
+    ends = []
+    threads = [threading.Thread(target=begin) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(ends) == 4
+    for end in ends:
+        end.unregister()
+print("done")
+"""
+
+
+@pytest.mark.parametrize("begin", ['Subscriber(f"/t{number}", Bool)', 'Publisher("/t", Bool, queue_size=1)'])
+def test_several_threads_may_be_the_first_of_a_topic(start: Start, begin: str) -> None:
+    assert finished(start(FIRST_AT_ONCE.format(begin=begin))) == ("done\n", "")
+
+
+LATCHED_MEANWHILE = """
+from minirospy.client.subscriber import Subscribed
+
+rospy.init_node("n")
+publisher = rospy.Publisher("/t", Int32, latch=True, queue_size=1)
+publisher.publish(1)
+early, late = [], []
+rospy.Subscriber("/t", Int32, early.append)
+eventually(lambda: early)
+join = Subscribed.join
+
+def join_a_moment_later(*args):
+    publisher.publish(2)
+    eventually(lambda: len(early) == 2)
+    join(*args)
+
+Subscribed.join = join_a_moment_later
+rospy.Subscriber("/t", Int32, late.append)
+Subscribed.join = join
+print([message.data for message in late])
+
+def on_message(message):
+    if message.data == 2:
+        publisher.publish(3)
+        eventually(lambda: newest == [3])
+    newest.append(message.data)
+
+newest = []
+rospy.Subscriber("/t", Int32, on_message)
+print(newest[-1])
+"""
+
+
+def test_a_latched_message_that_comes_at_this_moment_is_the_last_one_heard(start: Start) -> None:
+    assert finished(start(LATCHED_MEANWHILE)) == ("[2]\n3\n", "")
+
+
 def test_a_publisher_that_was_killed_and_comes_back_is_heard_again(start: Start) -> None:
     listener = start(LISTENER)
     assert line(listener) == "ready"

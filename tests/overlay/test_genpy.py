@@ -120,10 +120,12 @@ def test_classes_by_name() -> None:
     assert genpy.message.get_message_class("nope/Nope") is None
     assert genpy.message.get_service_class("std_srvs/SetBool") is SetBool
     assert genpy.message.get_service_class("std_msgs/Bool") is None
-    with pytest.raises(ValueError, match="message type is missing package name: Bool"):
-        genpy.message.get_message_class("Bool")
-    with pytest.raises(ValueError, match=r"invalid name \[std_msgs/msg/Bool\]"):
-        genpy.message.get_message_class("std_msgs/msg/Bool")
+    for nameless in ("Bool", "/Bool", "/", ""):
+        with pytest.raises(ValueError, match=f"message type is missing package name: {nameless}$"):
+            genpy.message.get_message_class(nameless)
+    for wrong in ("std_msgs/msg/Bool", "//Bool"):
+        with pytest.raises(ValueError, match=rf"invalid name \[{wrong}\]"):
+            genpy.message.get_message_class(wrong)
 
 
 def test_small_things() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
@@ -18,6 +19,8 @@ from minirospy.runtime.loop import new_event_loop
 from minirospy.runtime.node import Node
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.slave import SlaveApi
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import InterfaceType
 
 NO_MASTER = {"ROS_MASTER_URI": "http://127.0.0.1:1", "ROS_IP": "127.0.0.1"}
 
@@ -140,3 +143,56 @@ def test_a_node_that_is_on_loopback_for_a_master_elsewhere_says_so(
 
     run(scene)
     assert ("set ROS_IP" in caplog.text) == told
+
+
+def test_news_of_parameters_are_told_in_order() -> None:
+    told: list[int] = []
+    both, later = threading.Event(), threading.Event()
+
+    def on_parameter(key: str, value: int) -> None:
+        if value == 1:
+            # Two workers would tell of the second meanwhile.
+            later.wait(0.1)
+        told.append(value)
+        if value == 2:
+            later.set()
+            both.set()
+
+    node = Node("/n", Environment.read(NO_MASTER), on_parameter=on_parameter)
+    node.parameter_changed("/p", 1)
+    node.parameter_changed("/p", 2)
+    assert both.wait(30)
+    assert told == [1, 2]
+
+
+def test_other_threads_may_ask_what_there_is_while_it_changes() -> None:
+    node = Node("/n", Environment.read(NO_MASTER))
+
+    class Publishing(Publication):
+        @property
+        def topic(self) -> str:
+            node.publications["/other"] = Publication("/other", self.type)
+            return "/t"
+
+        @topic.setter
+        def topic(self, topic: str) -> None:
+            pass
+
+    node.publications["/t"] = Publishing("/t", InterfaceType("std_msgs/Bool", "*"))
+    assert SlaveApi(node).get_publications("/n")[2] == [["/t", "std_msgs/Bool"]]
+
+
+def test_a_port_that_is_taken_leaves_nothing_open() -> None:
+    async def scene() -> None:
+        node = Node("/n", Environment.read(NO_MASTER))
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            with pytest.raises(OSError, match="use"):
+                await node.start(xmlrpc_port=taken.getsockname()[1])
+        port = node.tcpros_port
+        assert port
+        with pytest.raises(ConnectionRefusedError):
+            await tcp.connect("127.0.0.1", port)
+
+    run(scene)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import socket
 from collections.abc import Callable, Coroutine
@@ -253,15 +254,21 @@ def test_a_kept_connection_ends_with_its_server() -> None:
 
 def test_what_a_server_says_unasked_is_nobodys_answer() -> None:
     body = b"<methodResponse><params><param><value>%d</value></param></params></methodResponse>"
-    calls = 0
+    calls = ended = 0
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        nonlocal calls
-        while await reader.readuntil(b"</methodCall>\n"):
-            calls += 1
-            one = body % calls
-            answer = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (len(one), one)
-            writer.write(answer + answer[:-5])
+        nonlocal calls, ended
+        # It goes on until the client has gone.
+        with contextlib.suppress(asyncio.IncompleteReadError, OSError):
+            while await reader.readuntil(b"</methodCall>\n"):
+                calls += 1
+                one = body % calls
+                answer = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s" % (len(one), one)
+                writer.write(answer + answer[:-5])
+        with contextlib.suppress(OSError):
+            writer.close()
+            await writer.wait_closed()
+        ended += 1
 
     async def test() -> None:
         server = await asyncio.start_server(serve, "127.0.0.1", 0)
@@ -269,6 +276,7 @@ def test_what_a_server_says_unasked_is_nobodys_answer() -> None:
         uri = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/"
         assert [await client.call(uri, "a") for _ in range(3)] == ["1", "2", "3"]
         await client.close()
+        await until(lambda: ended == 3)
         server.close()
 
     run(test)

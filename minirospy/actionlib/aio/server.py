@@ -31,6 +31,9 @@ _SECONDS_A_STATUS = 1e-4
 _SEND_SECONDS = 1e-3
 """A client of actionlib in Python drops what comes before its send_goal has returned: a result, too."""
 
+_CANCEL_SECONDS = 3 * _SEND_SECONDS
+"""A cancel waits so long: the goal that was sent before it comes by another connection, and waits itself."""
+
 _EVENTS = {
     GoalState.PREEMPTED: GoalEvent.CANCEL,
     GoalState.RECALLED: GoalEvent.CANCEL,
@@ -51,6 +54,7 @@ class ServerGoal(Generic[_G, _F]):
         self._server = server
         self._status = GoalStatus(goal_id=message.goal_id)
         self._task: asyncio.Task[None] | None = None
+        self._has_begun = False
         self._ended_at = 0
 
     @property
@@ -76,7 +80,9 @@ class ServerGoal(Generic[_G, _F]):
         """Cancel what works on it; once."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            self._task.cancel()
+            # A task that has not begun would end without a word.
+            if self._has_begun:
+                self._task.cancel()
 
 
 Execute = Callable[[ServerGoal[_G, _F]], Awaitable[Any]]
@@ -204,6 +210,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         return False
 
     async def _take_cancel(self, cancel: GoalID) -> None:
+        await asyncio.sleep(_CANCEL_SECONDS)
         stamp = cancel.stamp.to_nsec()
         for goal in self._running():
             if is_meant(cancel.id, stamp, goal.id, goal._status.goal_id.stamp.to_nsec()):
@@ -218,7 +225,10 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     async def _run(self, goal: ServerGoal[_G, _F], before: list[asyncio.Task[None]]) -> None:
         """Work on a goal, when those before it have made way."""
         event, result, returned = GoalEvent.SUCCEED, None, None
+        goal._has_begun = True
         try:
+            if goal.is_cancel_requested:
+                raise asyncio.CancelledError
             if before:
                 await asyncio.wait(before)
             goal._step(GoalEvent.ACCEPT)

@@ -1,0 +1,48 @@
+"""runtime/loop: the bridge between threads and the loop, at the loop's end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+
+import pytest
+
+from minirospy.runtime.loop import LoopClosedError, LoopThread
+
+
+def test_a_call_that_comes_while_the_loop_ends_is_told_so() -> None:
+    thread = LoopThread("test-loop")
+    stopping, begun = threading.Event(), threading.Event()
+
+    def stop() -> None:
+        thread.loop.stop()
+        stopping.set()
+        begun.wait(30)
+
+    thread.post(stop)
+    assert stopping.wait(30)
+    waits = [thread.begin(asyncio.sleep(0)), thread.begin(asyncio.sleep(60))]
+    begun.set()
+    # This one may just come to its end.
+    with contextlib.suppress(LoopClosedError):
+        waits[0](10)
+    with pytest.raises(LoopClosedError):
+        waits[1](10)
+    with pytest.raises(LoopClosedError):
+        thread.run(asyncio.sleep(0))
+    thread.close()
+
+
+def test_calls_begin_in_their_order() -> None:
+    thread = LoopThread("test-loop")
+    order: list[int] = []
+
+    async def come(number: int) -> None:
+        order.append(number)
+
+    waits = [thread.begin(come(number)) for number in range(100)]
+    for wait in reversed(waits):
+        wait(10)
+    assert order == list(range(100))
+    thread.close()
