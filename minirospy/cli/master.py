@@ -12,6 +12,7 @@ import logging
 import os
 import signal
 import sys
+import threading
 import uuid
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -110,8 +111,11 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
             parser.error(f"port {port} is not between 0 and 65535")
         if options.status:
             return _status(environment, port)
-        if options.timeout <= 0:
+        if not options.timeout > 0:
             parser.error("the timeout is more than 0 seconds")
+        if not all(each.strip(" ,") for each in options.allow):
+            # A variable that is not set, perhaps: surely not what lets everybody in.
+            parser.error("--allow wants a network, as 192.168.65.0/24, or an address")
         environment = environment._replace(allow=",".join(options.allow) or environment.allow)
         loop = new_event_loop()
         try:
@@ -142,7 +146,9 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
     except OSError as error:
         raise _port_error(name, environment.host, port, error) from error
     keep = True
+    pid_file = environment.home / f"roscore-{master.port}.pid"
     try:
+        _write_pid(pid_file)
         run_id = master.session or str(uuid.uuid1())
         log_file, master.say = _log_to_file(
             environment.log_dir / run_id, verbose=options.verbose, level=options.master_logger_level
@@ -152,25 +158,40 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
         where = listening_lines(environment.bind_host, master.port, access)
         if not options.quiet:
             logs = f"log file {log_file}" if log_file else "no log file"
-            print(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")
-            print("\n".join([where[0], *master.news]))
-            print(f"ROS_MASTER_URI={master.uri}", flush=True)
+            _show(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")
+            _show("\n".join([where[0], *master.news]))
+            _show(f"ROS_MASTER_URI={master.uri}")
         if where[1:]:
             print("\n".join(where[1:]), file=sys.stderr, flush=True)
-        _warn_of_host(environment.host)
+        _warn_of_host(environment)
+        if not options.quiet and name != "rosmaster":
+            # In a thread: a name server that is out of reach keeps nobody else waiting.
+            threading.Thread(target=_warn_of_uri, args=(environment, master), daemon=True).start()
         for line in (*where, *master.news):
             logging.getLogger("minirospy.master").warning(line)
         rosout_file = log_file.with_name("rosout.log") if log_file else None
         rosout = None
         if not options.no_rosout:
-            rosout = RosoutNode(environment._replace(master_uri=master.uri), rosout_file)
+            rosout = RosoutNode(
+                environment._replace(master_uri=master.uri), rosout_file, lambda: master.omits_topics
+            )
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
+        # While it has the port: the file may be the next one's right after.
+        with contextlib.suppress(OSError):
+            pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
     if not options.quiet:
-        print("master stopped", flush=True)
+        _show("master stopped")
     return 0
+
+
+def _write_pid(path: Path) -> None:
+    """For scripts that look there, as in ROS, whom to end."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(str(os.getpid()))
 
 
 async def _run(
@@ -182,9 +203,9 @@ async def _run(
             await rosout.start()
             master.adopt(rosout.node)
         if not quiet:
-            print(f"setting /run_id to {run_id}")
+            _show(f"setting /run_id to {run_id}")
             core = "started core service [/rosout]; " if rosout else ""
-            print(f"{core}Ctrl-C stops the master", flush=True)
+            _show(f"{core}Ctrl-C stops the master")
         await _first(stop, master.stopped)
     finally:
         if rosout:
@@ -224,17 +245,32 @@ def _span(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}"
 
 
-def _warn_of_host(host: str) -> None:
-    """Say so where ROS_IP is no address of this machine: most often that of yesterday's network.
+def _warn_of_host(environment: Environment) -> None:
+    """Say so where nobody reaches ROS_IP: most often it is that of yesterday's network.
 
     Names are left alone: a name server that is out of reach would keep the master waiting.
     """
+    host = environment.host
+    variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
     if host.replace(".", "").isdigit() and not is_own_host(host):
-        variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
         warn(
             f"{variable}={host} is no address of this machine: right only behind NAT or in a container "
             "(`minirospy doctor` tells more)"
         )
+    elif ":" in host and not environment.ipv6:
+        warn(f"{variable}={host} is an address of IPv6, where nobody listens without ROS_IPV6=on")
+
+
+def _warn_of_uri(environment: Environment, master: Master) -> None:
+    """Say so where ROS_MASTER_URI, which nodes that are started next to this master go by, leads to another one."""
+    host, port = environment.master_address
+    if port != master.port:
+        what = f"port [{port}] does not match this roscore [{master.port}]"
+    elif not is_own_host(host, environment.host):
+        what = f"[{environment.master_uri}] host is not set to this machine"
+    else:
+        return
+    warn(f"ROS_MASTER_URI {what}: nodes find it with ROS_MASTER_URI={master.uri.rstrip('/')}")
 
 
 def _most_clients() -> int:

@@ -79,7 +79,7 @@ class ParameterTree:
             table[path[-1]] = value
         return self._updates(path, value, caller_id)
 
-    def delete(self, key: str, caller_id: str) -> list[ParameterUpdate]:
+    def delete(self, key: str) -> list[ParameterUpdate]:
         """Delete a parameter or namespace. Raises KeyError, also for the root."""
         path = _split(key)
         if not path:
@@ -88,7 +88,7 @@ class ParameterTree:
         if not isinstance(table, dict):
             raise KeyError(key)
         del table[path[-1]]
-        return self._updates(path, {}, caller_id)
+        return self._updates(path, {})
 
     def search(self, namespace: str, key: str) -> str | None:
         """The name of the nearest parameter ``key``, upwards from ``namespace``.
@@ -150,18 +150,19 @@ class ParameterTree:
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
 
-    def _updates(self, path: list[str], value: Any, caller_id: str) -> list[ParameterUpdate]:
+    def _updates(self, path: list[str], value: Any, setter: str | None = None) -> list[ParameterUpdate]:
         changed = _with_slash(path)
         updates = []
         for key, subscribers in self._subscribers.items():
             if changed.startswith(key):
-                told, what = changed, value
+                # Who set it knows it.
+                updates += [
+                    ParameterUpdate(s.uri, changed, value) for s in subscribers if s.caller_id != setter
+                ]
             elif key.startswith(changed):
-                told, what = key, self.get(key) if self.has(key) else {}
-            else:
-                continue
-            # Who set it knows it.
-            updates += [ParameterUpdate(s.uri, told, what) for s in subscribers if s.caller_id != caller_id]
+                # Who set the namespace is told too: what it keeps of a parameter inside is out of date.
+                inside = self.get(key) if self.has(key) else {}
+                updates += [ParameterUpdate(s.uri, key, inside) for s in subscribers]
         return updates
 
 

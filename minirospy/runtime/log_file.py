@@ -1,8 +1,9 @@
-"""The master's log file: thousands of lines a second cost little, since they are written twice a second together."""
+"""The log files of a master: thousands of lines a second cost little, since they are written twice a second together."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import os
 import threading
@@ -19,8 +20,8 @@ _SECONDS = 0.5
 class LogFile(RotatingFileHandler):
     """``path``, of ``most_bytes`` at most, with three older ones beside it.
 
-    Records of logging come as to any handler, warnings and worse written at once; :meth:`line` takes a text
-    alone, on the loop.
+    Records of logging come as to any handler, warnings and worse written at once; :meth:`line` and :meth:`text`
+    take a text alone, on the loop.
     """
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
@@ -34,7 +35,11 @@ class LogFile(RotatingFileHandler):
 
     def line(self, text: str) -> None:
         """A line of level INFO (on the loop)."""
-        self._add(f"{self._line_head}{self._stamp(time.time())}: {text}\n")
+        self.text(f"{self._line_head}{self._stamp(time.time())}: {text}")
+
+    def text(self, text: str) -> None:
+        """A line that has its time and level already (on the loop)."""
+        self._add(text + "\n")
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
@@ -86,8 +91,11 @@ class LogFile(RotatingFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master.
-                return
+                # A full disk must not stop the master. What the stream could not write would fail again at its end.
+                if self.stream:
+                    with contextlib.suppress(OSError, ValueError):
+                        self.stream.close()
+                    self.stream = None
 
 
 class _Formatter(logging.Formatter):

@@ -104,6 +104,12 @@ class Master(MasterApi):
         # It becomes the name of a folder, and anybody may have set it.
         return found if isinstance(found, str) and re.fullmatch(r"[\w-]{1,64}", found) else ""
 
+    @property
+    def omits_topics(self) -> bool:
+        """What /rosout/omit_topics says: whether rosout.log leaves out the topics of nodes."""
+        key = "/rosout/omit_topics"
+        return self.parameters.has(key) and self.parameters.get(key) is True
+
     async def start(self) -> None:
         """Take up what a killed master left, and listen. Raises OSError."""
         nodes = await self._open_journal() if self._journal_path else {}
@@ -146,6 +152,10 @@ class Master(MasterApi):
                 self.parameters.unsubscribe_node(action.name, action.uri)
                 _log.warning("another node took the name %s: %s is told to stop", action.name, action.uri)
             self._notifier.send(action)
+
+    def hold(self, uri: str, topic: str) -> None:
+        """See :meth:`Notifier.hold`."""
+        self._notifier.hold(uri, topic)
 
     def stop(self) -> None:
         """Somebody asked the master to stop."""
@@ -270,7 +280,7 @@ class Master(MasterApi):
             case "set", (key, value):
                 parameters.set(key, value, "")
             case "del", (key,):
-                parameters.delete(key, "")
+                parameters.delete(key)
             case _:
                 raise ValueError(f"{what!r} with {len(args)} arguments is unknown")
         for action in actions:

@@ -17,7 +17,7 @@ from minirospy import names
 from minirospy.errors import RpcFault
 from minirospy.graph.parameters import ParameterTree, check_value
 from minirospy.graph.registry import Registry
-from minirospy.runtime.notifier import Notice
+from minirospy.runtime.notifier import PARAMETERS, Notice
 from minirospy.wire.xmlrpc import Serialized, serialize_response
 
 __all__ = ["Answer", "MasterApi", "key_of_node"]
@@ -93,6 +93,10 @@ class MasterApi(ABC):
         """Do what a change of the tables asks for."""
 
     @abstractmethod
+    def hold(self, uri: str, topic: str) -> None:
+        """The node gets its answer about a topic or PARAMETERS, and is not told of changes at the same moment."""
+
+    @abstractmethod
     def stop(self) -> None:
         """Somebody asked the master to stop."""
 
@@ -114,10 +118,10 @@ class MasterApi(ABC):
             return self._system(method, args)
         if not args:
             return [_ERROR, "missing required caller_id parameter", entry.refused]
-        if not isinstance(args[0], str):
-            return [_ERROR, "caller_id must be a string", entry.refused]
         if not entry.fewest <= len(args) <= entry.most:
             return [_ERROR, "Error: bad call arity", entry.refused]
+        if not isinstance(args[0], str):
+            return [_ERROR, "caller_id must be a string", entry.refused]
         try:
             return entry.function(*args)
         except _Refusal as refusal:
@@ -201,6 +205,7 @@ class MasterApi(ABC):
         type_, uri = _type(topic_type, "topic_type"), _uri(caller_api, "caller_api")
         peers, actions = self.registry.register_subscriber(caller_id, topic, type_, uri)
         self.act(actions)
+        self.hold(uri, topic)
         self.note("+sub", caller_id, topic, type_, uri)
         self.say(f"+SUB [{topic}] {caller_id} {uri}")
         return [_SUCCESS, f"Subscribed to [{topic}]", peers]
@@ -267,7 +272,7 @@ class MasterApi(ABC):
         """Delete a parameter."""
         name = _key(key, caller_id)
         try:
-            updates = self.parameters.delete(name, caller_id)
+            updates = self.parameters.delete(name)
         except KeyError:
             return [_ERROR, f"parameter [{name}] is not set", 0]
         self.act(updates)
@@ -293,19 +298,22 @@ class MasterApi(ABC):
 
     def subscribe_param(self, caller_id: str, caller_api: Any, key: Any) -> Answer:
         """Tell a node of changes of a parameter; its value now."""
-        name, uri = _key(key, caller_id), _uri(caller_api, "caller_api")
+        uri, name = _uri(caller_api, "caller_api"), _key(key, caller_id)
         actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
         value = self.parameters.subscribe(name, caller_id, uri)
         self.act(actions)
+        self.hold(uri, PARAMETERS)
         self.note("+par", caller_id, name, uri)
+        self.say(f"+CACHEDPARAM [{name}] by {caller_id}")
         return [_SUCCESS, f"Subscribed to parameter [{name}]", value]
 
     def unsubscribe_param(self, caller_id: str, caller_api: Any, key: Any) -> Answer:
         """Tell it no more."""
-        name, uri = _key(key, caller_id), _uri(caller_api, "caller_api")
+        uri, name = _uri(caller_api, "caller_api"), _key(key, caller_id)
         if self.parameters.unsubscribe(name, caller_id, uri):
             self.registry.unregister_parameter(caller_id, key_of_node(name), uri)
             self.note("-par", caller_id, name, uri)
+            self.say(f"-CACHEDPARAM [{name}] by {caller_id}")
         return [_SUCCESS, f"Unsubscribe to parameter [{name}]", 1]
 
     # --- helpers
@@ -373,10 +381,10 @@ def _resolve(name: str, caller_id: str) -> str:
 
 
 def _check_key(value: Any) -> None:
-    if not isinstance(value, str):
-        raise _Refusal("ERROR: parameter [key] must be a string")
     if not value:
         raise _Refusal("ERROR: parameter [key] must be specified and non-empty")
+    if not isinstance(value, str):
+        raise _Refusal("ERROR: parameter [key] must be a string")
 
 
 def _key(value: Any, caller_id: str) -> str:

@@ -15,7 +15,7 @@ from minirospy.graph.registry import NodeShutdown, PublisherUpdate
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.wire.xmlrpc import serialize_call
 
-__all__ = ["Notice", "Notifier"]
+__all__ = ["PARAMETERS", "Notice", "Notifier"]
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +26,11 @@ _MOST_SUSPECTS = 10000
 _LONG_LIST = 200
 _SECONDS_PER_PUBLISHER = 50e-6
 _TICK = 0.001
+_HOLD_SECONDS = 0.02
+_HOLD_TICK = 0.01
+
+PARAMETERS = ""
+"""For :meth:`Notifier.hold`: no topic has this name."""
 
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 
@@ -68,6 +73,8 @@ class Notifier:
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
         self._nodes: dict[str, _Node] = {}
+        # URI and topic -> until when nothing is said of it, the first to end in front.
+        self._held: dict[tuple[str, str], float] = {}
         self._line = _Line(_CALLS_AT_ONCE)
         self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
@@ -76,25 +83,40 @@ class Notifier:
         # The last update that was written: the subscribers of one topic all get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
 
+    def hold(self, uri: str, topic: str) -> None:
+        """The node gets an answer that tells how a topic, or PARAMETERS, is now: a change is told a moment later.
+
+        A node of rospy that takes the update first and then the answer goes by the answer, the older of the two.
+        """
+        now = asyncio.get_running_loop().time()
+        while self._held and next(iter(self._held.values())) <= now:
+            del self._held[next(iter(self._held))]
+        self._held.pop((uri, topic), None)
+        # All that end within one tick wake the master once.
+        self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
+
     def send(self, notice: Notice) -> None:
         """Call the node that the notice is for, soon."""
+        key: object = object()
+        end: float | None = None
         if isinstance(notice, PublisherUpdate):
-            key: object = notice.topic
-        else:
-            key = (notice.key,) if isinstance(notice, ParameterUpdate) else object()
+            key = notice.topic
+            end = self._held.get((notice.uri, notice.topic))
+        elif isinstance(notice, ParameterUpdate):
+            key = (notice.key,)
+            end = self._held.get((notice.uri, PARAMETERS))
         node = self._nodes.get(notice.uri)
+        is_idle = node is None or node.timer is not None
         if node is None:
             node = self._nodes[notice.uri] = _Node(notice.uri)
-            self._line_up(node)
-        elif node.timer and key not in node.pauses:
-            # It pauses on account of another topic.
-            node.timer.cancel()
-            node.timer = None
-            self._line_up(node)
+        if end and end > asyncio.get_running_loop().time():
+            node.pauses[key] = max(end, node.pauses.get(key, 0.0))
         if isinstance(notice, ParameterUpdate):
             # Behind what was said of its parents and children meanwhile.
             node.notices.pop(key, None)
         node.notices[key] = notice
+        if is_idle:
+            self._go_on(node)
 
     async def close(self) -> None:
         """Give up what waits."""
@@ -124,7 +146,7 @@ class Notifier:
         """Tell a node the first thing that need not wait."""
         key = next((key for key in node.notices if key not in node.pauses), None)
         if key is None:
-            self._pause(node)
+            self._go_on(node)
             return
         notice, count = node.notices.pop(key), 0
         line.under_way += 1
@@ -162,19 +184,17 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Node) -> None:
-        node.timer = None
+        """Line the node up where there is something to say; else wait for the end of a pause, if there is one."""
+        if node.timer:
+            node.timer.cancel()
+            node.timer = None
+        loop = asyncio.get_running_loop()
         if node.pauses:
-            now = asyncio.get_running_loop().time()
+            now = loop.time()
             node.pauses = {key: end for key, end in node.pauses.items() if end > now}
-        if node.notices:
+        if any(key not in node.pauses for key in node.notices):
             self._line_up(node)
-        else:
-            self._pause(node)
-
-    def _pause(self, node: _Node) -> None:
-        """Nothing is to be said now: until the first pause ends, if there is one."""
-        if node.pauses:
-            loop = asyncio.get_running_loop()
+        elif node.pauses:
             # A timer may be early by as much as the clock's resolution.
             node.timer = loop.call_at(min(node.pauses.values()) + _TICK, self._go_on, node)
         else:

@@ -7,13 +7,15 @@ http://wiki.ros.org/rosout.
 from __future__ import annotations
 
 import logging
+import time
+from collections.abc import Callable
 from io import BytesIO
-from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Any
 
 from minirospy.environment import Environment
 from minirospy.errors import DeserializationError, ServiceException
+from minirospy.runtime.log_file import LogFile
 from minirospy.runtime.node import Node
 from minirospy.runtime.services import AsyncHandler, LoopServiceServer
 from minirospy.runtime.topics import Publication
@@ -22,6 +24,8 @@ from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
 __all__ = ["RosoutNode"]
+
+_log = logging.getLogger(__name__)
 
 _LOG_BYTES = 100 * 1024 * 1024
 _LEVELS = {1: "DEBUG", 2: "INFO", 4: "WARN", 8: "ERROR", 16: "FATAL"}
@@ -37,10 +41,14 @@ _LOGGER_LEVELS = {
 class RosoutNode:
     """Runs on the loop of whoever starts it; a message is passed on as it came, bytes for bytes."""
 
-    def __init__(self, environment: Environment, log_file: Path | None) -> None:
+    def __init__(
+        self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
+    ) -> None:
+        """``omits_topics``: whether lines in the file leave out which topics the node publishes."""
         self.node = Node("/rosout", environment)
         self._log_file = log_file
-        self._handler: logging.Handler | None = None
+        self._omits_topics = omits_topics
+        self._file: LogFile | None = None
         self._log_class: Any = None
         self._aggregated: Publication | None = None
 
@@ -50,9 +58,12 @@ class RosoutNode:
 
         self._log_class = Log
         if self._log_file:
-            self._handler = RotatingFileHandler(
-                self._log_file, maxBytes=_LOG_BYTES, backupCount=3, encoding="utf-8", delay=True
-            )
+            try:
+                self._file = LogFile(self._log_file, _LOG_BYTES, "rosout")
+            except OSError as error:
+                _log.warning("%s cannot be written: %s", self._log_file, error.strerror or error)
+            else:
+                self._file.text(f"\n\n{time.time():.9f}  Node Startup")
         type_ = InterfaceType(Log._type, Log._md5sum, Log._full_text)
         await self.node.start()
         self._aggregated = Publication("/rosout_agg", type_, queue_size=1000)
@@ -65,8 +76,8 @@ class RosoutNode:
     async def close(self) -> None:
         """Leave the graph. Idempotent."""
         await self.node.close()
-        if self._handler:
-            self._handler.close()
+        if self._file:
+            self._file.close()
 
     async def _serve_loggers(self) -> None:
         from roscpp.msg import Logger
@@ -110,21 +121,21 @@ class RosoutNode:
         assert self._aggregated
         body = bytes(frame)
         self._aggregated.publish(serialize_frame(body))
-        if self._handler:
-            self._write(self._handler, body)
+        if self._file:
+            self._write(self._file, body)
 
-    def _write(self, handler: logging.Handler, body: bytes) -> None:
+    def _write(self, file: LogFile, body: bytes) -> None:
         message = self._log_class()
         try:
             message.deserialize(body)
         except DeserializationError:
             return
         stamp = message.header.stamp
-        line = (
+        topics = "" if self._omits_topics() else f" [topics: {', '.join(message.topics)}]"
+        file.text(
             f"{stamp.secs}.{stamp.nsecs:09d} {_LEVELS.get(message.level, message.level)} {message.name} "
-            f"[{message.file}:{message.line}({message.function})] [topics: {', '.join(message.topics)}] {message.msg}"
+            f"[{message.file}:{message.line}({message.function})]{topics} {message.msg}"
         )
-        handler.emit(logging.LogRecord("rosout", logging.INFO, "", 0, line, None, None))
 
 
 def _bytes_of(message: Any) -> bytes:

@@ -28,6 +28,9 @@ MAX_BODY = 64 * 1024 * 1024
 _MAX_HEAD = 64 * 1024
 _SHORT_HEAD = 512
 _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
+# A line feed alone ends a line too, where somebody writes a request by hand.
+_END_OF_HEAD = re.compile(rb"\r?\n\r?\n")
+_END_OF_LINE = re.compile(rb"\r?\n")
 _REASONS = {
     400: "Bad Request",
     405: "Method Not Allowed",
@@ -151,7 +154,7 @@ class HttpReader:
         """The messages in the buffer, and None where it has to be filled; ``head`` has been taken out already."""
         while True:
             if head is None:
-                head = _parse_head((yield from self._until(b"\r\n\r\n")))
+                head = _parse_head((yield from self._until(_END_OF_HEAD)))
             self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
             self._in_body = True
             body = yield from self._body(head)
@@ -178,30 +181,31 @@ class HttpReader:
     def _chunks(self) -> Generator[None, None, bytes]:
         body = bytearray()
         while True:
-            line = (yield from self._until(b"\r\n")).partition(b";")[0].strip()
+            line = (yield from self._until(_END_OF_LINE)).partition(b";")[0].strip()
             if not re.fullmatch(rb"[0-9A-Fa-f]{1,12}", line):
                 raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}")
             size = int(line, 16)
             self._check(len(body) + size)
             if not size:
-                while (yield from self._until(b"\r\n")):
+                while (yield from self._until(_END_OF_LINE)):
                     pass
                 return bytes(body)
             body += yield from self._exactly(size)
-            if (yield from self._until(b"\r\n")):
+            if (yield from self._until(_END_OF_LINE)):
                 raise RpcProtocolError("a chunk is longer than its size")
 
-    def _until(self, mark: bytes) -> Generator[None, None, bytes]:
+    def _until(self, mark: re.Pattern[bytes]) -> Generator[None, None, bytes]:
         looked = 0
-        while (at := self._buffer.find(mark, max(0, looked - len(mark)))) < 0:
+        while (found := mark.search(self._buffer, max(0, looked - 3))) is None:
             looked = len(self._buffer)
             if looked > _MAX_HEAD:
                 raise RpcProtocolError("HTTP header too long")
             if self._ended and self._buffer:
                 raise RpcProtocolError("the peer ended inside a message")
             yield None
+        at, end = found.span()
         data = self._take(at)
-        del self._buffer[: len(mark)]
+        del self._buffer[: end - at]
         return data
 
     def _exactly(self, count: int) -> Generator[None, None, bytes]:
@@ -257,7 +261,7 @@ def _short_head(data: bytes) -> HttpHead:
 
 
 def _read_head(data: bytes) -> HttpHead:
-    start, *lines = data.decode("latin-1").split("\r\n")
+    start, *lines = data.decode("latin-1").replace("\r\n", "\n").split("\n")
     if not _is_start_line(start):
         raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
     headers: dict[str, str] = {}

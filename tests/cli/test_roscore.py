@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +16,9 @@ import pytest
 
 from minirospy.cli.master import main, roscore
 from minirospy.cli.rostopic import main as rostopic
+from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
+from tests.conftest import free_port
 
 BIN = Path(sys.executable).parent
 pytestmark = pytest.mark.skipif(
@@ -49,12 +53,7 @@ Start = Callable[..., Core]
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     """Start roscore on the test's port, which ROS_MASTER_URI names."""
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
     started: list[Core] = []
 
     def run(*options: str) -> Core:
@@ -109,6 +108,16 @@ def test_the_end_of_the_terminal_is_a_clean_end(start: Start) -> None:
     assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
 
 
+def test_scripts_find_whom_to_end(start: Start) -> None:
+    core = start()
+    port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
+    pid_file = Path(os.environ["ROS_HOME"], f"roscore-{port}.pid")
+    assert pid_file.read_text() == str(core.process.pid)
+    os.kill(int(pid_file.read_text()), signal.SIGTERM)
+    assert core.process.wait(30) == 0
+    assert not pid_file.exists()
+
+
 def test_a_shutdown_call_is_one_too(start: Start) -> None:
     core = start()
     master = proxy()
@@ -150,6 +159,28 @@ def test_the_address_of_another_network(start: Start, monkeypatch: pytest.Monkey
         warning = f"WARNING: ROS_IP={address} is no address of this machine: right only behind NAT or in a container"
         assert (warning in core.said) != is_ours
         core.end()
+    monkeypatch.setenv("ROS_IP", "::1")
+    assert (
+        "WARNING: ROS_IP=::1 is an address of IPv6, where nobody listens without ROS_IPV6=on" in start().said
+    )
+
+
+@pytest.mark.parametrize(
+    ("uri", "what"),
+    [
+        ("http://localhost:1", "port [1] does not match this roscore [{}]"),
+        ("http://203.0.113.9:{}", "[http://203.0.113.9:{}] host is not set to this machine"),
+    ],
+)
+def test_nodes_would_look_for_another_master(
+    start: Start, monkeypatch: pytest.MonkeyPatch, uri: str, what: str
+) -> None:
+    port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
+    monkeypatch.setenv("ROS_MASTER_URI", uri.format(port))
+    core = start("-p", port)
+    assert core.process.stdout
+    said = core.said if "WARNING" in core.said else core.process.stdout.readline()
+    assert f"WARNING: ROS_MASTER_URI {what.format(port)}: nodes find it with ROS_MASTER_URI=http://" in said
 
 
 def test_the_log_folder(start: Start) -> None:
@@ -158,14 +189,65 @@ def test_the_log_folder(start: Start) -> None:
     folder = Path(os.environ["ROS_LOG_DIR"]) / master.get_param("/run_id")
     master.register_publisher("/t", "a/B", "http://127.0.0.1:1/")
     master.set_param("/p", 1)
+    master.call("subscribeParam", "http://127.0.0.1:1/", "/p")
+    master.call("unsubscribeParam", "http://127.0.0.1:1/", "/p")
     master.close()
     core.end()
+    # There from the start, for `tail -f`; first comes what real rosout begins with.
+    assert re.fullmatch(r"\n\n[0-9]+\.[0-9]{9}  Node Startup\n", (folder / "rosout.log").read_text())
     log = (folder / "master.log").read_text()
     assert "[minirospy.master][INFO] " in log
     assert ": +PUB [/t] /test http://127.0.0.1:1/\n" in log
     assert ": +PARAM [/p] by /test\n" in log
+    assert ": +CACHEDPARAM [/p] by /test\n" in log
+    assert ": -CACHEDPARAM [/p] by /test\n" in log
     assert "listening on 127.0.0.1:" in log
     assert (folder.parent / "latest").resolve() == folder.resolve()
+
+
+LOGS = """
+import queue
+import rospy
+from rosgraph_msgs.msg import Log
+
+rospy.init_node("talk", disable_rosout=True)
+publisher, heard = rospy.Publisher("/rosout", Log, queue_size=9), queue.Queue()
+subscriber = rospy.Subscriber("/rosout_agg", Log, heard.put)
+while not (publisher.get_num_connections() and subscriber.get_num_connections()):
+    rospy.sleep(0.01)
+message = Log(name="/talk", file="f.py", function="g", line=7, topics=["/t", "/rosout"])
+message.header.stamp = rospy.Time(5, 6)
+for omit, message.level, message.msg in (
+    (False, 4, "a\\nb \u00e9"), (True, 2, "no topics"), (1, 16, "no boolean"), (False, 1, "last")
+):
+    rospy.set_param("/rosout/omit_topics", omit)
+    publisher.publish(message)
+    assert heard.get(timeout=30).msg == message.msg
+"""
+
+
+def test_what_nodes_log(start: Start) -> None:
+    """The lines are those of real rosout."""
+    core = start()
+    subprocess.run([sys.executable, "-c", LOGS], check=True, timeout=60)
+    core.end()
+    (file,) = Path(os.environ["ROS_LOG_DIR"]).glob("*-*/rosout.log")
+    assert file.read_text(encoding="utf-8").partition("Node Startup\n")[2] == (
+        "5.000000006 WARN /talk [f.py:7(g)] [topics: /t, /rosout] a\nb \u00e9\n"
+        "5.000000006 INFO /talk [f.py:7(g)] no topics\n"
+        "5.000000006 FATAL /talk [f.py:7(g)] [topics: /t, /rosout] no boolean\n"
+        "5.000000006 DEBUG /talk [f.py:7(g)] [topics: /t, /rosout] last\n"
+    )
+
+
+def test_a_rosout_log_that_cannot_be_written(start: Start) -> None:
+    start().end(signal.SIGKILL)
+    (file,) = Path(os.environ["ROS_LOG_DIR"]).glob("*-*/rosout.log")
+    file.unlink()
+    file.mkdir()
+    start().end()
+    log = file.with_name("master.log").read_text()
+    assert f"{file} cannot be written: Is a directory" in log
 
 
 def test_verbose_quiet_and_levels(start: Start) -> None:
@@ -201,7 +283,7 @@ def test_the_health_line(start: Start, capsys: pytest.CaptureFixture[str]) -> No
     core = start()
     assert main(["--status"]) == 0
     line = capsys.readouterr().out
-    assert line.startswith(f"{os.environ['ROS_MASTER_URI']}: pid {core.process.pid}, up 0:00:0")
+    assert line.startswith(f"{os.environ['ROS_MASTER_URI']}: pid {core.process.pid}, up 0:0")
     assert " 1 nodes, 2 topics, " in line
     assert " 3 parameters, " in line
     assert f"journal: {os.environ['ROS_HOME']}/master/journal-" in line
@@ -216,6 +298,9 @@ def test_the_health_line(start: Start, capsys: pytest.CaptureFixture[str]) -> No
     [
         (["--allow", "here"], "'here' is not a network"),
         (["-t", "0"], "the timeout is more than 0 seconds"),
+        (["-t", "nan"], "the timeout is more than 0 seconds"),
+        (["--allow", ""], "--allow wants a network"),
+        (["--allow", "10.0.0.0/8", "--allow", " ,"], "--allow wants a network"),
         (["--master-logger-level", "loud"], "invalid choice: 'loud'"),
     ],
 )
@@ -258,3 +343,18 @@ def test_a_reader_that_has_gone_does_not_hurt_the_master(start: Start) -> None:
     core.process.send_signal(signal.SIGTERM)
     assert core.process.wait(30) == 0
     core.process.stdout = None
+
+
+def test_a_reader_that_was_never_there_does_not_either(start: Start) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    core = subprocess.Popen([str(BIN / "roscore"), "--no-journal"], stdout=write, stderr=subprocess.DEVNULL)
+    os.close(write)
+    master, found = proxy(), dict[str, list[str]]()
+    while "/rosout" not in found:
+        assert core.poll() is None
+        with contextlib.suppress(MasterUnreachableError):
+            found = master.get_system_state().subscribers
+    master.close()
+    core.terminate()
+    assert core.wait(30) == 0

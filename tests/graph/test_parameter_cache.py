@@ -71,7 +71,7 @@ def test_what_it_knows_is_what_the_master_says(program: list[tuple[str, str, obj
                 cache.store(key, truth, cache.changes)
             continue
         try:
-            updates = tree.set(key, value, "/writer") if verb == "set" else tree.delete(key, "/writer")
+            updates = tree.set(key, value, "/writer") if verb == "set" else tree.delete(key)
         except KeyError:
             continue
         for update in updates:

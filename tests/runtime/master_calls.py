@@ -456,6 +456,14 @@ CALLS: list[tuple[Any, ...]] = [
     ("getParamNames", "/x"),
     ("getParam", "/x", "/"),
     ("deleteParam", "/x", "/"),
+    # --- which of two mistakes is told
+    ("getPid", 5, 1, 2),
+    ("registerPublisher", 5),
+    ("subscribeParam", 5, 5),
+    ("subscribeParam", "/s", "", 5),
+    ("unsubscribeParam", "/s", 5, ""),
+    ("setParam", "/x", {}, 5),
+    ("setParam", "/x", 0, 5),
 ]
 
 SCENE: list[tuple[Any, ...]] = [
@@ -490,6 +498,14 @@ SCENE: list[tuple[Any, ...]] = [
     ("setParam", "/x", "/q", 13),
     ("unsubscribeParam", "/sub", "{0}", "/"),
     ("setParam", "/x", "/q", 15),
+    # Who sets or deletes it itself.
+    ("setParam", "/sub", "/a", {"b": 16}),
+    ("setParam", "/sub", "/a", {"z": 17}),
+    ("setParam", "/sub", "/", {"a": {"b": {"c": 18}}}),
+    ("setParam", "/sub", "/a/b/c", 19),
+    ("deleteParam", "/sub", "/a/b/c"),
+    ("deleteParam", "/sub", "/a/b"),
+    ("setParam", "/sub", "/", {}),
     ("unsubscribeParam", "/sub", "{0}", "/a/b"),
     ("setParam", "/x", "/a/b", 16),
     # A node of the same name at another address: the older has to stop.

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -46,15 +47,18 @@ def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, maste
     tcpros, xmlrpc = bad_peers.port_of(service), bad_peers.port_of(api)
     short = bad_peers.bad_publisher(master, b"\x05\0\0\0short")
     attacks = [
-        (bad_peers.garbage, xmlrpc, 1),
-        (bad_peers.half_request, xmlrpc, 1),
-        (bad_peers.silent, tcpros, 12),
-        (bad_peers.half_header, tcpros, 12),
-        (bad_peers.huge_request, tcpros, 1),
-        (short, 0, 3),
+        (bad_peers.garbage, xmlrpc),
+        (bad_peers.half_request, xmlrpc),
+        (bad_peers.silent, tcpros),
+        (bad_peers.half_header, tcpros),
+        (bad_peers.huge_request, tcpros),
+        (short, 0),
     ]
-    for attack, port, most_lines in attacks:
+    begun = time.monotonic()
+    for attack, port in attacks:
         row = bad_peers.measure(attack.__name__, node, attack, port, PEERS, ask)
         assert row.answered, row
         assert row.height - row.before < 40, row
-        assert row.lines <= most_lines, (row, node.lines[-row.lines :])  # type: ignore[attr-defined]
+    # Ten lines of each kind in ten seconds at most; each attack opens two hundred connections.
+    most = 30 * (1 + (time.monotonic() - begun) // 10)
+    assert len(node.lines) < most, node.lines  # type: ignore[attr-defined]

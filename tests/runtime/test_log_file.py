@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import io
 import logging
 import sys
 import threading
@@ -69,3 +71,28 @@ def test_no_line_is_lost_where_several_threads_log(tmp_path: Path) -> None:
         flusher.join()
         file.close()
     assert (tmp_path / "master.log").read_text().count("\n") == 3000
+
+
+def test_a_disk_that_is_full_for_a_while_hurts_nobody(tmp_path: Path) -> None:
+    class Full(io.StringIO):
+        def flush(self) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def close(self) -> None:
+            if not self.closed:
+                super().close()
+                self.flush()
+
+    def warn(text: str) -> None:
+        file.handle(logging.LogRecord("x", logging.WARNING, "", 0, text, None, None))
+
+    file = LogFile(tmp_path / "master.log", 1_000_000, "master")
+    file.stream.close()
+    file.stream = Full()  # type: ignore[assignment]
+    warn("lost")
+    warn("kept")
+    file.stream.close()
+    file.stream = Full()  # type: ignore[assignment]
+    warn("lost")
+    file.close()
+    assert (tmp_path / "master.log").read_text().endswith(": kept\n")

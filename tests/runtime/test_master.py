@@ -18,6 +18,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
+from minirospy.runtime import notifier
 from minirospy.runtime.master import Master
 from minirospy.wire.xmlrpc import serialize_response
 
@@ -194,6 +195,40 @@ def test_a_subscriber_that_never_answers_delays_nobody(proxy: ServerProxy, slave
         proxy.registerSubscriber("/sub", "/t", "std_msgs/Bool", slaves[0].uri)
         proxy.registerPublisher("/pub", "/t", "std_msgs/Bool", slaves[1].uri)
         assert slaves[0].next() == ("publisherUpdate", "/master", "/t", [slaves[1].uri])
+
+
+def test_an_update_does_not_meet_the_answer_to_a_registration(
+    proxy: ServerProxy, slaves: list[Slave], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Real rospy that takes an update first, and then the older answer, stays without the publisher.
+    old, fresh = slaves
+    monkeypatch.setattr(notifier, "_HOLD_SECONDS", 0.0)
+    proxy.registerSubscriber("/old", "/t", "std_msgs/Bool", old.uri)
+    proxy.registerSubscriber("/fresh", "/before", "std_msgs/Bool", fresh.uri)
+    monkeypatch.setattr(notifier, "_HOLD_SECONDS", 3600.0)
+    proxy.registerSubscriber("/fresh", "/t", "std_msgs/Bool", fresh.uri)
+    proxy.subscribeParam("/fresh", fresh.uri, "/p")
+    proxy.setParam("/other", "/p", 1)
+    proxy.registerPublisher("/pub", "/t", "std_msgs/Bool", "http://127.0.0.1:1/")
+    assert old.next() == ("publisherUpdate", "/master", "/t", ["http://127.0.0.1:1/"])
+    proxy.registerPublisher("/pub", "/before", "std_msgs/Bool", "http://127.0.0.1:1/")
+    assert fresh.next() == ("publisherUpdate", "/master", "/before", ["http://127.0.0.1:1/"])
+    assert fresh.called.empty()
+
+
+def test_what_was_held_is_told_a_moment_later(proxy: ServerProxy, slaves: list[Slave]) -> None:
+    told = slaves[0]
+    for number in range(20):
+        proxy.registerSubscriber("/node", f"/t{number}", "std_msgs/Bool", told.uri)
+        proxy.subscribeParam("/node", told.uri, f"/p{number}")
+        proxy.registerPublisher("/pub", f"/t{number}", "std_msgs/Bool", "http://127.0.0.1:1/")
+        proxy.setParam("/other", f"/p{number}", 1)
+    found = sorted(told.next() for _ in range(40))
+    assert found == sorted(
+        [("paramUpdate", "/master", f"/p{number}/", 1) for number in range(20)]
+        + [("publisherUpdate", "/master", f"/t{number}", ["http://127.0.0.1:1/"]) for number in range(20)]
+    )
+    assert told.called.empty()
 
 
 def test_param_updates(proxy: ServerProxy, slaves: list[Slave]) -> None:

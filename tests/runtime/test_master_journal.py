@@ -27,6 +27,7 @@ from minirospy.runtime.master import Master
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.wire.journal import HEAD, parse_journal
 from minirospy.wire.xmlrpc import parse_response, serialize_response
+from tests.conftest import free_port
 
 BIN = Path(sys.executable).parent
 
@@ -382,21 +383,17 @@ class Killed:
     def __init__(self, port: int) -> None:
         self.port = port
         self.uri = f"http://127.0.0.1:{port}/"
-        self.process = self.start()
+        self.first = self.start()
+        """The seconds until it answered when it knew nothing."""
 
-    def start(self) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
+    def start(self) -> float:
+        """Start; the seconds until it answers with all that it knew."""
+        begin = time.monotonic()
+        self.process = subprocess.Popen(
             [str(BIN / "roscore"), "-q", "-p", str(self.port)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
         )
-
-    def kill(self) -> float:
-        """Kill and start; the seconds until it answers with all that it knew."""
-        self.process.send_signal(signal.SIGKILL if sys.platform != "win32" else signal.SIGTERM)
-        self.process.communicate()
-        begin = time.monotonic()
-        self.process = self.start()
         while True:
             try:
                 with ServerProxy(self.uri) as proxy:
@@ -405,6 +402,12 @@ class Killed:
             except OSError:
                 assert time.monotonic() - begin < 30
                 time.sleep(0.01)
+
+    def kill(self) -> float:
+        """Kill and start."""
+        self.process.send_signal(signal.SIGKILL if sys.platform != "win32" else signal.SIGTERM)
+        self.process.communicate()
+        return self.start()
 
     def end(self) -> None:
         self.process.terminate()
@@ -426,7 +429,12 @@ class Registering:
         self._over.set()
         self._thread.join()
 
-    def lasts(self, seconds: float) -> bool:
+    def lasts(self, seconds: float, answers: int) -> bool:
+        """Whether it goes on until so many more answers have come, and for so long after that."""
+        wanted = len(self.answered) + answers
+        while len(self.answered) < wanted:
+            if not self._thread.is_alive() or self._over.wait(0.01):
+                return False
         return not self._over.wait(seconds)
 
     def _run(self) -> None:
@@ -459,20 +467,17 @@ def known(master: str) -> set[tuple[str, str, str]]:
 def test_two_hundred_nodes_survive_their_master() -> None:
     """CRASHES=50 in the environment makes it the long one."""
     crashes = int(os.environ.get("CRASHES", "4"))
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
     loop, fakes = LoopThread("fakes"), Fakes()
 
     async def open_all() -> list[str]:
         return [await fakes.open() for _ in range(200)]
 
-    master = Killed(port)
+    master = Killed(free_port())
     client = Registering(master.uri, loop.run(open_all(), 20.0))
     rng, times = random.Random(2), []
     try:
         for _ in range(crashes):
-            assert client.lasts(rng.uniform(0.2, 0.7))
+            assert client.lasts(rng.uniform(0.2, 0.7), 20)
             before = set(client.answered)
             times.append(master.kill())
             assert not before - known(master.uri)
@@ -481,8 +486,7 @@ def test_two_hundred_nodes_survive_their_master() -> None:
         loop.run(fakes.close(), 20.0)
         loop.close()
         master.end()
-    assert len({name for _, _, name in client.answered}) > 20
     median = sorted(times)[len(times) // 2]
     print(f"{crashes} crashes, {len(client.answered)} answers kept, back after {median:.2f} s")
-    # A second on a quiet machine; the start of Python is most of it.
-    assert median < 3.0, times
+    # The start of Python is most of it.
+    assert median < 5 * master.first + 2.0, (times, master.first)

@@ -52,6 +52,13 @@ def test_chunked_bodies(step: int) -> None:
     assert [message.body for message in feed(data * 2, step)] == [b"Wikipedia "] * 2
 
 
+@pytest.mark.parametrize("step", [1, 7, 1000])
+def test_a_line_feed_alone_ends_a_line_of_a_request_written_by_hand(step: int) -> None:
+    plain = b"POST / HTTP/1.1\nContent-Length: 4\n\na\r\nb"
+    chunked = b"POST / HTTP/1.1\nTransfer-Encoding: chunked\n\n4\na\r\nb\n0\n\n"
+    assert [message.body for message in feed(plain + chunked + plain, step)] == [b"a\r\nb"] * 3
+
+
 def test_an_answer_without_a_length_ends_with_the_connection() -> None:
     reader = HttpReader()
     assert feed(b"HTTP/1.0 200 OK\r\n\r\nabc", 5, reader) == []
