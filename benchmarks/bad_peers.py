@@ -211,7 +211,7 @@ def _hold(port: int, peers: int, data: bytes, seconds: float = 0.5) -> Iterator[
 
 
 def _connect(port: int) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", port), 5)
+    return socket.create_connection(("127.0.0.1", port), 20)
 
 
 def _header(**fields: str) -> bytes:

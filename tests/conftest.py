@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import random
+import signal
+import socket
+import sys
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +17,31 @@ from hypothesis import HealthCheck, settings
 # A busy machine makes examples slow, and nothing wrong.
 settings.register_profile("minirospy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("minirospy")
+
+
+def pytest_configure() -> None:
+    """What a shell runs in the background ignores SIGINT, as `nohup` ignores SIGHUP; the tests' processes must not."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        # Nothing happens here; a new process begins with the system's default.
+        signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+def free_port() -> int:
+    """A port that nobody listens on, for a server that another process starts, or that comes back.
+
+    It is none of those that systems deal out by themselves (from 32768 or 49152 on): such a one may go to any
+    connection of another test before it is used.
+    """
+    while True:
+        port = random.SystemRandom().randrange(20_000, 32_000)
+        with socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port
 
 
 @pytest.fixture(scope="session")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from minirospy.cli.catkin_test_results import Counts, results_below
 from minirospy.errors import BuildError, MinirospyError, NotFoundError
+from minirospy.testing.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
@@ -69,16 +70,19 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
     """The exit status. Raises MinirospyError at Ctrl-C, when the test has ended its nodes."""
-    with subprocess.Popen(command, env=environment, cwd=folder) as popen:
-        try:
-            return popen.wait()
-        except KeyboardInterrupt:
+    with interrupt_noted() as interrupted, subprocess.Popen(command, env=environment, cwd=folder) as popen:
+        while (status := popen.poll()) is None and not interrupted.is_set():
+            interrupted.wait(POLL_SECONDS)
+        if status is None:
             # The terminal's Ctrl-C reached it, too.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
                 popen.terminate()
-            raise MinirospyError("interrupted: the tests that were left have not run") from None
+    if interrupted.is_set():
+        raise MinirospyError("interrupted: the tests that were left have not run")
+    assert status is not None
+    return status
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:

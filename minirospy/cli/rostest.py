@@ -24,13 +24,13 @@ __all__ = ["rostest", "rosunit"]
 def rostest(argv: Sequence[str] | None = None) -> int:
     """rostest; 0 all passed, 1 a test could not be run or did not say how it went, 2 a test failed."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return run("rostest", lambda: _rostest(words))
+    return run("rostest", lambda: _rostest(words), interrupted=1)
 
 
 def rosunit(argv: Sequence[str] | None = None) -> int:
     """rosunit; 0 all passed, 1 the file could not be run or did not say how it went, 2 a test failed."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return run("rosunit", lambda: _rosunit(words))
+    return run("rosunit", lambda: _rosunit(words), interrupted=1)
 
 
 def _rostest(words: list[str]) -> int:

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Edge", "Link"]
 
-START_PATIENCE = 15.0
-"""Seconds for a server to start; a loaded small machine needs two or three."""
+START_PATIENCE = 30.0
+"""Seconds for a server to start; a loaded small machine needs two or three, one that also stands still fifteen."""
 
-ANSWER_PATIENCE = 20.0
+ANSWER_PATIENCE = 40.0
 """Seconds for an answer: longer than a dead server takes to be replaced."""
 
 CLOSE_PATIENCE = 0.5

@@ -269,6 +269,7 @@ class Launcher:
             "master", [sys.executable, "-m", "minirospy.cli.master", *arguments], environ=os.environ
         )
         self._master_process = process
+        self.guard(process)
         self._attend(process)
         self._output.say(f"process[master]: started with pid [{process.pid}]", bold=True)
         end = time.monotonic() + _MASTER_SECONDS
@@ -333,6 +334,8 @@ class Launcher:
             why = error.strerror or error
             raise MinirospyError(f"the folder {folder} cannot be made: {why}; set ROS_HOME") from error
         self._ready_guardian()
+        if self._options.watch:
+            self._files.add(node)
         process = start_process(
             name,
             [*command, f"__log:={self._log_folder / stem}.log"],
@@ -343,14 +346,12 @@ class Launcher:
         )
         process.node = node
         process.log_files = f"{self._log_folder / stem}*.log" if self._has_logs else "none"
+        self.guard(process)
         self._output.say(f"process[{name}]: started with pid [{process.pid}]", bold=True)
-        if self._options.watch:
-            self._files.add(node)
         return process
 
     def _attend(self, process: Process) -> None:
-        """Have a process's end told, and the process ended where we are killed."""
-        self.guard(process)
+        """Have a process's end told."""
 
         def wait() -> None:
             process.popen.wait()

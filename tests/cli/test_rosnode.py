@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from minirospy.runtime.master_proxy import MasterProxy
+from tests.conftest import free_port
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
@@ -23,9 +24,7 @@ Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 @pytest.fixture
 def ghost(master: str) -> str:
     """The URI of /ghost, which is registered and does not answer."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        uri = f"http://localhost:{probe.getsockname()[1]}/"
+    uri = f"http://localhost:{free_port()}/"
     proxy = MasterProxy(master, "/ghost")
     proxy.register_publisher("/boo", "std_msgs/Bool", uri)
     proxy.register_subscriber("/listen", "std_msgs/Bool", uri)

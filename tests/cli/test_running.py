@@ -18,15 +18,10 @@ import pytest
 from minirospy.cli import family, roslaunch, rosrun
 from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
+from tests.conftest import free_port
 
 BIN = Path(sys.executable).parent
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def launched(file: Path) -> subprocess.CompletedProcess[str]:

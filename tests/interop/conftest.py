@@ -17,6 +17,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import free_port
+
 HERE = Path(__file__).parent
 REAL_PYTHON = "/usr/bin/python3"
 REAL_BIN = Path("/usr/bin")
@@ -36,13 +38,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         elif not item.get_closest_marker("timeout"):
             # A compiler may run in it first, beside other tests.
             item.add_marker(pytest.mark.timeout(240))
-
-
-def free_port() -> int:
-    """A port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def environment(uri: str, stack: str) -> dict[str, str]:

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.interop.conftest import OUR_BIN, REAL_BIN, environment, free_port
+from tests.conftest import free_port
+from tests.interop.conftest import OUR_BIN, REAL_BIN, environment
 
 INNER = '<launch><arg name="k" default="d" doc="a key"/><param name="p" value="$(arg k)"/><node name="in" pkg="pkg" type="wait.py"/></launch>'
 OUTER = """<launch>

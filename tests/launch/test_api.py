@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,7 @@ import roslaunch
 import roslaunch.roslaunch_logs
 
 from minirospy.runtime.master_proxy import MasterProxy
+from tests.conftest import free_port
 
 
 def eventually(condition: Callable[[], object]) -> bool:
@@ -124,9 +124,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
 
 def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also at a master that the launch starts."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        uri = f"http://localhost:{probe.getsockname()[1]}"
+    uri = f"http://localhost:{free_port()}"
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
     launch = roslaunch.parent.ROSLaunchParent(run_id, [])

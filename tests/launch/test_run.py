@@ -8,11 +8,19 @@ import socket
 import stat
 import sys
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 
+from minirospy.environment import Environment
+from minirospy.launch.output import Output
+from minirospy.launch.process import Guardian, Process, start_process
+from minirospy.launch.runner import Launcher, RunOptions
+from minirospy.launch.spec import LaunchSpec, NodeSpec
 from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.workspace.packages import Packages
+from tests.conftest import free_port
 from tests.launch.conftest import Start
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals between processes")
@@ -21,9 +29,7 @@ NODE = '<node pkg="pkg" type="wait.py" name='
 
 
 def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{probe.getsockname()[1]}")
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
     launch = start(f'{NODE}"a" output="screen"/>{NODE}"b" launch-prefix="env"/>', "--sigint-timeout=20")
     launch.read_until("waiting", "process[b-3]")
     children = launch.children()
@@ -101,6 +107,34 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     changed.replace(file)
     said = launch.read_until("changed __name:=a")
     assert f"[a-1] {file} has changed\nended by SIGINT\n[a-1] restarting process\n" in said
+
+
+def test_a_node_is_guarded_and_watched_before_it_is_heard_of(
+    package: Path, master: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = NodeSpec("/a", "pkg", "wait.py")
+    guarded: list[int] = []
+    found: list[tuple[bool, Path | None]] = []
+    monkeypatch.setattr(Guardian, "add", lambda _, process: guarded.append(process.pid))
+
+    class Hearing(Output):
+        def say(self, text: str = "", *, bold: bool = False) -> None:
+            if text.startswith("process["):
+                found.append((bool(guarded), launcher._files.changed(node)))
+
+    def start_changed(*args: Any, **kwargs: Any) -> Process:
+        process = start_process(*args, **kwargs)
+        os.utime(package / "wait.py", ns=(1, 1))
+        return process
+
+    monkeypatch.setattr("minirospy.launch.runner.start_process", start_changed)
+    environment = Environment.read()
+    launcher = Launcher(
+        LaunchSpec(nodes=[node]), environment, Packages(environment), RunOptions(watch=True), Hearing()
+    )
+    launcher.start()
+    launcher.close()
+    assert found == [(True, package / "wait.py")]
 
 
 def test_rosparam_commands_come_before_the_parameters(start: Start, master: str, tmp_path: Path) -> None:

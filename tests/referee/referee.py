@@ -105,12 +105,12 @@ class Other:
             self.process.stdout.close()
 
 
-def of_three_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
-    """What ``look()`` finds, at the first of three looks where all of it is true.
+def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
+    """What ``look()`` finds, at the first of ten looks where all of it is true.
 
-    For what takes a certain time: on a machine that stands still for a moment it takes longer, but not thrice.
+    For what takes a certain time: on a machine that stands still now and then it takes longer, but not ten times.
     """
-    for _ in range(3):
+    for _ in range(10):
         found = look()
         if all(found):
             break

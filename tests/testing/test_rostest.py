@@ -7,10 +7,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+
+from minirospy.cli.rostest import rostest, rosunit
+from minirospy.errors import MinirospyError
+from minirospy.testing.bare import run_bare
 
 HERE = Path(__file__).parent
 TEST = HERE / "tested" / "test"
@@ -156,6 +162,34 @@ def test_ctrl_c_is_no_success_of_rosunit(tmp_path: Path) -> None:
     _, err = popen.communicate(timeout=30)
     assert popen.returncode == 1
     assert "rosunit: ERROR: interrupted: how the test went is not known\n" in err
+
+
+@pytest.mark.parametrize("command", [rostest, rosunit])
+def test_ctrl_c_before_the_tests_is_no_success(
+    command: Callable[[list[str]], int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("minirospy.cli.rostest._package_of", interrupted)
+    assert command([str(TEST / "good.py")]) == 1
+
+
+def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[subprocess.Popen[bytes]] = []
+
+    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            super().__init__(*args, **kwargs)
+            begun.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    with pytest.raises(MinirospyError, match="interrupted: how the test went is not known"):
+        run_bare(TEST / "sleepy.py", [], tmp_path / "x.xml", "p", "sleepy", seconds=50, text=False)
+    assert [each.returncode is None for each in begun] == [False]
 
 
 def test_rosunit() -> None:

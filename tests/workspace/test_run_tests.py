@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -135,8 +135,8 @@ def test_ctrl_c_lets_a_test_end_its_nodes(scene: Scene, tmp_path: Path) -> None:
     begun, ended = tmp_path / "begun", tmp_path / "ended"
     text = f"""import pathlib, time
 def test_slow():
-    pathlib.Path({str(begun)!r}).touch()
     try:
+        pathlib.Path({str(begun)!r}).touch()
         time.sleep(60)
     finally:
         time.sleep(0.5)
@@ -160,6 +160,27 @@ def test_slow():
     assert popen.returncode == 1
     assert err.endswith("catkin_make: ERROR: interrupted: the tests that were left have not run\n")
     assert ended.exists()
+
+
+def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begun: list[subprocess.Popen[bytes]] = []
+
+    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            super().__init__(*args, **kwargs)
+            begun.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    scene.package(
+        "p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": "import time\ntime.sleep(60)\n"}
+    )
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    monkeypatch.setattr("minirospy.cli.catkin_tests._END_SECONDS", 0.1)
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
+    assert capsys.readouterr().err.endswith("interrupted: the tests that were left have not run\n")
+    assert [each.returncode is None for each in begun] == [False]
 
 
 def test_a_file_where_a_folder_belongs(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:

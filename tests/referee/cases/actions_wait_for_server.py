@@ -7,7 +7,7 @@ import actionlib
 import rospy
 from actionlib.msg import TestAction, TestActionFeedback, TestActionGoal, TestActionResult
 from actionlib_msgs.msg import GoalID, GoalStatusArray
-from referee import Other, eventually, of_three_looks, show
+from referee import Other, eventually, of_ten_looks, show
 
 rospy.init_node("case", argv=[], disable_rosout=True)
 client = actionlib.SimpleActionClient("server", TestAction)
@@ -71,7 +71,7 @@ def at_once():
     return other_client.wait_for_server(), time.monotonic() - before < 0.5
 
 
-show("at once", *of_three_looks(at_once))
+show("at once", *of_ten_looks(at_once))
 server.close()
 show("gone", eventually(lambda: not other_client.action_client.pub_goal.get_num_connections()))
 show("without it", other_client.wait_for_server(rospy.Duration.from_sec(0.3)))

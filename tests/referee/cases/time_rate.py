@@ -3,7 +3,7 @@
 import time
 
 import rospy
-from referee import of_three_looks, outcome, show
+from referee import of_ten_looks, outcome, show
 
 rospy.init_node("case", argv=[])
 for hz in (
@@ -66,16 +66,16 @@ def another_turn():
     return (0.03 < took(rate.sleep) < 0.2,)
 
 
-show("no drift", *of_three_looks(lambda: (0.95 < took(ten_turns) < 1.2,)))
-show("late by little: two short turns", *of_three_looks(late_by_little))
-show("late by much: one, and a new beginning", *of_three_looks(late_by_much))
-show("remaining", *of_three_looks(remaining))
+show("no drift", *of_ten_looks(lambda: (0.95 < took(ten_turns) < 1.2,)))
+show("late by little: two short turns", *of_ten_looks(late_by_little))
+show("late by much: one, and a new beginning", *of_ten_looks(late_by_much))
+show("remaining", *of_ten_looks(remaining))
 rate = rospy.Rate(1)
 time.sleep(1)
 show("none remaining", rate.remaining() < rospy.Duration(0))
 rate.last_time = rospy.Time.now() + rospy.Duration(100)
 show("from the future", 0.9 < rate.remaining().to_sec() <= 1.0)
 rate.sleep_dur = rospy.Duration(0, 50_000_000)
-show("another turn", *of_three_looks(another_turn))
-show("reset", *of_three_looks(lambda: (0.15 < took(rospy.Rate(5, reset=True).sleep) < 0.4,)))
+show("another turn", *of_ten_looks(another_turn))
+show("reset", *of_ten_looks(lambda: (0.15 < took(rospy.Rate(5, reset=True).sleep) < 0.4,)))
 outcome("by name", lambda: rospy.Rate(hz=5, reset=False).sleep_dur)

@@ -5,7 +5,7 @@ import threading
 import time
 
 import rospy
-from referee import eventually, of_three_looks, outcome, show
+from referee import eventually, of_ten_looks, outcome, show
 
 rospy.init_node("case", argv=[])
 threading.excepthook = lambda args: errors.append((args.exc_type.__name__, str(args.exc_value)))
@@ -32,7 +32,7 @@ def four_times():
 
 
 said = []
-of_three_looks(four_times)
+of_ten_looks(four_times)
 show(*said[:3])
 show(*said[3:])
 for before, event in zip([None, *events], events, strict=False):
