@@ -21,7 +21,7 @@ from minirospy.wire.xmlrpc import parse_response, serialize_call
 __all__ = ["AsyncRpcClient", "Call"]
 
 _RECEIVE = 65536
-_KEEP_PER_SERVER = 2
+_KEEP_PER_SERVER = 8
 _KEEP_AT_MOST = 100
 _KEEP_SECONDS = 10.0
 
