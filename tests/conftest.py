@@ -6,10 +6,12 @@ import os
 import random
 import signal
 import socket
+import subprocess
 import sys
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -97,3 +99,18 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     finally:
         loop.run(serving.close(), 30.0)
         loop.close()
+
+
+@pytest.fixture
+def interrupted_processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+    """The processes that are started from now on; as each begins, this one gets a Ctrl-C."""
+    begun: list[subprocess.Popen[bytes]] = []
+
+    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            super().__init__(*args, **kwargs)
+            begun.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    return begun

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -17,16 +18,18 @@ from run_case import CASES, differences, recorded, run_case
 sys.path.pop(0)
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(250)
 @pytest.mark.parametrize("name", CASES)
 def test_the_record_is_what_real_rospy_prints(name: str, real_master: str, tmp_path: Path) -> None:
-    said = run_case(name, "/usr/bin/python3", real_master, tmp_path)
+    def said() -> str:
+        try:
+            return run_case(name, "/usr/bin/python3", real_master, tmp_path)
+        except subprocess.TimeoutExpired as error:
+            return f"{(error.stdout or b'').decode()}it hangs\n"
+
+    first = said()
     if os.environ.get("RECORD"):
-        recorded(name).write_text(said)
-    found = differences(said, recorded(name).read_text())
-    if found:
-        # Threads of actionlib's overtake each other on a busy machine.
-        found = differences(
-            run_case(name, "/usr/bin/python3", real_master, tmp_path), recorded(name).read_text()
-        )
+        recorded(name).write_text(first)
+    # Threads of real rospy's and actionlib's overtake each other on a busy machine, and rarely wait for ever.
+    found = differences(first, recorded(name).read_text()) and differences(said(), recorded(name).read_text())
     assert not found, found

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -176,20 +175,11 @@ def test_ctrl_c_before_the_tests_is_no_success(
 
 
 def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, interrupted_processes: list[subprocess.Popen[bytes]]
 ) -> None:
-    begun: list[subprocess.Popen[bytes]] = []
-
-    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
-        def __init__(self, *args: Any, **kwargs: Any) -> None:
-            super().__init__(*args, **kwargs)
-            begun.append(self)
-            signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(subprocess, "Popen", Interrupted)
     with pytest.raises(MinirospyError, match="interrupted: how the test went is not known"):
         run_bare(TEST / "sleepy.py", [], tmp_path / "x.xml", "p", "sleepy", seconds=50, text=False)
-    assert [each.returncode is None for each in begun] == [False]
+    assert [each.returncode is None for each in interrupted_processes] == [False]
 
 
 def test_rosunit() -> None:

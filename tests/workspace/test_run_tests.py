@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -163,24 +163,18 @@ def test_slow():
 
 
 def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
-    scene: Scene, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    scene: Scene,
+    interrupted_processes: list[subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    begun: list[subprocess.Popen[bytes]] = []
-
-    class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
-        def __init__(self, *args: Any, **kwargs: Any) -> None:
-            super().__init__(*args, **kwargs)
-            begun.append(self)
-            signal.raise_signal(signal.SIGINT)
-
     scene.package(
         "p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": "import time\ntime.sleep(60)\n"}
     )
-    monkeypatch.setattr(subprocess, "Popen", Interrupted)
     monkeypatch.setattr("minirospy.cli.catkin_tests._END_SECONDS", 0.1)
     assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
     assert capsys.readouterr().err.endswith("interrupted: the tests that were left have not run\n")
-    assert [each.returncode is None for each in begun] == [False]
+    assert [each.returncode is None for each in interrupted_processes] == [False]
 
 
 def test_a_file_where_a_folder_belongs(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
