@@ -16,7 +16,13 @@ from minirospy import client as rospy
 from minirospy import times
 from minirospy.actionlib.goal_id import GoalIDGenerator
 from minirospy.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
-from minirospy.actionlib.spec import TAKES_FAST_ANSWERS, ActionException, action_types
+from minirospy.actionlib.spec import (
+    CANCEL_SECONDS,
+    SEND_SECONDS,
+    TAKES_FAST_ANSWERS,
+    ActionException,
+    action_types,
+)
 from minirospy.actionlib.statuses import StatusList
 from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent
@@ -40,12 +46,6 @@ _FEW_STATUSES = 50
 
 _SECONDS_A_STATUS = 1e-4
 """Of more, each adds this to the pause between two lists: else a busy server would do nothing but tell them."""
-
-_SEND_SECONDS = 1e-3
-"""A client of actionlib in Python drops what comes before its send_goal has returned: a result, too."""
-
-_CANCEL_SECONDS = 3 * _SEND_SECONDS
-"""A cancel waits so long: the goal that was sent before it comes by another connection, and waits itself."""
 
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
@@ -213,7 +213,7 @@ class ActionServer:
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
         """A client wants goals canceled: the one of the id, all up to a stamp, or all."""
-        time.sleep(_CANCEL_SECONDS)
+        time.sleep(CANCEL_SECONDS)
         with self.lock:
             if not self.started:
                 return
@@ -237,7 +237,7 @@ class ActionServer:
         """A client has sent a goal."""
         header = getattr(goal, "_connection_header", None) or {}
         if not TAKES_FAST_ANSWERS.items() <= header.items():
-            time.sleep(_SEND_SECONDS)
+            time.sleep(SEND_SECONDS)
         with self.lock:
             if not self.started:
                 return

@@ -6,11 +6,24 @@ from typing import Any, NamedTuple
 
 from minirospy.errors import MinirospyError
 
-__all__ = ["TAKES_FAST_ANSWERS", "ActionException", "ActionTypes", "action_types"]
+__all__ = [
+    "CANCEL_SECONDS",
+    "SEND_SECONDS",
+    "TAKES_FAST_ANSWERS",
+    "ActionException",
+    "ActionTypes",
+    "action_types",
+]
 
 
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 """What our clients say in the connection header of their goals."""
+
+SEND_SECONDS = 1e-3
+"""Goals of others wait so long: actionlib in Python drops what comes before its send_goal has returned: a result, too."""
+
+CANCEL_SECONDS = 3 * SEND_SECONDS
+"""Cancels wait so long: the goal that was sent before comes by another connection, and waits itself."""
 
 
 class ActionException(MinirospyError):

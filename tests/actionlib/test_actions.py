@@ -73,14 +73,13 @@ print(client.wait_for_result(second), client.simple_state)
         """A goal of a client that is no minirospy's waits a moment before it is taken."""
         said = run("""
 import minirospy.actionlib.server
-minirospy.actionlib.server._SEND_SECONDS, minirospy.actionlib.server._CANCEL_SECONDS = 0.1, 0.3
+minirospy.actionlib.server.SEND_SECONDS, minirospy.actionlib.server.CANCEL_SECONDS = 0.1, 0.3
 from actionlib.msg import TestActionGoal
 from actionlib_msgs.msg import GoalID
 actions = server.action_server
 goal = TestActionGoal(goal_id=GoalID(id="other-1"), goal=TestGoal(3))
 taking = threading.Thread(target=actions.internal_goal_callback, args=(goal,))
 taking.start()
-time.sleep(0.05)
 actions.internal_cancel_callback(GoalID())
 taking.join()
 print(actions.status_list[0].status.status in (GoalStatus.PREEMPTING, GoalStatus.PREEMPTED, GoalStatus.RECALLING))

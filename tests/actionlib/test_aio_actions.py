@@ -251,7 +251,7 @@ def test_a_cancel_where_somebody_only_looks_on() -> None:
 
 
 def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.actionlib.aio.server._CANCEL_SECONDS", 0)
+    monkeypatch.setattr("minirospy.actionlib.aio.server.CANCEL_SECONDS", 0)
 
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()
@@ -265,8 +265,8 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
     """A goal of a client that is no minirospy's waits a moment before it is taken."""
-    monkeypatch.setattr("minirospy.actionlib.aio.server._SEND_SECONDS", 0.1)
-    monkeypatch.setattr("minirospy.actionlib.aio.server._CANCEL_SECONDS", 0.3)
+    monkeypatch.setattr("minirospy.actionlib.aio.server.SEND_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.actionlib.aio.server.CANCEL_SECONDS", 0.3)
 
     async def main(_: Client, server: Server) -> None:
         async with (
@@ -275,7 +275,6 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
         ):
             await goals.wait_for_subscribers()
             await goals.publish(goal_id=GoalID(id="other-1"), goal=msg.TestGoal(3))
-            await asyncio.sleep(0.05)
             await server._take_cancel(GoalID())
             assert server._goals["other-1"].is_cancel_requested
 

@@ -12,7 +12,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 
 from minirospy import Node
 from minirospy.actionlib.aio.common import WAITING, ActionClass, ActionEnd, GoalError
-from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
+from minirospy.actionlib.spec import CANCEL_SECONDS, SEND_SECONDS, TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList, status_bytes
 from minirospy.aio import Publisher, Subscription
 from minirospy.errors import ROSException
@@ -27,12 +27,6 @@ _F = TypeVar("_F")
 
 _SECONDS_A_STATUS = 1e-4
 """A list of statuses is told after a pause that grows with it: a busy server has better things to do."""
-
-_SEND_SECONDS = 1e-3
-"""A client of actionlib in Python drops what comes before its send_goal has returned: a result, too."""
-
-_CANCEL_SECONDS = 3 * _SEND_SECONDS
-"""A cancel waits so long: the goal that was sent before it comes by another connection, and waits itself."""
 
 _EVENTS = {
     GoalState.PREEMPTED: GoalEvent.CANCEL,
@@ -172,7 +166,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
 
     async def _take_goal(self, message: Any) -> None:
         if not TAKES_FAST_ANSWERS.items() <= (message._connection_header or {}).items():
-            await asyncio.sleep(_SEND_SECONDS)
+            await asyncio.sleep(SEND_SECONDS)
         now = self._node.now()
         if not message.goal_id.id:
             message.goal_id.id = f"{self._node.name}-{len(self._goals)}-{now.secs}.{now.nsecs}"
@@ -210,7 +204,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         return False
 
     async def _take_cancel(self, cancel: GoalID) -> None:
-        await asyncio.sleep(_CANCEL_SECONDS)
+        await asyncio.sleep(CANCEL_SECONDS)
         stamp = cancel.stamp.to_nsec()
         for goal in self._running():
             if is_meant(cancel.id, stamp, goal.id, goal._status.goal_id.stamp.to_nsec()):
