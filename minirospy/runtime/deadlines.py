@@ -1,4 +1,4 @@
-"""Time limits of many things that are nearly always done in time: one timer of the loop serves them all."""
+"""Time limits of many things that nearly always complete in time: one timer of the loop serves them all."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ _T = TypeVar("_T")
 
 
 class Deadlines(Generic[_T]):
-    """Until when each has to be done; ``late`` is called with one that is not (on the loop)."""
+    """The time limit of each thing under way.
+
+    ``late`` is called, on the loop, with each one that has passed its limit, in the order of the limits.
+    """
 
     def __init__(self, late: Callable[[_T], object]) -> None:
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # When the timer goes off: no later than the first of the ends.
+        # When the timer fires: no later than the first of the ends.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -28,18 +31,18 @@ class Deadlines(Generic[_T]):
         return iter(self._ends)
 
     def set(self, each: _T, seconds: float) -> None:
-        """It has so long from now on."""
+        """Limit it to this many seconds from now on; replaces the limit that it had."""
         loop = asyncio.get_running_loop()
         end = self._ends[each] = loop.time() + seconds
         if self._timer is None or end < self._next:
             self._watch(loop, end)
 
     def drop(self, each: _T) -> None:
-        """It is done. Idempotent."""
+        """Remove the limit of one that has completed. Idempotent."""
         self._ends.pop(each, None)
 
     def close(self) -> None:
-        """Nothing is late any more. Idempotent."""
+        """Remove all limits. Idempotent."""
         self._ends.clear()
         self._stop_timer()
 
@@ -57,8 +60,16 @@ class Deadlines(Generic[_T]):
         self._timer = None
         loop = asyncio.get_running_loop()
         now = loop.time()
-        for each in [each for each, end in self._ends.items() if end <= now]:
-            self.drop(each)
-            self._late(each)
+
+        # After a stall several are late: in the order of their ends, whatever the order in which they were set.
+        late = sorted(
+            (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
+        )
+        for end, _, each in late:
+            # The end of an earlier one may have completed this one, or given it more time.
+            if self._ends.get(each) == end:
+                self.drop(each)
+                self._late(each)
+
         if self._ends:
             self._watch(loop, min(self._ends.values()))

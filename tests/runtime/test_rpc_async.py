@@ -13,7 +13,6 @@ import pytest
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
-from minirospy.runtime.deadlines import Deadlines
 from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_client import RpcClient
@@ -300,27 +299,5 @@ def test_a_node_on_the_loop_is_told_without_a_call() -> None:
         assert told[2][0] - told[0][0] > 0.05
         assert not notifier._line.under_way
         await notifier.close()
-
-    run(test)
-
-
-def test_deadlines_are_kept_with_one_timer() -> None:
-    async def test() -> None:
-        late: list[str] = []
-        deadlines: Deadlines[str] = Deadlines(late.append)
-        begin = asyncio.get_running_loop().time()
-        deadlines.set("long", 60.0)
-        deadlines.set("third", 0.05)
-        deadlines.set("first", 0.01)
-        deadlines.set("in time", 0.01)
-        deadlines.set("second", 0.01)
-        deadlines.set("second", 0.03)
-        deadlines.drop("in time")
-        assert "in time" not in list(deadlines)
-        await until(lambda: len(late) == 3)
-        assert late == ["first", "second", "third"]
-        assert asyncio.get_running_loop().time() - begin >= 0.05
-        assert list(deadlines) == ["long"]
-        deadlines.close()
 
     run(test)
