@@ -30,7 +30,7 @@ import psutil
 
 from minirospy.runtime.rpc_client import RpcClient
 
-OURS = [sys.executable, "-m", "minirospy.cli.master", "-q"]
+OURS = [sys.executable, "-m", "minirospy.cli.ros.master", "-q"]
 STACKS = {
     "ours": OURS,
     "ours without journal": [*OURS, "--no-journal"],

@@ -2,6 +2,6 @@
 
 import sys
 
-from minirospy.cli.family import main
+from minirospy.cli.main import main
 
 sys.exit(main())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.catkin import catkin_make
+from minirospy.cli.catkin.make import catkin_make
 from minirospy.errors import MinirospyError
 from minirospy.launch.load import find_files, load_files
 from minirospy.workspace.packages import Packages
@@ -21,7 +21,7 @@ EXERCISES = sorted({path.stem for path in (ROOT / "launch").glob("*.launch")} - 
 
 @pytest.mark.parametrize("file", TESTS)
 def test_on_the_virtual_board(file: str) -> None:
-    command = [sys.executable, "-m", "minirospy.cli.rostest", "rpi_feros", file]
+    command = [sys.executable, "-m", "minirospy.cli.ros.rostest", "rpi_feros", file]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 0, done.stdout + done.stderr
     assert " * TESTS: 1\n" in done.stdout

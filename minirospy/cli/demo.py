@@ -97,7 +97,7 @@ def _own_world() -> Iterator[Path]:
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
     """roslaunch with the workshop's launch file; it is ended by Ctrl-C's signal, which ends all its nodes."""
-    command = [sys.executable, "-m", "minirospy.cli.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
+    command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
     windows = sys.platform == "win32"
     flags = subprocess.CREATE_NEW_PROCESS_GROUP if windows else 0  # type: ignore[attr-defined,unused-ignore]
     with log.open("wb") as output:

@@ -266,7 +266,7 @@ class Launcher:
         self._has_run = True
         self._ready_guardian()
         process = start_process(
-            "master", [sys.executable, "-m", "minirospy.cli.master", *arguments], environ=os.environ
+            "master", [sys.executable, "-m", "minirospy.cli.ros.master", *arguments], environ=os.environ
         )
         self._master_process = process
         self.guard(process)

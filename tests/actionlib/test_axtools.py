@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.cli.axclient import progress
-from minirospy.cli.form import ask_for, fields
+from minirospy.cli.ros.axclient import progress
+from minirospy.cli.ros.form import ask_for, fields
 from minirospy.errors import MessageException
 from minirospy.workspace.packages import Packages
 

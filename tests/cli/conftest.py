@@ -110,7 +110,8 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
     """Run a command in this process: ``command("rostopic", "list", "-v")``."""
 
     def run(name: str, *argv: str) -> Result:
-        module = import_module("minirospy.cli." + ("rosmsg" if name == "rossrv" else name))
+        room = "" if name == "doctor" else "ros."
+        module = import_module(f"minirospy.cli.{room}{'rosmsg' if name == 'rossrv' else name}")
         capsys.readouterr()
         main = module.main_srv if name == "rossrv" else module.main
         try:

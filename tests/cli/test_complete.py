@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from minirospy.cli import sources
 from minirospy.cli.command import Parser
-from minirospy.cli.complete import BY_HAND, COMPLETED_WITH, ENTRANCES, _takes, candidates, main
-from minirospy.cli.family import _VERBS
+from minirospy.cli.completion import completers
+from minirospy.cli.completion.complete import BY_HAND, COMPLETED_WITH, ENTRANCES, _takes, candidates, main
+from minirospy.cli.main import _VERBS
 from minirospy.cli.verbs import Family
 from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
@@ -55,7 +55,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy machine may answer late."""
-    monkeypatch.setattr(sources, "LIVE_SECONDS", 30.0)
+    monkeypatch.setattr(completers, "LIVE_SECONDS", 30.0)
 
 
 def tab(line: str) -> list[str]:
@@ -96,7 +96,7 @@ def test_options_of_a_verb() -> None:
 
 
 def test_asking_a_command_leaves_it_as_it_was(capsys: pytest.CaptureFixture[str]) -> None:
-    from minirospy.cli import rostopic
+    from minirospy.cli.ros import rostopic
 
     tab("rostopic pub -")
     assert rostopic.main(["-h"]) == 0
@@ -117,7 +117,7 @@ def test_every_command_that_is_installed_is_completed() -> None:
     """The table of commands, and the entrances of each, are those of pyproject.toml."""
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     section = text.partition("[project.scripts]")[2].partition("\n[")[0]
-    installed = dict(re.findall(r'^([\w-]+) = "minirospy\.cli\.(\w+:\w+)"$', section, re.MULTILINE))
+    installed = dict(re.findall(r'^([\w-]+) = "minirospy\.cli\.([\w.]+:\w+)"$', section, re.MULTILINE))
     by_hand = {name: installed.pop(name) for name in ("minirospy", "rosrun", "rospack", "rosstack")}
     assert installed == ENTRANCES
     assert {*by_hand} - {"minirospy"} <= {*BY_HAND}
@@ -128,7 +128,7 @@ _WITHOUT_WORDS = {"rosdep init", "rosdep update"}
 
 def parsers() -> Iterator[tuple[str, str, Parser]]:
     """Every parser that a command has: its name in the table, what is typed before its words, itself."""
-    entrances = {**ENTRANCES, "rosrun": "rosrun:main", "rospack": "rospack:main"}
+    entrances = {**ENTRANCES, "rosrun": "ros.rosrun:main", "rospack": "ros.rospack:main"}
     by_verb = {
         f"minirospy {verb}": f"{entry.module}:{entry.function}"
         for verb, entry in _VERBS.items()
@@ -136,9 +136,10 @@ def parsers() -> Iterator[tuple[str, str, Parser]]:
     }
     for typed, entrance in (entrances | by_verb).items():
         module, _, function = entrance.partition(":")
-        if module not in BY_HAND:
+        short = module.rpartition(".")[2]
+        if short not in BY_HAND:
             yield from parsers_of(
-                module if typed in by_verb else typed,
+                short if typed in by_verb else typed,
                 typed,
                 getattr(import_module(f"minirospy.cli.{module}"), function),
             )
@@ -346,7 +347,7 @@ def test_variables_and_home(workspace: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_nothing_in_a_text_is_history(robot: Robot) -> None:
     """bash and zsh at a terminal put the last command in place of !! even within double quotes."""
-    from minirospy.cli import rosparam
+    from minirospy.cli.ros import rosparam
 
     assert rosparam.main(["set", "/greeting", "it's you!"]) == 0
     (text,) = tab("rosparam set /greeting ")
@@ -427,7 +428,7 @@ def test_services_and_a_request(robot: Robot) -> None:
 
 
 def test_parameters(robot: Robot, command: object) -> None:
-    from minirospy.cli import rosparam
+    from minirospy.cli.ros import rosparam
 
     assert rosparam.main(["set", "/robot/speed", "3"]) == 0
     assert tab("rosparam get /robot/") == ["/robot/speed"]
@@ -436,7 +437,7 @@ def test_parameters(robot: Robot, command: object) -> None:
 
 
 def test_the_value_that_a_parameter_has(robot: Robot) -> None:
-    from minirospy.cli import rosparam
+    from minirospy.cli.ros import rosparam
 
     assert rosparam.main(["set", "/speed", "3.5"]) == 0
     assert rosparam.main(["set", "/gains", "{p: 1, i: [2, 3]}"]) == 0
@@ -476,7 +477,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
 
     with socket.create_server(("localhost", 0)) as silent:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
-        monkeypatch.setattr(sources, "LIVE_SECONDS", 0.2)
+        monkeypatch.setattr(completers, "LIVE_SECONDS", 0.2)
         took: list[float] = []
         # A call gives up after five by itself; a machine that stands still meanwhile gets two looks more.
         while len(took) < 3 and min(took, default=9.0) > 4:

@@ -213,7 +213,7 @@ def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
         for service in ("/haunt", "/ghost/get_loggers"):
             ghost.register_service(service, "rosrpc://localhost:1", "http://localhost:1/")
         ghost.set_param("/text", "日本")
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.02)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.02)
     return robot
 
 

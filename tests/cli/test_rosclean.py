@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli import rosclean
+from minirospy.cli.ros import rosclean
 
 from .conftest import Command
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 
-from minirospy.cli.rosconsole import _shown
+from minirospy.cli.ros.rosconsole import _shown
 
 from .conftest import Command, Robot
 

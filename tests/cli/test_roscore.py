@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.cli.master import main, roscore
-from minirospy.cli.rostopic import main as rostopic
+from minirospy.cli.ros.master import main, roscore
+from minirospy.cli.ros.rostopic import main as rostopic
 from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
 from tests.conftest import free_port
@@ -145,7 +145,7 @@ def test_folders_that_cannot_be_made(start: Start, tmp_path: Path, monkeypatch: 
     assert "Errno" not in core.said
     assert f"setting /run_id to {run_id}\n" in core.said
     # The /rosout node hears what is logged, and does not stumble over its file.
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.2)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
     assert core.end() == "master stopped\n"
@@ -315,7 +315,7 @@ def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(
     start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As /rosout of real ROS, a node of roscpp: its root logger is `ros`."""
-    from minirospy.cli.rosservice import main as rosservice
+    from minirospy.cli.ros.rosservice import main as rosservice
 
     start()
     assert rosservice(["list"]) == 0

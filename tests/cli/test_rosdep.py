@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli.rosdep import main
+from minirospy.cli.ros.rosdep import main
 
 
 @pytest.fixture

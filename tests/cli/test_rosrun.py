@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli import rosrun
+from minirospy.cli.ros import rosrun
 
 BIN = Path(sys.executable).parent
 posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX systems")

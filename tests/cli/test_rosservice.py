@@ -42,7 +42,7 @@ def test_what_a_service_is(robot: Any, command: Any) -> None:
 
 def test_a_call_imports_little(robot: Any) -> None:
     code = (
-        "import sys; from minirospy.cli.rosservice import main; assert main(['type', '/fail']) == 0; "
+        "import sys; from minirospy.cli.ros.rosservice import main; assert main(['type', '/fail']) == 0; "
         "assert main(['call', '/set_led_state', 'True']) == 0; "
         "print(*sorted({'asyncio', 'numpy', 'logging', 'xmlrpc'} & set(sys.modules)))"
     )

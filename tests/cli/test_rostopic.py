@@ -159,7 +159,7 @@ def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
 
 
 def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 1.0)
     words = ("std_msgs/Bool", "data: True")
     assert command("rostopic", "pub", "-1", "/listen", *words).out == (
         "publishing and latching message for 1.0 seconds\n"
@@ -168,7 +168,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     verbose = command("rostopic", "pub", "/listen", "-v", "std_msgs/Bool", "False", "--once")
     assert verbose.out == "publishing and latching [data: False] for 1.0 seconds\n"
     assert robot.heard == [b"\x01", b"\x00"]
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     for words in (
         ("geometry_msgs/Point", "1", "-2.5", "-3"),
         ("std_msgs/Float32", "-0.5"),
@@ -225,7 +225,7 @@ def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: 
 
 
 def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "/listen", "std_msgs/String", "x")
     assert (
         "WARNING: topic [/listen] is of type [std_msgs/Bool] already, not [std_msgs/String]\n" in result.err
@@ -301,7 +301,7 @@ def test_rosnode_kill_ends_a_stream(robot: Any, program: Start, command: Any) ->
 
 def test_list_imports_little(robot: Any) -> None:
     code = (
-        "import sys; from minirospy.cli.rostopic import main; assert main(['list']) == 0; "
+        "import sys; from minirospy.cli.ros.rostopic import main; assert main(['list']) == 0; "
         "print(*sorted({'asyncio', 'yaml', 'numpy', 'logging', 'std_msgs', 'genpy', 'xmlrpc'} & set(sys.modules)))"
     )
     done = subprocess.run(
@@ -351,7 +351,7 @@ def test_pub_options_that_exclude_each_other(master: str, command: Any) -> None:
 
 
 def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "")
     assert result == (0, "publishing and latching [data: ''] for 0.1 seconds\n", "")
 
@@ -434,6 +434,6 @@ def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: St
 
 
 def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "data: 'x:=1'")
     assert result == (0, 'publishing and latching [data: "x:=1"] for 0.1 seconds\n', "")

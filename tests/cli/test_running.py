@@ -15,7 +15,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from minirospy.cli import family, roslaunch, rosrun
+from minirospy.cli import main as umbrella
+from minirospy.cli.ros import roslaunch, rosrun
 from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
 from tests.conftest import free_port
@@ -142,7 +143,7 @@ def test_roscore_on_a_port_of_somebody_else() -> None:
 
 @pytest.mark.parametrize("words", [["--nonsense"], ["-p", "x"], ["-p", "70000"]])
 def test_roscore_typed_wrong(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    from minirospy.cli.master import roscore
+    from minirospy.cli.ros.master import roscore
 
     assert roscore(words) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -357,11 +358,11 @@ def test_roslaunch_does_not_start_a_master_elsewhere(package: Path, monkeypatch:
 
 
 def test_the_family_tells_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    assert family.main([]) == 2
+    assert umbrella.main([]) == 2
     assert "minirospy demo " in capsys.readouterr().out
-    assert family.main(["--version"]) == 0
+    assert umbrella.main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("minirospy 0.")
-    assert family.main(["tpic"]) == 2
+    assert umbrella.main(["tpic"]) == 2
     assert "did you mean topic?" in capsys.readouterr().err
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 REAL_PYTHON = "/usr/bin/python3"
-OUR_RUN = "import sys; from minirospy.cli.{module} import {function}; sys.exit({function}())"
+OUR_RUN = "import sys; from minirospy.cli.ros.{module} import {function}; sys.exit({function}())"
 
 TREE = {
     "a": "<depend>b</depend><depend>c</depend>",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli import roslaunch
+from minirospy.cli.ros import roslaunch
 from tests.launch.conftest import BIN
 
 

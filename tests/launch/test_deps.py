@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.cli import roslaunch, roslaunch_deps, roslaunch_logs
+from minirospy.cli.ros import roslaunch, roslaunch_deps, roslaunch_logs
 from minirospy.runtime.master_proxy import MasterProxy
 
 

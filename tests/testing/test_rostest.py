@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from minirospy.cli.rostest import rostest, rosunit
+from minirospy.cli.ros.rostest import rostest, rosunit
 from minirospy.errors import MinirospyError
 from minirospy.testing.bare import run_bare
 
@@ -29,7 +29,7 @@ def _tested(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def start(command: str, *words: object) -> subprocess.Popen[str]:
-    code = f"import sys; from minirospy.cli.rostest import {command}; sys.exit({command}())"
+    code = f"import sys; from minirospy.cli.ros.rostest import {command}; sys.exit({command}())"
     return subprocess.Popen(
         [sys.executable, "-c", code, *map(str, words)],
         stdout=subprocess.PIPE,
@@ -170,7 +170,7 @@ def test_ctrl_c_before_the_tests_is_no_success(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("minirospy.cli.rostest._package_of", interrupted)
+    monkeypatch.setattr("minirospy.cli.ros.rostest._package_of", interrupted)
     assert command([str(TEST / "good.py")]) == 1
 
 
@@ -220,11 +220,11 @@ def test_typed_wrong(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    import minirospy.cli.rostest
+    import minirospy.cli.ros.rostest
 
     outside = write_test(tmp_path / "x.test", "")
     words = tuple(str(outside) if word == "OUTSIDE" else word for word in words)
-    assert getattr(minirospy.cli.rostest, command)(words) == status
+    assert getattr(minirospy.cli.ros.rostest, command)(words) == status
     err = capsys.readouterr().err
     assert text in err
     assert err.count("\n") == 1

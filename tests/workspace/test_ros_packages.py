@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from minirospy.cli.rospack import main as rospack
+from minirospy.cli.ros.rospack import main as rospack
 from minirospy.workspace.manifest import read_manifest
 
 ROOT = Path(__file__).parents[2] / "minirospy"

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.cli.catkin import catkin, catkin_make
-from minirospy.cli.catkin_test_results import main as catkin_test_results
+from minirospy.cli.catkin.make import catkin, catkin_make
+from minirospy.cli.catkin.test_results import main as catkin_test_results
 from minirospy.workspace.plan import Test as PlannedTest
 from minirospy.workspace.plan import read_plan
 
@@ -143,7 +143,9 @@ def test_slow():
         pathlib.Path({str(ended)!r}).touch()
 """
     scene.package("p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": text})
-    code = "import sys; from minirospy.cli.catkin import catkin_make; sys.exit(catkin_make(['run_tests']))"
+    code = (
+        "import sys; from minirospy.cli.catkin.make import catkin_make; sys.exit(catkin_make(['run_tests']))"
+    )
     popen = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=scene.root,
@@ -171,7 +173,7 @@ def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
     scene.package(
         "p", "catkin_add_nosetests(test)", "", {"test/test_slow.py": "import time\ntime.sleep(60)\n"}
     )
-    monkeypatch.setattr("minirospy.cli.catkin_tests._END_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.cli.catkin.run_tests._END_SECONDS", 0.1)
     assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
     assert capsys.readouterr().err.endswith("interrupted: the tests that were left have not run\n")
     assert [each.returncode is None for each in interrupted_processes] == [False]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import pytest
 
 import minirospy
-from minirospy.cli.complete import BY_HAND, ENTRANCES
+from minirospy.cli.completion.complete import BY_HAND, ENTRANCES
 
 SHELL = Path(minirospy.__file__).parent / "workspace" / "shell"
 BIN = Path(sys.executable).parent
@@ -91,7 +91,7 @@ def make_workspace(root: Path) -> None:
         for name, function in (("rospack", "main"), ("rosstack", "rosstack")):
             stand_in = root / "bin" / name
             stand_in.write_text(
-                f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.rospack import {function}\nsys.exit({function}())\n"
+                f"#!{sys.executable}\nimport sys\nfrom minirospy.cli.ros.rospack import {function}\nsys.exit({function}())\n"
             )
             stand_in.chmod(0o755)
 

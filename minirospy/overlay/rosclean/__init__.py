@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli.rosclean import disk_usage, human_size, main
+from minirospy.cli.ros.rosclean import disk_usage, human_size, main
 
 __all__ = ["CleanupException", "get_disk_usage", "get_human_readable_disk_usage", "rosclean_main"]
 

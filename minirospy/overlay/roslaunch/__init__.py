@@ -73,6 +73,6 @@ def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | N
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``roslaunch``; ``argv`` with the command's name in front."""
-    from minirospy.cli import roslaunch
+    from minirospy.cli.ros import roslaunch
 
     return roslaunch.main(None if argv is None else argv[1:])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.cli.roslaunch_deps import main as roslaunch_deps_main
+from minirospy.cli.ros.roslaunch_deps import main as roslaunch_deps_main
 from minirospy.errors import MinirospyError
 from minirospy.launch.depends import file_needs, missing_declarations, package_of
 from minirospy.workspace.packages import Packages

@@ -1,7 +1,7 @@
 """roslaunch.roslaunch_logs, filled in by minirospy: where the log files of the present run lie."""
 
-from minirospy.cli.roslaunch_logs import get_run_id
-from minirospy.cli.roslaunch_logs import main as logs_main
+from minirospy.cli.ros.roslaunch_logs import get_run_id
+from minirospy.cli.ros.roslaunch_logs import main as logs_main
 
 __all__ = ["NAME", "get_run_id", "logs_main"]
 

@@ -13,6 +13,6 @@ __all__ = ["DEFAULT_MASTER_PORT", "rosmaster_main"]
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:
     """The command; ``argv`` begins with its name. Its exit status, once it ends."""
-    from minirospy.cli.master import rosmaster
+    from minirospy.cli.ros.master import rosmaster
 
     return rosmaster(list(sys.argv if argv is None else argv)[1:])

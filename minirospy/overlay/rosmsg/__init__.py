@@ -106,7 +106,7 @@ def get_yaml_for_msg(msg: Any, prefix: str = "", *, flow_style_: bool | None = N
 
 def rosmsgmain(mode: str = MODE_MSG) -> int:
     """The command on this process's command line. Its exit status."""
-    from minirospy.cli import rosmsg
+    from minirospy.cli.ros import rosmsg
 
     return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
 

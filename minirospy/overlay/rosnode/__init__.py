@@ -200,7 +200,7 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
 
 def rosnode_cleanup() -> None:
     """What `rosnode cleanup` does, its question included. Raises ROSNodeIOException."""
-    from minirospy.cli.rosnode import main
+    from minirospy.cli.ros.rosnode import main
 
     with _graph() as graph:
         graph.master.get_pid()
@@ -209,7 +209,7 @@ def rosnode_cleanup() -> None:
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
     """The command; ``argv`` begins with its name. Ends the program with its exit status, as ROS's does."""
-    from minirospy.cli.rosnode import main
+    from minirospy.cli.ros.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
 

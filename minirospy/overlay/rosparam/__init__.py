@@ -164,7 +164,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
     """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
-    from minirospy.cli.rosparam import main
+    from minirospy.cli.ros.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)

@@ -1,6 +1,6 @@
 """rospy.rosconsole, filled in by minirospy: the command rosconsole."""
 
-from minirospy.cli.rosconsole import main
+from minirospy.cli.ros.rosconsole import main
 from rospy.logger_level_service_caller import LoggerLevelServiceCaller, ROSConsoleException
 
 NAME = "rosconsole"

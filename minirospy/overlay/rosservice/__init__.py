@@ -115,7 +115,7 @@ def has_service_args(service_name: str, service_class: Any = None) -> bool:
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
     """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
-    from minirospy.cli.rosservice import main
+    from minirospy.cli.ros.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)

@@ -19,6 +19,6 @@ def rostestmain() -> None:
     """What the command `rostest` runs; ends the process."""
     import sys
 
-    from minirospy.cli.rostest import rostest
+    from minirospy.cli.ros.rostest import rostest
 
     sys.exit(rostest())

@@ -271,7 +271,7 @@ def _is_shutdown() -> bool:
 
 
 def _command(words: Sequence[str]) -> None:
-    from minirospy.cli.rostopic import main
+    from minirospy.cli.ros.rostopic import main
 
     if status := main(list(words)):
         sys.exit(status)

@@ -21,9 +21,9 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minirospy.cli import sources
 from minirospy.cli.command import Parser
-from minirospy.cli.sources import Place, Source, Text
+from minirospy.cli.completion import completers
+from minirospy.cli.completion.completers import Place, Source, Text
 from minirospy.cli.verbs import Family
 from minirospy.errors import MinirospyError
 
@@ -34,68 +34,68 @@ if TYPE_CHECKING:
 __all__ = ["BY_HAND", "COMPLETED_WITH", "ENTRANCES", "candidates", "main"]
 
 ENTRANCES = {
-    "roscore": "master:roscore", "rosmaster": "master:rosmaster", "roslaunch": "roslaunch:main",
-    "roslaunch-deps": "roslaunch_deps:main", "roslaunch-logs": "roslaunch_logs:main", "rosdep": "rosdep:main",
-    "rostopic": "rostopic:main", "rosnode": "rosnode:main", "rosservice": "rosservice:main",
-    "rosparam": "rosparam:main", "rosmsg": "rosmsg:main", "rossrv": "rosmsg:main_srv",
-    "rosmsg-proto": "rosmsg_proto:main", "rosconsole": "rosconsole:main", "rosgraph": "rosgraph:main",
-    "rosclean": "rosclean:main", "rosversion": "rosversion:main", "roswtf": "doctor:roswtf",
-    "rostest": "rostest:rostest", "rosunit": "rostest:rosunit", "catkin": "catkin:catkin",
-    "catkin_make": "catkin:catkin_make", "catkin_make_isolated": "catkin:catkin_make_isolated",
-    "catkin_create_pkg": "catkin:catkin_create_pkg", "catkin_init_workspace": "catkin:catkin_init_workspace",
-    "catkin_find": "catkin_tools:catkin_find", "catkin_find_pkg": "catkin_tools:catkin_find_pkg",
-    "catkin_topological_order": "catkin_tools:catkin_topological_order",
-    "catkin_test_results": "catkin_test_results:main",
+    "roscore": "ros.master:roscore", "rosmaster": "ros.master:rosmaster", "roslaunch": "ros.roslaunch:main",
+    "roslaunch-deps": "ros.roslaunch_deps:main", "roslaunch-logs": "ros.roslaunch_logs:main", "rosdep": "ros.rosdep:main",
+    "rostopic": "ros.rostopic:main", "rosnode": "ros.rosnode:main", "rosservice": "ros.rosservice:main",
+    "rosparam": "ros.rosparam:main", "rosmsg": "ros.rosmsg:main", "rossrv": "ros.rosmsg:main_srv",
+    "rosmsg-proto": "ros.rosmsg_proto:main", "rosconsole": "ros.rosconsole:main", "rosgraph": "ros.rosgraph:main",
+    "rosclean": "ros.rosclean:main", "rosversion": "ros.rosversion:main", "roswtf": "doctor:roswtf",
+    "rostest": "ros.rostest:rostest", "rosunit": "ros.rostest:rosunit", "catkin": "catkin.make:catkin",
+    "catkin_make": "catkin.make:catkin_make", "catkin_make_isolated": "catkin.make:catkin_make_isolated",
+    "catkin_create_pkg": "catkin.make:catkin_create_pkg", "catkin_init_workspace": "catkin.make:catkin_init_workspace",
+    "catkin_find": "catkin.find:catkin_find", "catkin_find_pkg": "catkin.find:catkin_find_pkg",
+    "catkin_topological_order": "catkin.find:catkin_topological_order",
+    "catkin_test_results": "catkin.test_results:main",
 }  # fmt: skip
 """Command -> where its parser is made: ``module:function`` of this folder, as in pyproject.toml."""
 
 BY_HAND: dict[str, Source] = {
-    "roscd": sources.package_folders,
-    "rospd": sources.package_folders,
-    "rosls": sources.package_folders,
-    "rosed": sources.package_file,
-    "roscat": sources.package_file,
-    "roscp": sources.package_file_and_target,
-    "rosmv": sources.package_file_and_target,
-    "rosrun": sources.rosrun_words,
-    "rospack": sources.rospack_words,
-    "rosstack": sources.rosstack_words,
+    "roscd": completers.package_folders,
+    "rospd": completers.package_folders,
+    "rosls": completers.package_folders,
+    "rosed": completers.package_file,
+    "roscat": completers.package_file,
+    "roscp": completers.package_file_and_target,
+    "rosmv": completers.package_file_and_target,
+    "rosrun": completers.rosrun_words,
+    "rospack": completers.rospack_words,
+    "rosstack": completers.rosstack_words,
 }
 """Commands that read their words without a parser."""
 
 COMPLETED_WITH: dict[Source, str] = {
     # of the graph, as it is now
-    sources.topics: "topic topics rostopic.namespace",
-    sources.topic_type: "rostopic.type",
-    sources.message_text: "rostopic.args",
-    sources.nodes: "node nodes rosnode.namespace",
-    sources.machines: "machine",
-    sources.services: "service rosservice.namespace",
-    sources.request_text: "rosservice.args",
-    sources.parameters: "parameter rosparam.namespace",
-    sources.parameter_value: "rosparam.value",
-    sources.loggers: "logger",
+    completers.topics: "topic topics rostopic.namespace",
+    completers.topic_type: "rostopic.type",
+    completers.message_text: "rostopic.args",
+    completers.nodes: "node nodes rosnode.namespace",
+    completers.machines: "machine",
+    completers.services: "service rosservice.namespace",
+    completers.request_text: "rosservice.args",
+    completers.parameters: "parameter rosparam.namespace",
+    completers.parameter_value: "rosparam.value",
+    completers.loggers: "logger",
     # of the packages
-    sources.message_types: "type",
-    sources.service_types: "rosservice.type rossrv.type",
-    sources.prototype_types: "rosmsg-proto.type",
-    sources.package_names: "package packages pkg only_pkg_with_deps dependencies catkin_deps "
+    completers.message_types: "type",
+    completers.service_types: "rosservice.type rossrv.type",
+    completers.prototype_types: "rosmsg-proto.type",
+    completers.package_names: "package packages pkg only_pkg_with_deps dependencies catkin_deps "
     "blacklist whitelist start_with",
-    sources.package_path: "catkin_find.path",
-    sources.build_targets: "targets",
-    sources.launch_words: "roslaunch.what rostest.what",
-    sources.launch_nodes: "roslaunch.args roslaunch.find_node",
-    sources.launch_files: "others roslaunch-deps.files",
+    completers.package_path: "catkin_find.path",
+    completers.build_targets: "targets",
+    completers.launch_words: "roslaunch.what rostest.what",
+    completers.launch_nodes: "roslaunch.args roslaunch.find_node",
+    completers.launch_files: "others roslaunch-deps.files",
     # of this computer
-    sources.files: "file files textfile binfile bag pid arguments",
-    sources.folders: "build devel directory extend folder from_paths install_space pkgdir results_base_dir source "
+    completers.files: "file files textfile binfile bag pid arguments",
+    completers.folders: "build devel directory extend folder from_paths install_space pkgdir results_base_dir source "
     "test_results_dir workspace",
     # what there is to choose from
-    sources.pins: "pin",
-    sources.shells: "shell",
-    sources.kinds: "mode",
+    completers.pins: "pin",
+    completers.shells: "shell",
+    completers.kinds: "mode",
     # numbers, names to be made up, expressions
-    sources.nothing: "ahead allow author boost_comps catkin_make_args child cmake_args count dependency_types description "
+    completers.nothing: "ahead allow author boost_comps catkin_make_args child cmake_args count dependency_types description "
     "exclude_slots filter j jobs keys left license load_average maintainer make_args mem_limit name numworkers os p "
     "parallel_packages pkg_version port prefix presses rate results_filename rosdistro run_id server_uri sigint_timeout "
     "sigterm_timeout size skip_keys sys_deps time_limit timeout width window",
@@ -151,7 +151,7 @@ def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> l
     command = re.split(r"[/\\]", command)[-1].removesuffix(".exe")
     try:
         found = _of_command(command, before, word.text)
-        fitting = (sources.on_one_line(text) if one_line else text for text in found)
+        fitting = (completers.on_one_line(text) if one_line else text for text in found)
         return [_quoted(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
         # An unknown package or type: the command itself will say so.
@@ -173,16 +173,17 @@ def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
-    from minirospy.cli.family import _VERBS
+    from minirospy.cli.main import _VERBS
 
     if not before:
         return _OPTIONS if word.startswith("-") else [name for name, verb in _VERBS.items() if verb.summary]
     entry = _VERBS.get(before[0])
     if entry is None:
         return ()
-    if entry.module in BY_HAND:
-        return _of_command(entry.module, before[1:], word)
-    return _of_module(entry.module, entry.module, entry.function, before[1:], word)
+    name = entry.module.rpartition(".")[2]
+    if name in BY_HAND:
+        return _of_command(name, before[1:], word)
+    return _of_module(name, entry.module, entry.function, before[1:], word)
 
 
 def _of_module(command: str, module: str, function: str, before: list[str], word: str) -> Iterable[str]:

@@ -137,7 +137,7 @@ def _catkin_make(command: str, argv: Sequence[str] | None, suffix: str) -> int:
     if "install" in options.targets or options.install:
         _install(workspace, plans)
     if tests or _TESTS & set(options.targets):
-        from minirospy.cli.catkin_tests import run_tests
+        from minirospy.cli.catkin.run_tests import run_tests
 
         return run_tests(
             workspace, plans, [*chosen, *(target.removeprefix("run_tests_") for target in tests)]
@@ -486,7 +486,7 @@ def _locate(argv: Sequence[str]) -> int:
 
 
 def _run_tests(argv: Sequence[str]) -> int:
-    from minirospy.cli.catkin_tests import run_tests
+    from minirospy.cli.catkin.run_tests import run_tests
 
     parser = _parser("test", "Build, and run the tests of packages.")
     parser.add_argument("packages", nargs="*", default=[], help="default: all")

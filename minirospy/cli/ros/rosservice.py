@@ -129,7 +129,7 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
 
 
 def _asked_for(request: Any, known: Sequence[str]) -> Any:
-    from minirospy.cli.form import ask_for
+    from minirospy.cli.ros.form import ask_for
 
     def refuse(error: Exception) -> None:
         complain("rosservice", error)

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from minirospy.cli.catkin_test_results import Counts, results_below
+from minirospy.cli.catkin.test_results import Counts, results_below
 from minirospy.errors import BuildError, MinirospyError, NotFoundError
 from minirospy.testing.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
@@ -112,14 +112,14 @@ def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
     name = re.sub(r"[^\w.-]", "_", stem)
     options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]
     file = str(plan.folder / test.path)
-    program = [sys.executable, "-m", "minirospy.cli.rostest"]
+    program = [sys.executable, "-m", "minirospy.cli.ros.rostest"]
     return [*program, *options, "--results-base-dir", str(results.parent), file, *test.arguments]
 
 
 def _launch_check(plan: Plan, test: Test, results: Path) -> list[str]:
     name = re.sub(r"[^\w.-]", "_", test.path)
     output = str(results / f"roslaunch-check_{name}.xml")
-    program = [sys.executable, "-m", "minirospy.cli.roslaunch_check", "-o", output]
+    program = [sys.executable, "-m", "minirospy.cli.ros.roslaunch_check", "-o", output]
     return [*program, *test.arguments, str(plan.folder / test.path)]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from minirospy.cli.command import Parser, run
-from minirospy.cli.form import ask_for, fields, flow
+from minirospy.cli.ros.form import ask_for, fields, flow
 from minirospy.errors import ROSException, UsageError
 
 __all__ = ["action_class", "main", "read_answer"]

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from minirospy.cli.rospack import _Verb as PackVerb
+    from minirospy.cli.ros.rospack import _Verb as PackVerb
     from minirospy.idl.load import Catalogue
     from minirospy.idl.spec import MessageSpec
     from minirospy.introspect.graph import Graph
@@ -187,20 +187,20 @@ def rosrun_words(place: Place) -> Iterable[str]:
 
 def rospack_words(place: Place) -> Iterable[str]:
     """A verb of rospack, its options, a package."""
-    from minirospy.cli.rospack import _VERBS
+    from minirospy.cli.ros.rospack import _VERBS
 
     return _pack_words(place, _VERBS)
 
 
 def rosstack_words(place: Place) -> Iterable[str]:
     """A verb of rosstack, its options, a stack."""
-    from minirospy.cli.rospack import _STACK_VERBS
+    from minirospy.cli.ros.rospack import _STACK_VERBS
 
     return _pack_words(place, _STACK_VERBS)
 
 
 def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
-    from minirospy.cli.rospack import _FLAGS
+    from minirospy.cli.ros.rospack import _FLAGS
 
     words = [word for word in place.given if not word.startswith("-")]
     verb = verbs.get(words[0]) if words else None

@@ -10,9 +10,9 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from minirospy.cli.axclient import action_class, read_answer
 from minirospy.cli.command import Parser, run
-from minirospy.cli.form import ask_for
+from minirospy.cli.ros.axclient import action_class, read_answer
+from minirospy.cli.ros.form import ask_for
 
 __all__ = ["main"]
 

@@ -298,7 +298,7 @@ def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list
 
 
 def _pub(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    from minirospy.cli.rostopic_pub import publish
+    from minirospy.cli.ros.rostopic_pub import publish
 
     publish(argv, arguments)
 

@@ -1,0 +1,1 @@
+"""The commands of catkin and catkin_tools: workspaces without CMake."""

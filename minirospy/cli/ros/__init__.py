@@ -1,0 +1,1 @@
+"""The commands of ROS: `roscore`, `rosrun`, `roslaunch`, `rostopic` and their family."""
