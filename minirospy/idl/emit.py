@@ -2,11 +2,15 @@
 
 A generated module imports public names of ``genpy`` alone, so that it works beside real ROS too. How its
 ``serialize`` and ``deserialize`` are made: ``codec``.
+
+Definitions may come from strangers: names are written only after ``validate`` has checked them, all other text by
+``repr``. Every message that the source is made of passes :func:`_checked`.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from minirospy.idl.codec import keeps_buffer, lazy_arrays, write_deserialize, write_serialize
 from minirospy.idl.digest import (
@@ -17,8 +21,9 @@ from minirospy.idl.digest import (
 )
 from minirospy.idl.source import Source, python_name
 from minirospy.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
+from minirospy.idl.validate import check_spec, check_type_name
 
-__all__ = ["emit_message", "emit_package", "emit_service", "python_name"]
+__all__ = ["ClassSource", "emit_class", "emit_message", "emit_package", "emit_service", "python_name"]
 
 _PYTHON_TYPE = {
     "bool": "bool",
@@ -94,21 +99,41 @@ _HELPERS = {
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
-    """The module of a message."""
-    return _Module(lookup).source([spec], None, f"{spec.full_name}.msg")
+    """Return the module of a message. Raise DefinitionError where a name cannot be one in Python."""
+    check_spec(spec)
+    return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
+
+
+def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
+    """Return the source of a message's class, which finds the classes of its fields among its globals.
+
+    Raise DefinitionError where a name cannot be one in Python.
+    """
+    check_spec(spec)
+    module = _Module(_checked(lookup), imports=False)
+    source = module.source([spec], None, f"{spec.full_name}.msg")
+    return ClassSource(source, module.classes)
 
 
 def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
-    """The module of a service: request, response, and the class that joins them."""
-    return _Module(lookup).source([spec.request, spec.response], spec, f"{spec.full_name}.srv")
+    """Return the module of a service: request, response, and the class that joins them.
+
+    Raise DefinitionError where a name cannot be one in Python.
+    """
+    check_type_name(spec.full_name)
+    for message in (spec.request, spec.response):
+        check_spec(message)
+    return _Module(_checked(lookup)).source([spec.request, spec.response], spec, f"{spec.full_name}.srv")
 
 
 def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
-    """The ``__init__`` of a package's msg or srv folder: module -> the names that it holds.
+    """Return the ``__init__`` of a package's msg or srv folder: module -> the names that it holds.
 
-    Each module is loaded when one of its names is first used.
+    Each module is loaded when one of its names is first used. Raise DefinitionError as :func:`emit_message`.
     """
     names = {name: module for module, held in modules.items() for name in held}
+    for name in names:
+        check_type_name(f"{package}/{name}")
     lines = [
         f'"""{package}.{kind}: generated from the definitions; each class is loaded when it is first used."""',
         "",
@@ -137,12 +162,41 @@ def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
     return "\n".join(lines)
 
 
-class _Module:
-    """Writes one module."""
+class ClassSource(NamedTuple):
+    """The source of a class, and what it expects among its globals."""
 
-    def __init__(self, lookup: Lookup) -> None:
+    source: str
+    classes: dict[str, str]
+    """``pkg/Name`` -> the global name under which the source finds that class."""
+
+
+def _checked(lookup: Lookup) -> Lookup:
+    """Return ``lookup`` with :func:`check_spec` on all that it returns, each message once."""
+    seen: dict[str, MessageSpec] = {}
+
+    def checked(name: str) -> MessageSpec:
+        if name not in seen:
+            check_type_name(name)
+            spec = lookup(name)
+            check_spec(spec)
+            seen[name] = spec
+        return seen[name]
+
+    return checked
+
+
+class _Module:
+    """Write one module; without ``imports`` the classes of its fields are among its globals already."""
+
+    def __init__(self, lookup: Lookup, *, imports: bool = True) -> None:
         self._lookup = lookup
+        self._imports = imports
         self._source = Source()
+
+    @property
+    def classes(self) -> dict[str, str]:
+        """The classes of the fields: ``pkg/Name`` -> the module's name of it."""
+        return dict(self._source.classes)
 
     def source(self, messages: list[MessageSpec], service: ServiceSpec | None, origin: str) -> str:
         for message in messages:
@@ -178,7 +232,7 @@ class _Module:
         ]
         for full_name, alias in sorted(self._source.classes.items()):
             package, name = full_name.split("/")
-            if full_name not in own:
+            if self._imports and full_name not in own:
                 lines.append(f"from {package}.msg._{name} import {name} as {alias}")
         lines.append("")
         if "_NATIVE" in helpers:
@@ -201,8 +255,8 @@ class _Module:
         with self._source.block(f"class {spec.name}({base}):"):
             line(f'"""{spec.full_name}"""')
             line()
-            line(f'_md5sum = "{message_md5(spec, self._lookup)}"')
-            line(f'_type = "{spec.full_name}"')
+            line(f"_md5sum = {message_md5(spec, self._lookup)!r}")
+            line(f"_type = {spec.full_name!r}")
             line(f"_has_header = {spec.has_header}")
             line(f"_full_text = {full_text(spec, self._lookup)!r}")
             line(f"_takes_memoryview = {keeps_buffer(spec, self._lookup)}")
@@ -228,8 +282,8 @@ class _Module:
         with self._source.block(f"class {spec.name}:"):
             line(f'"""{spec.full_name}"""')
             line()
-            line(f'_type = "{spec.full_name}"')
-            line(f'_md5sum = "{service_md5(spec, self._lookup)}"')
+            line(f"_type = {spec.full_name!r}")
+            line(f"_md5sum = {service_md5(spec, self._lookup)!r}")
             line(f"_request_class = {spec.request.name}")
             line(f"_response_class = {spec.response.name}")
 
@@ -280,5 +334,5 @@ def _is_even(letters: str) -> bool:
 
 def _constant(value: object) -> str:
     if isinstance(value, float) and not math.isfinite(value):
-        return f'float("{value}")'
+        return f"float({str(value)!r})"
     return repr(value)

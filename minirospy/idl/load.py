@@ -8,17 +8,23 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import importlib
+import importlib.machinery
+import importlib.util
 import linecache
+import os
 import sys
 import types
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
+from minirospy.idl.validate import check_type_name, is_type_name
+
+if TYPE_CHECKING:
+    from minirospy.idl.emit import ClassSource
 
 __all__ = [
     "Catalogue",
@@ -214,6 +220,7 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
         if number:
             head, _, body = part.partition("\n")
             name = head.removeprefix("MSG:").strip()
+        check_type_name(name, full_name)
         package, _, short = name.partition("/")
         specs.setdefault(name, parse_message(body, package, short))
     return specs
@@ -230,10 +237,8 @@ def class_from_text(full_name: str, text: str) -> Any:
 @lru_cache(maxsize=256)
 def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
     """The class of a full text, and those of all types in it that it needs, by name. Raises DefinitionError."""
-    from minirospy.idl.emit import emit_message
+    from minirospy.idl.emit import emit_class
 
-    if not all(full_name.partition("/")):
-        raise DefinitionError(full_name, 1, f"[{full_name}] is not of the form package/Type")
     specs = specs_of_text(full_name, text)
 
     def lookup(name: str) -> MessageSpec:
@@ -244,15 +249,14 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
     made: dict[str, Any] = {}
 
     def make(name: str, around: tuple[str, ...] = ()) -> Any:
-        """Run the generated source; its imports of other types find those made here."""
+        """Make the class of a type, after those of its fields."""
         if name in around:
             raise DefinitionError(full_name, 1, f"[{name}] contains itself")
         if name not in made:
             for field in lookup(name).fields:
                 if not field.type.is_primitive:
                     make(field.type.base, (*around, name))
-            source = emit_message(lookup(name), lookup)
-            made[name] = _run(source, name, made)
+            made[name] = _run(emit_class(lookup(name), lookup), name, made)
         return made[name]
 
     # Sent on as it came, even where ours would be written otherwise.
@@ -260,28 +264,31 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
     return types.MappingProxyType(made)
 
 
-def _run(source: str, name: str, made: dict[str, Any]) -> Any:
+def _run(emitted: ClassSource, name: str, made: dict[str, Any]) -> Any:
+    """Execute the source of a class, in whose fields are classes made before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
-    kept = []
-    for line in source.split("\n"):
-        if line.startswith("from ") and ".msg._" in line:
-            package, _, rest = line.removeprefix("from ").partition(".msg._")
-            short = rest.split(" ", 1)[0]
-            module.__dict__[line.rsplit(" as ", 1)[1]] = made[f"{package}/{short}"]
-            line = ""  # noqa: PLW2901 - the line number stays what the traceback shows
-        kept.append(line)
-    text = "\n".join(kept)
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    exec(compile(text, file, "exec"), module.__dict__)
+    for type_, alias in emitted.classes.items():
+        module.__dict__[alias] = made[type_]
+    source = emitted.source
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    # Its names have passed `validate`, all other text is in it by `repr`: nothing of a peer's is code.
+    exec(compile(source, file, "exec"), module.__dict__)
     return module.__dict__[name.partition("/")[2]]
 
 
 def _imported(name: str, kind: str) -> Any:
-    package, separator, short = name.partition("/")
-    if package == "Header" and not separator and kind == "msg":
-        package, short = "std_msgs", "Header"
-    if not short or "/" in short or package[:1] in ("", "."):
+    """Return the class ``pkg/Name`` of an installed package, or None.
+
+    The name may come from a peer, and to import a module is to execute it: so only a package with a folder (or module)
+    ``msg`` or ``srv`` is imported, never any other module that happens to have the name.
+    """
+    if name == "Header" and kind == "msg":
+        name = "std_msgs/Header"
+    if not is_type_name(name):
+        return None
+    package, _, short = name.partition("/")
+    if not _has_definitions(package, kind):
         return None
     try:
         module = importlib.import_module(f"{package}.{kind}")
@@ -291,6 +298,24 @@ def _imported(name: str, kind: str) -> Any:
         return None
     found = getattr(module, short, None)
     return found if hasattr(found, "_md5sum") and hasattr(found, "_type") else None
+
+
+def _has_definitions(package: str, kind: str) -> bool:
+    """Return whether a package holds a module of generated classes, without importing either."""
+    if f"{package}.{kind}" in sys.modules:
+        return True
+    try:
+        found = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        # ValueError: a module that was put into sys.modules by hand has no spec.
+        found = None
+    if found is None:
+        return package in sys.modules
+    if found.submodule_search_locations is None:
+        return False
+    # A package may spread over several entries of sys.path once it has been imported (pkgutil.extend_path).
+    folders = [*found.submodule_search_locations, *(os.path.join(entry, package) for entry in sys.path)]
+    return importlib.machinery.PathFinder.find_spec(f"{package}.{kind}", folders) is not None
 
 
 def _known(kind: str) -> Iterable[str]:

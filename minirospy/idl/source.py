@@ -62,8 +62,14 @@ class Source:
         return helper
 
     def class_(self, full_name: str) -> str:
-        """The name of a message's class."""
-        return self.classes.setdefault(full_name, "_" + full_name.replace("/", "_"))
+        """Return the name of a message's class, one that nothing else in the module has."""
+        if full_name not in self.classes:
+            name = "_" + full_name.replace("/", "_")
+            # a/b_C and a_b/C look the same, and struct/I looks like a compiled struct.
+            while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
+                name += "_"
+            self.classes[full_name] = name
+        return self.classes[full_name]
 
     def local(self, stem: str) -> str:
         """A local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
