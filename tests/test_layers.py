@@ -18,7 +18,7 @@ LAYERS = [
     {"client", "aio"},
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
-    {"clock", "environment", "names", "scanner", "times"},
+    {"clock", "environment", "names", "private_files", "scanner", "times"},
     {"errors"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

@@ -3,12 +3,13 @@
 One file for each user and port, ``ROS_HOME/master/journal-PORT``. A record is written, without fsync, before
 the caller gets its answer: so a kill -9 loses nothing that was answered. A power cut may lose the last seconds,
 and with them the nodes of this machine are gone too. The file is rewritten, and then synced, once it has grown
-to several times what it holds. A master that ends as it should removes it: the next session starts empty.
+to several times what it holds. A master that shuts down cleanly removes it: the next session starts empty.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
 import sys
@@ -17,16 +18,23 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from minirospy import private_files
 from minirospy.wire.journal import HEAD, Recovered, parse_journal, serialize_record
 
-__all__ = ["Journal", "JournalBusyError", "Left", "boot_id"]
+__all__ = ["RETRY_SECONDS", "Journal", "JournalBusyError", "Left", "boot_id"]
 
 _log = logging.getLogger(__name__)
 
 _COMPACT_BYTES = 1024 * 1024
 _COMPACT_FACTOR = 4
-_RETRY_SECONDS = 30.0
-_CREATE = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+
+RETRY_SECONDS = 30.0
+"""After this the journal is tried again that could not be written."""
+
+_BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
+"""What locking a file raises that another process has locked; the last two on Windows."""
+
+_ENCODED_PID = 20
 
 
 class JournalBusyError(Exception):
@@ -42,23 +50,33 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """What a master that did not end as it should has left; ``age``: seconds since it last wrote."""
+    """What a master that was killed has left; ``age``: seconds since it last wrote.
+
+    ``copy`` is the file to which a damaged journal was copied, None where that was not possible.
+    """
 
     recovered: Recovered
     age: float
     same_boot: bool
+    copy: Path | None = None
 
 
 class Journal:
-    """An open journal. ``snapshot`` gives the records that make up the present state, for a rewrite.
+    """An open journal. ``snapshot`` returns the records that make up the present state, for a rewrite.
 
-    :meth:`open` gives what was left, :meth:`rewrite` begins anew; then :meth:`append` never raises: where the
-    disk fails, the master goes on without, says so, and tries again with a whole rewrite half a minute later.
+    In this order: :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`. Where the disk fails, from the
+    first step on, the master goes on without; ``trouble`` says why, and a whole rewrite is tried every half minute.
     """
 
-    def __init__(self, path: Path, snapshot: Callable[[], Iterable[list[Any]]]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        snapshot: Callable[[], Iterable[list[Any]]],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self.path = path
         self._snapshot = snapshot
+        self._clock = clock
         self._file = -1
         self._lock = -1
         self._size = 0
@@ -67,51 +85,73 @@ class Journal:
         self.trouble = ""
         """Why nothing is written at present."""
 
-    def open(self) -> Left | None:
-        """Lock the journal; what was left in it, if anything. Raises OSError or JournalBusyError."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
-        try:
-            data = self.path.read_bytes()
-            written = self.path.stat().st_mtime
-        except FileNotFoundError:
-            return None
-        recovered = parse_journal(data)
-        same_boot = recovered.records[:1] == [["boot", boot_id()]]
-        left = Left(
-            recovered._replace(records=recovered.records[1:]), max(0.0, time.time() - written), same_boot
-        )
-        if left.recovered.damage:
-            with contextlib.suppress(OSError):
-                self.path.with_name(self.path.name + ".damaged").write_bytes(data)
-        return left
-
     @property
     def size(self) -> int:
-        """Bytes in the file."""
+        """The bytes in the file."""
         return self._size
 
+    def lock(self) -> None:
+        """Make this process the only one that writes the journal. Raises OSError or JournalBusyError."""
+        if self._lock < 0:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
+
+    def read(self) -> Left | None:
+        """Return what another master has left, None where that is nothing."""
+        try:
+            data, written = private_files.read_file(self.path)
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            damage = f"it cannot be read: {error.strerror or error}"
+            return Left(Recovered([], 0, damage), 0.0, same_boot=True, copy=self._set_aside())
+        recovered = parse_journal(data)
+        same_boot = recovered.records[:1] == [["boot", boot_id()]]
+        copy = self._keep_copy(data) if recovered.damage else None
+        recovered = recovered._replace(records=recovered.records[1:])
+        return Left(recovered, max(0.0, time.time() - written), same_boot, copy)
+
+    def discard(self) -> None:
+        """Drop what another master has left."""
+        with contextlib.suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+    def start(self) -> None:
+        """Write the present state, and from here on each change. Never raises."""
+        try:
+            self.lock()
+            self.rewrite()
+        except (OSError, ValueError, TypeError, JournalBusyError) as error:
+            self._fail(error)
+
     def rewrite(self) -> None:
-        """Write the present state and nothing else. Raises OSError; the old file then still stands."""
+        """Write the present state and nothing else. Raises OSError; the old file then remains."""
         head = HEAD + serialize_record(["boot", boot_id()])
         data = head + b"".join(serialize_record(record) for record in self._snapshot())
         new = self.path.with_name(self.path.name + ".new")
-        file = os.open(new, _CREATE | os.O_TRUNC, 0o600)
+        file = private_files.create_file(new)
         try:
             _write_all(file, data)
             os.fsync(file)
+
             # Windows replaces no file that is open.
             self._close_file()
             if sys.platform == "win32":
                 os.close(file)
+                file = -1
                 os.replace(new, self.path)
-                file = os.open(self.path, _CREATE | os.O_APPEND)
+                file = private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
             else:
                 os.replace(new, self.path)
         except BaseException:
+            if file >= 0:
+                with contextlib.suppress(OSError):
+                    os.close(file)
+            # On a full disk it takes the room that the old one may need.
             with contextlib.suppress(OSError):
-                os.close(file)
+                new.unlink(missing_ok=True)
             raise
+
         self._file = file
         self._size = len(data)
         self._compact_at = max(_COMPACT_BYTES, _COMPACT_FACTOR * len(data))
@@ -119,10 +159,10 @@ class Journal:
 
     def append(self, *record: Any) -> None:
         """Write one change. Never raises."""
+        if self._file < 0:
+            self.retry()
+            return
         try:
-            if self._file < 0:
-                self._try_again()
-                return
             data = serialize_record(list(record))
             _write_all(self._file, data)
             self._size += len(data)
@@ -131,21 +171,29 @@ class Journal:
         except (OSError, ValueError, TypeError) as error:
             self._fail(error)
 
+    def retry(self) -> None:
+        """Write the present state where nothing could be written half a minute ago. Never raises."""
+        if self._file < 0 and self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
+            self.start()
+            if not self.trouble:
+                _log.warning("the journal %s is written again", self.path)
+
     def touch(self) -> None:
-        """Say that this master is alive, for the age that :meth:`open` tells."""
+        """Record that this master is alive, for the age that :meth:`read` returns."""
         with contextlib.suppress(OSError):
-            os.utime(self.path)
+            os.utime(self.path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
 
     def remove(self) -> None:
-        """End as a master should: nothing is left to recover. Idempotent."""
+        """Shut down cleanly: nothing is left to recover. Idempotent."""
         self._close_file()
         if self._lock >= 0:
-            self.path.unlink(missing_ok=True)
+            self.discard()
         self.close()
 
     def close(self) -> None:
-        """Let go of the file and leave it as it is. Idempotent."""
+        """Release the file and leave it as it is. Idempotent."""
         self._close_file()
+        self.trouble = ""
         if self._lock >= 0:
             os.close(self._lock)
             self._lock = -1
@@ -155,16 +203,40 @@ class Journal:
             os.close(self._file)
             self._file = -1
 
-    def _fail(self, error: Exception) -> None:
-        self.trouble = str(error)
-        self._failed_at = time.monotonic()
-        self._close_file()
-        _log.error("the journal %s cannot be written, a crash would lose the graph: %s", self.path, error)
+    @property
+    def _copy_path(self) -> Path:
+        return self.path.with_name(self.path.name + ".damaged")
 
-    def _try_again(self) -> None:
-        if self._lock >= 0 and time.monotonic() - self._failed_at > _RETRY_SECONDS:
-            self.rewrite()
-            _log.warning("the journal %s is written again", self.path)
+    def _set_aside(self) -> Path | None:
+        try:
+            os.replace(self.path, self._copy_path)
+        except OSError:
+            return None
+        return self._copy_path
+
+    def _keep_copy(self, data: bytes) -> Path | None:
+        copy = self._copy_path
+        try:
+            file = private_files.create_file(copy)
+        except OSError:
+            return None
+        try:
+            _write_all(file, data)
+        except OSError:
+            return None
+        finally:
+            os.close(file)
+        return copy
+
+    def _fail(self, error: Exception) -> None:
+        trouble = (isinstance(error, OSError) and error.strerror) or str(error)
+        if trouble != self.trouble:
+            _log.error(
+                "the journal %s cannot be written, a crash would lose the graph: %s", self.path, trouble
+            )
+        self.trouble = trouble
+        self._failed_at = self._clock()
+        self._close_file()
 
 
 def _write_all(file: int, data: bytes) -> None:
@@ -174,8 +246,8 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """A lock that ends with this process, however it ends; in the file stands the pid."""
-    file = os.open(path, _CREATE, 0o600)
+    """Return a lock that the system releases with this process; the file holds its pid. Raises as Journal.lock."""
+    file = private_files.open_file(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -189,21 +261,27 @@ def _locked(path: Path, journal: Path) -> int:
 
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
+        if error.errno in _BUSY:
+            os.lseek(file, 0, os.SEEK_SET)
+            text = os.read(file, _ENCODED_PID).strip()
+            os.close(file)
+            raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
+        # A file system without locks: the port that this master has is the only one.
         os.lseek(file, 0, os.SEEK_SET)
-        text = os.read(file, 20).strip()
-        os.close(file)
-        raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
-    os.ftruncate(file, 0)
-    os.write(file, b"%d\n" % os.getpid())
+
+    # On a full disk the lock holds all the same.
+    with contextlib.suppress(OSError):
+        os.ftruncate(file, 0)
+        os.write(file, b"%d\n" % os.getpid())
     return file
 
 
 def boot_id() -> str:
-    """Something that is the same as long as this machine runs."""
+    """Return an identifier that stays the same until this machine is restarted."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:
         import psutil
 
-        # Elsewhere than on Linux the time of the start is counted back from now: a second more or less.
+        # Elsewhere than on Linux the time of the start is counted back from now, to a second or so.
         return str(round(psutil.boot_time() / 60))

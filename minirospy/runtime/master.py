@@ -26,6 +26,7 @@ from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 
 if TYPE_CHECKING:
+    from minirospy.runtime.journal import Journal
     from minirospy.runtime.node import Node
 
 __all__ = ["Master"]
@@ -36,7 +37,11 @@ _CHECK_SECONDS = 3.0
 _CHECK_TRIES = 3
 _CHECKS_AT_ONCE = 100
 _QUICK_CHECK_SECONDS = 1.0
-_TOUCH_SECONDS = 60.0
+_TOUCH_SECONDS = 30.0
+_LOCK_SECONDS = 3.0
+_LOCK_PAUSE = 0.02
+"""A master that was killed may release its port a moment before its journal."""
+
 _RESTART_SECONDS = 600.0
 """A master that starts so soon after the last sign of the one that was killed takes its session up."""
 
@@ -111,11 +116,14 @@ class Master(MasterApi):
         return self.parameters.has(key) and self.parameters.get(key) is True
 
     async def start(self) -> None:
-        """Take up what a killed master left, and listen. Raises OSError."""
-        nodes = await self._open_journal() if self._journal_path else {}
+        """Take the port, recover what a killed master left, and serve. Raises OSError."""
+        # The port first: of two masters that are started together, the one that gets it has the journal too.
+        self._server.listen()
         try:
+            nodes = await self._open_journal() if self._journal_path else {}
             await self._server.start()
         except BaseException:
+            await self._server.close()
             if self._journal:
                 self._journal.close()
             raise
@@ -197,26 +205,32 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Open the journal and take up what stands in it; the nodes to be checked, and their URIs."""
-        from minirospy.runtime.journal import Journal, JournalBusyError
+        """Recover what is in the journal, and begin to write it; return the nodes to be checked, and their URIs."""
+        from minirospy.runtime.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
-        journal = Journal(self._journal_path, self._snapshot)
+        journal = self._journal = Journal(self._journal_path, self._snapshot)
         try:
-            left = journal.open()
-            if left and not self._fresh:
-                await self._take_up(left)
-            journal.rewrite()
+            await _lock(journal)
         except JournalBusyError as error:
-            # Its master may well be the one that has the port, which the caller then finds out.
             self.news.append(f"no journal: {error}")
+            self._journal = None
             return {}
-        except OSError as error:
-            journal.close()
-            why = f"{self._journal_path} cannot be written: {error.strerror or error}; set ROS_HOME"
-            self.news.append(f"no journal, a crash of the master would lose the graph: {why}")
-            return {}
-        self._journal = journal
+        except OSError:
+            # What is there can be read all the same. :meth:`Journal.start` finds out whether it can be written.
+            pass
+
+        if self._fresh:
+            journal.discard()
+        elif left := journal.read():
+            await self._take_up(left)
+
+        journal.start()
+        if journal.trouble:
+            self.news.append(
+                f"no journal, a crash of the master would lose the graph: {self._journal_path} cannot be written: "
+                f"{journal.trouble}; set ROS_HOME (it is tried again every {RETRY_SECONDS:.0f} s)"
+            )
         self.note = journal.append
         self._touch()
         return self.registry.nodes()
@@ -233,9 +247,10 @@ class Master(MasterApi):
             # The /rosout node went with its master; this one brings its own.
             self.registry.forget(_OWN_NODE, uri)
         if recovered.damage:
+            kept = f"a copy is kept as {left.copy}" if left.copy else "no copy of it could be written"
             self.news.append(
                 f"journal: {recovered.damage}; recovered up to the last whole record "
-                f"({len(recovered.records)} of them), a copy is kept as {self._journal_path}.damaged"
+                f"({len(recovered.records)} of them), {kept}"
             )
         nodes, parameters = self.registry.nodes(), self.parameters.names()
         if not nodes and not parameters:
@@ -302,6 +317,8 @@ class Master(MasterApi):
 
     def _touch(self) -> None:
         self._journal.touch()
+        # A graph where nothing changes writes nothing, and would not retry.
+        self._journal.retry()
         self._touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self._touch)
 
     # --- the nodes of a master that was killed
@@ -342,6 +359,22 @@ class Master(MasterApi):
     def _forget(self, name: str, uri: str) -> list[Any]:
         self.parameters.unsubscribe_node(name, uri)
         return list(self.registry.forget(name, uri))
+
+
+async def _lock(journal: Journal) -> None:
+    """Lock the journal, as Journal.lock; wait a moment where it is held. The caller has the port."""
+    from minirospy.runtime.journal import JournalBusyError
+
+    end = time.monotonic() + _LOCK_SECONDS
+    while True:
+        try:
+            journal.lock()
+        except JournalBusyError:
+            if time.monotonic() >= end:
+                raise
+        else:
+            return
+        await asyncio.sleep(_LOCK_PAUSE)
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:

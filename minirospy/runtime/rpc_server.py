@@ -106,6 +106,7 @@ class RpcServer:
         self._most = most_idle
         self._access = access
         self._known_as = dict.fromkeys(known_as)
+        self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
         self.deadlines: Deadlines[_Connection] = Deadlines(_Connection.end)
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
@@ -117,18 +118,30 @@ class RpcServer:
         """How many clients are connected."""
         return len(self.connections)
 
-    async def start(self) -> None:
-        """Listen; with port 0 ``port`` tells the one that was free. Raises OSError."""
+    def listen(self) -> None:
+        """Take the port, alone; clients that connect wait until :meth:`start`. Idempotent. Raises OSError.
+
+        With port 0 ``port`` is the one that was free from here on.
+        """
+        if self._sock is not None:
+            return
         sock = tcp.bind(self._bind_host, self.port, self._ports)
         try:
             # Those that are accepted take it over.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            # Two sockets may be bound to one port, as long as none of them listens.
             sock.listen(_BACKLOG)
         except BaseException:
             sock.close()
             raise
         self.port = sock.getsockname()[1]
-        self._watch(sock)
+        self._sock = sock
+
+    async def start(self) -> None:
+        """Serve clients, after :meth:`listen`. Raises OSError."""
+        self.listen()
+        assert self._sock
+        self._watch(self._sock)
         for host in self._known_as:
             near = local.bind(host, self.port)
             if near:
@@ -141,6 +154,8 @@ class RpcServer:
             sock = self._listening.pop()
             asyncio.get_running_loop().remove_reader(sock)
             sock.close()
+        if self._sock is not None:
+            self._sock.close()
         for connection in list(self.connections):
             connection.end()
         self.deadlines.close()

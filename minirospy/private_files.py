@@ -1,0 +1,67 @@
+"""Files at predictable names, in folders that others may be able to write: opened without following a link.
+
+ROS_HOME is a shared folder on some robots, and TMPDIR is one everywhere. Whoever can create a name there before its
+owner does may make it a symbolic link, or a hard link, to a file of the owner's, and have that overwritten.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+__all__ = ["create_file", "open_file", "read_file"]
+
+_FLAGS = (
+    getattr(os, "O_BINARY", 0)
+    | getattr(os, "O_CLOEXEC", 0)
+    | getattr(os, "O_NOINHERIT", 0)
+    | getattr(os, "O_NOFOLLOW", 0)
+    # A FIFO at the name would block the process until somebody opens its other end.
+    | getattr(os, "O_NONBLOCK", 0)
+)
+
+
+def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
+    """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
+
+    Raises OSError, also where the name is that of a link, or of anything but a regular file with one name. With
+    O_TRUNC the file is emptied after these checks.
+    """
+    if os.path.islink(path):
+        # Windows has no O_NOFOLLOW. Elsewhere this is for the text alone.
+        raise _refusal(path, "it is a symbolic link, which is not followed")
+
+    file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
+    try:
+        found = os.fstat(file)
+        if not stat.S_ISREG(found.st_mode):
+            raise _refusal(path, "it is not a regular file")
+        if found.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
+            raise _refusal(path, "it is a hard link to another file")
+
+        if flags & os.O_TRUNC:
+            os.ftruncate(file, 0)
+        if os.name != "nt":
+            os.set_blocking(file, True)
+    except BaseException:
+        os.close(file)
+        raise
+    return file
+
+
+def create_file(path: Path, mode: int = 0o600) -> int:
+    """Create ``path`` for writing, in place of what has that name; return the file descriptor. Raises OSError."""
+    path.unlink(missing_ok=True)
+    return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
+
+
+def read_file(path: Path) -> tuple[bytes, float]:
+    """Return the bytes of ``path`` and the time of its last change. Raises OSError."""
+    with os.fdopen(open_file(path, os.O_RDONLY), "rb") as stream:
+        return stream.read(), os.fstat(stream.fileno()).st_mtime
+
+
+def _refusal(path: Path, why: str) -> OSError:
+    return OSError(errno.ELOOP, why, str(path))
