@@ -117,7 +117,7 @@ class Journal:
             self.path.unlink(missing_ok=True)
 
     def start(self) -> None:
-        """Write the present state, and from here on each change. Never raises."""
+        """Write the present state, and each change from here on. Never raises: see ``trouble``."""
         try:
             self.lock()
             self.rewrite()
@@ -170,6 +170,9 @@ class Journal:
                 self.rewrite()
         except (OSError, ValueError, TypeError) as error:
             self._fail(error)
+            _log.error(
+                "the journal %s cannot be written, a crash would lose the graph: %s", self.path, self.trouble
+            )
 
     def retry(self) -> None:
         """Write the present state where nothing could be written half a minute ago. Never raises."""

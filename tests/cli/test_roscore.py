@@ -141,7 +141,7 @@ def test_folders_that_cannot_be_made(start: Start, tmp_path: Path, monkeypatch: 
     )
     assert ", no log file\n" in core.said
     assert f"{tmp_path}/file/master/journal-" in core.said
-    assert " cannot be written: Not a directory; set ROS_HOME\n" in core.said
+    assert " cannot be written: Not a directory; set ROS_HOME (it is tried again every 30 s)\n" in core.said
     assert "Errno" not in core.said
     assert f"setting /run_id to {run_id}\n" in core.said
     # The /rosout node hears what is logged, and does not stumble over its file.
