@@ -7,6 +7,7 @@ Source: http://wiki.ros.org/ROS/EnvironmentVariables and http://wiki.ros.org/ROS
 from __future__ import annotations
 
 import os
+import re
 import socket
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,6 +24,7 @@ __all__ = [
     "Environment",
     "is_own_host",
     "master_and_namespace",
+    "run_folder",
     "split_uri",
 ]
 
@@ -33,6 +35,9 @@ DISTRO = "noetic\n"
 
 ROS_VERSION = "1.17.0\n"
 """What /rosversion says."""
+
+
+_RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
 class Environment(NamedTuple):
@@ -153,6 +158,16 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
     except OSError:
         return False
     return True
+
+
+def run_folder(log_dir: Path, run_id: object) -> Path | None:
+    """Return the folder of a run's log files; None for a /run_id that cannot be the name of one folder.
+
+    Any node may set that parameter, also to a path that leads elsewhere.
+    """
+    if not isinstance(run_id, str) or not _RUN_ID.fullmatch(run_id):
+        return None
+    return log_dir / run_id
 
 
 def _checked_uri(uri: str) -> str:

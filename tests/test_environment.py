@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment
+from minirospy.environment import Environment, run_folder
 from minirospy.errors import UsageError
 
 
@@ -113,3 +113,15 @@ def test_a_range_of_ports() -> None:
 def test_a_range_that_is_none_is_refused_in_words(text: str) -> None:
     with pytest.raises(UsageError, match="is not a range of ports"):
         Environment.read({"MINIROSPY_PORTS": text})
+
+
+@pytest.mark.parametrize(
+    "run_id", ["", ".", "..", "a/b", "/a", "a\\b", "a\n", "a\0", "\x1b", "x" * 101, 1, None, ["a"]]
+)
+def test_run_id_that_is_not_one_folder_is_refused(run_id: object) -> None:
+    assert run_folder(Path("/log"), run_id) is None
+
+
+@pytest.mark.parametrize("run_id", ["a-run", "9c1c52e0-c7b5-11ee-b3b5-0242ac110002", "run_1.2", "my run"])
+def test_run_id_is_a_folder_of_the_logs(run_id: str) -> None:
+    assert run_folder(Path("/log"), run_id) == Path("/log") / run_id

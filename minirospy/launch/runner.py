@@ -20,7 +20,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host
+from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host, run_folder
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
 from minirospy.launch.command import node_command, node_environment, node_folder
 from minirospy.launch.output import Output
@@ -243,8 +243,16 @@ class Launcher:
 
     def _find_run_id(self) -> None:
         try:
-            self.run_id = str(self._master.get_param("/run_id"))
+            found = self._master.get_param("/run_id")
         except RpcError:
+            found = None
+        if run_folder(self._environment.log_dir, found):
+            self.run_id = str(found)
+        else:
+            if found is not None:
+                self._output.warn(
+                    "WARNING: /run_id at the master cannot be the name of a folder: it is replaced"
+                )
             self.run_id = self.run_id or str(uuid.uuid1())
             self._master.set_param("/run_id", self.run_id)
             self._output.say(f"setting /run_id to {self.run_id}", bold=True)

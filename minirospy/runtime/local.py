@@ -18,6 +18,9 @@ from minirospy.runtime import sockets
 __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
+_PREFIX = "minirospy-"
+"""How the names of sockets start."""
+
 _TRUSTED = frozenset({0})
 """Users that are believed to be whom they say: root, and oneself."""
 
@@ -44,7 +47,7 @@ def this_host() -> str:
 def name_of(host: str, port: int) -> str:
     """The name of the socket beside ``port`` of a server that is known as ``host``."""
     host = host.strip("[]").lower()
-    return f"minirospy-{'127.0.0.1' if host == 'localhost' else host}:{port}"
+    return f"{_PREFIX}{'127.0.0.1' if host == 'localhost' else host}:{port}"
 
 
 def bind(host: str, port: int) -> socket.socket | None:
@@ -83,7 +86,8 @@ def reach(host: str, port: int) -> socket.socket | None:
 def parse_answer(answer: Any) -> UnixAddress | None:
     """The address out of a publisher's answer to requestTopic; None where it is of another protocol."""
     match answer:
-        case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]]:
+        # Any other socket of this machine is not for a peer to choose: it is a display's, a message bus's.
+        case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:
             return None

@@ -49,14 +49,14 @@ PROVIDED = frozenset(
 """Packages without messages that packages of Python name: minirospy does their part, or a compiler would."""
 
 _KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
-_RELAY = '''"""Made by catkin_make: {name} lies in {folder}; what was generated for it lies here."""
+_RELAY = """# Made by catkin_make: {name!r} is in {folder!r}; what was generated for it is here.
 
 import sys
 
 if {root!r} not in sys.path:
     sys.path.insert(1, {root!r})
 __path__.insert(0, {folder!r})
-'''
+"""
 _RELAY_RUN = """__file__ = {file!r}
 with open(__file__, "rb") as _source:
     exec(compile(_source.read(), __file__, "exec"))
@@ -70,7 +70,7 @@ _SHEBANG = (
     else "/usr/bin/env python3"
 )
 _PROGRAM = """#!{python}
-# Made by catkin_make: {name} lies in {folder}.
+# Made by catkin_make: {name!r} is in {folder!r}.
 import sys
 
 sys.path[0] = {folder!r}
@@ -466,7 +466,7 @@ def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
             text += _RELAY_RUN.format(file=str(folder / "__init__.py"))
         relays[modules / name / "__init__.py"] = text
     for name, file in setup.modules.items():
-        text = f'"""Made by catkin_make: {name} lies in {file}."""\n\n'
+        text = f"# Made by catkin_make: {name!r} is in {str(file)!r}.\n\n"
         relays[modules / f"{name}.py"] = text + _RELAY_RUN.format(file=str(file))
     return relays
 

@@ -57,7 +57,7 @@ def setup_files(setup: SetUp) -> dict[str, str]:
 def shell_text(shell: str, setup: SetUp) -> str:
     """What ``eval "$(minirospy shell)"`` evaluates: the environment without a workspace, and the functions."""
     if shell == "fish":
-        return _fish_base(setup) + f"source {_quoted(setup.functions / 'ros.fish')}\n"
+        return _fish_base(setup) + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
     if shell == "bat":
         return _bat_base(setup) + f'call "{setup.functions / "ros.bat"}"\n'
     functions = "" if shell == "sh" else f". {_quoted(setup.functions / 'ros.bash')}\n"
@@ -170,7 +170,7 @@ fi
 def _posix(setup: SetUp, others: str) -> str:
     return (
         _HEAD
-        + f': "${{_minirospy_prefix:={setup.prefix}}}"\n'
+        + f'[ -n "${{_minirospy_prefix:-}}" ] || _minirospy_prefix={_quoted(setup.prefix)}\n'
         + _POSIX_FUNCTIONS.replace("@DIST_PACKAGES@", DIST_PACKAGES)
         + _posix_base(setup)
         + others
@@ -220,7 +220,9 @@ def _quoted(path: Path) -> str:
 
 
 def _fish(setup: SetUp) -> str:
-    chain = "\n".join(f"    _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
+    chain = "\n".join(
+        f"    _minirospy_workspace {_fish_quoted(parent)} put" for parent in reversed(setup.parents)
+    )
     return (
         _HEAD
         + "set -l _minirospy_prefix (builtin realpath (dirname (status filename)))\n"
@@ -235,12 +237,12 @@ end
 _minirospy_workspace $_minirospy_prefix put
 """
         + "".join(
-            f"contains {_quoted(folder)} $ROS_PACKAGE_PATH; or set -gx --path --append ROS_PACKAGE_PATH "
-            f"{_quoted(folder)}\n"
+            f"contains {_fish_quoted(folder)} $ROS_PACKAGE_PATH; or set -gx --path --append ROS_PACKAGE_PATH "
+            f"{_fish_quoted(folder)}\n"
             for folder in setup.share
         )
         + "functions -e _minirospy_put _minirospy_take _minirospy_workspace\n"
-        + f"source {_quoted(setup.functions / 'ros.fish')}\n"
+        + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
     )
 
 
@@ -281,8 +283,13 @@ set -q CMAKE_PREFIX_PATH; and set -gx --path CMAKE_PREFIX_PATH $CMAKE_PREFIX_PAT
 def _fish_base(setup: SetUp) -> str:
     return (
         "".join(f"set -q {name}; or set -gx {name} {value}\n" for name, value in _BASE.items())
-        + f"command -q minirospy; or set -gx PATH {_quoted(setup.programs)} $PATH\n"
+        + f"command -q minirospy; or set -gx PATH {_fish_quoted(setup.programs)} $PATH\n"
     )
+
+
+def _fish_quoted(path: Path) -> str:
+    """Return a path as one word of fish, whose single quotes know two escapes, unlike those of other shells."""
+    return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
 # --- cmd.exe

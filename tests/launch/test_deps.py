@@ -67,6 +67,20 @@ def test_where_the_log_files_are(master: str, capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == f"{folder}/a-run\n"
 
 
+@pytest.mark.parametrize(
+    "run_id", ["../../elsewhere", "/etc", ".ssh", "a\n", "\x9b2J", ["a"], 5, "", "x" * 200]
+)
+def test_run_id_that_leads_elsewhere_is_not_followed(
+    run_id: object, master: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    proxy = MasterProxy(master, "/t")
+    proxy.set_param("/run_id", run_id)
+    proxy.close()
+    # A list has no text that looks like a path: its text is refused as well.
+    assert roslaunch_logs.main([]) == (0 if run_id == 5 else 1)
+    assert "elsewhere" not in capsys.readouterr().out
+
+
 def test_without_a_master(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
     assert roslaunch_logs.main([]) == 2

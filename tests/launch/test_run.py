@@ -57,6 +57,18 @@ def test_a_node_that_does_not_listen_is_killed(start: Start, master: str) -> Non
     assert "[b-1] escalating to SIGKILL\n" not in said
 
 
+def test_run_id_that_leads_elsewhere_is_replaced(
+    start: Start, master: str, package: Path, tmp_path: Path
+) -> None:
+    proxy = MasterProxy(master, "/t")
+    proxy.set_param("/run_id", str(tmp_path / "elsewhere"))
+    said, _ = start('<node pkg="pkg" type="stop.py" name="a" args="0"/>').process.communicate(timeout=30)
+    assert "/run_id at the master cannot be the name of a folder" in said
+    assert not (tmp_path / "elsewhere").exists()
+    assert (Path(os.environ["ROS_HOME"]) / "log" / str(proxy.get_param("/run_id"))).is_dir()
+    proxy.close()
+
+
 def test_where_a_node_prints_and_runs(start: Start, master: str, package: Path) -> None:
     home, run_id = Path(os.environ["ROS_HOME"]), MasterProxy(master, "/t")
     launch = start(

@@ -254,6 +254,12 @@ print(local.reach(OWN, 2) is not None)
     assert printed.split() == ["True", "False"]
 
 
+@pytest.mark.parametrize("name", ["/tmp/.X11-unix/X0", "dbus-x", "", "minirospy", "xminirospy-a:1"])
+def test_publisher_chooses_no_other_socket_of_this_machine(name: str) -> None:
+    assert local.parse_answer([1, "", ["UNIXROS", name, "robot", 1]]) is None
+    assert local.parse_answer([1, "", ["UNIXROS", "minirospy-robot:1", "robot", 1]]) is not None
+
+
 def test_without_unix_sockets_there_is_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
     """As where systemd's RestrictAddressFamilies leaves them out, or no file descriptor is left."""
 

@@ -16,6 +16,8 @@ from minirospy.workspace.build import Report, Workspace, build, find_workspace, 
 from minirospy.workspace.packages import Packages, built_in_roots
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conftest import Scene
 
 
@@ -237,6 +239,27 @@ def test_programs_are_in_devel(scene: Scene) -> None:
     (folder / "CMakeLists.txt").write_text("project(tools)")
     scene.build()
     assert not (scene.devel / "bin").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such file names")
+def test_name_of_a_file_is_never_code(scene: Scene, tmp_path: Path) -> None:
+    evil = 'x\n"""\nopen("OWNED", "w")\n"""'
+    scene = type(scene)(tmp_path / evil)
+    files = {
+        "setup.py": SETUP.format(
+            "packages=['tools'], py_modules=['one'], scripts=['lamp'], package_dir={'': 'src'}"
+        )
+    }
+    files |= {
+        "src/tools/__init__.py": "VALUE = 3\n",
+        "src/one.py": "VALUE = 4\n",
+        "lamp": "#!/usr/bin/env python3\n",
+    }
+    scene.package("tools", "catkin_python_setup()", "", files)
+    scene.build()
+    assert python(scene, "import tools, one; print(tools.VALUE, one.VALUE)") == "3 4\n"
+    subprocess.run([scene.devel / "bin" / "lamp"], check=True, cwd=scene.root)
+    assert not list(tmp_path.rglob("OWNED"))
 
 
 def test_a_compiler_is_not_needed(scene: Scene) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from minirospy.workspace.build import write_set_up
 from minirospy.workspace.packages import built_in_roots
+from minirospy.workspace.setup_files import SetUp, setup_files
 
 if TYPE_CHECKING:
     from conftest import Scene
@@ -71,6 +72,29 @@ def test_the_variables(scene: Scene, shell: str, ending: str) -> None:
     assert variables(shell, once, scene.root) == expected
     # Sourced twice, nothing is there twice.
     assert variables(shell, f"{once}\n{once}", scene.root) == expected
+
+
+EVIL = "a'b\"c$(touch OWNED)`touch OWNED`;touch OWNED\\'; touch OWNED; '"
+
+
+@pytest.mark.parametrize(("shell", "ending"), SHELLS)
+def test_name_of_a_folder_is_never_code(scene: Scene, shell: str, ending: str) -> None:
+    evil = type(scene)(scene.root / EVIL)
+    evil.build()
+    above = type(scene)(scene.root / "above")
+    above.build()
+    write_set_up(above.devel, (above.source,), {"CMAKE_PREFIX_PATH": str(evil.devel)})
+    script = f". \"$SETUP_FILE\"\n. '{above.devel}/setup.{ending}'"
+    found = variables(shell, script, scene.root, SETUP_FILE=str(evil.devel / f"setup.{ending}"))
+    assert found["CMAKE_PREFIX_PATH"] == f"{above.devel}:{evil.devel}"
+    assert not list(scene.root.rglob("OWNED"))
+
+
+def test_paths_are_words_of_fish() -> None:
+    folder = Path("/a'b\\' c")
+    text = setup_files(SetUp(folder, (folder,), (folder,), folder, (folder,), folder))["setup.fish"]
+    assert "_minirospy_workspace '/a\\'b\\\\\\' c' put" in text
+    assert "/a'b" not in text.replace("/a\\'b", "")
 
 
 def test_run_instead_of_sourced(scene: Scene) -> None:

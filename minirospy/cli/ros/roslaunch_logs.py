@@ -9,8 +9,8 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import Parser, run
-from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError
+from minirospy.environment import Environment, run_folder
+from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.runtime.master_proxy import MasterProxy
 
 __all__ = ["get_run_id", "main"]
@@ -37,12 +37,15 @@ def _logs(argv: Sequence[str]) -> int:
         argv
     )
     run_id = get_run_id()
-    folder = Environment.read().log_dir
+    log_dir = Environment.read().log_dir
     if run_id is None:
         print("No active roscore", file=sys.stderr)
-        print(folder)
+        print(log_dir)
         return 2
-    print(folder / run_id)
+    folder = run_folder(log_dir, run_id)
+    if folder is None:
+        raise MinirospyError("/run_id at the master cannot be the name of a folder: somebody has changed it")
+    print(folder)
     return 0
 
 
