@@ -73,7 +73,7 @@ class ToolNode:
         self.clock: Clock = WallClock()
         self.simulated = False
         self._fault: Exception | None = None
-        self._listeners: dict[str, list[Callable[[Frame, Header], None]]] = {}
+        self._listeners: dict[str, _Listeners] = {}
         self._on_end: list[Callable[[], object]] = []
         self._loop = LoopThread(f"{tool}-loop")
         self._node = Node(self.name, environment, on_shutdown=self._asked_to_stop)
@@ -122,20 +122,17 @@ class ToolNode:
     ) -> None:
         """Call ``deliver(bytes, header)`` in a worker with each message of a topic, whatever its type.
 
-        The bytes are valid during the call only. A node subscribes to a topic once: whoever listens to it later,
-        as to the /clock that the node itself goes by, is told by the same worker.
+        The bytes are valid during the call only. A node subscribes to a topic once: a later listener, as to the
+        /clock that the node itself follows, is called by the same worker; in this thread first, with the last message
+        of a latched publisher that has come already.
         """
         if topic in self._listeners:
-            self._listeners[topic].append(deliver)
+            self._listeners[topic].add(deliver)
             return
-        listeners = self._listeners[topic] = [deliver]
 
-        def tell(body: Frame, header: Header) -> None:
-            for listener in listeners:
-                listener(body, header)
-
+        listeners = self._listeners[topic] = _Listeners(deliver)
         subscription = self._node.make_subscription(
-            topic, InterfaceType(ANY, ANY), tell, tcp_nodelay=tcp_nodelay
+            topic, InterfaceType(ANY, ANY), listeners.deliver, tcp_nodelay=tcp_nodelay
         )
         self._loop.run(self._node.subscribe(subscription))
 
@@ -196,6 +193,34 @@ class ToolNode:
         self.ended.set()
         for function in self._on_end:
             function()
+
+
+class _Listeners:
+    """The functions that get the messages of one topic, each message once."""
+
+    def __init__(self, first: Callable[[Frame, Header], None]) -> None:
+        self._functions = (first,)
+        self._lock = threading.Lock()
+        # The publisher's name -> its last message, of publishers that latch.
+        self._latched: dict[str, tuple[bytes, Header]] = {}
+
+    def add(self, function: Callable[[Frame, Header], None]) -> None:
+        """Call ``function`` from now on, and at once with what latched publishers have sent."""
+        with self._lock:
+            self._functions += (function,)
+            latched = [*self._latched.values()]
+        for body, header in latched:
+            function(body, header)
+
+    def deliver(self, body: Frame, header: Header) -> None:
+        """Call all with a message that has arrived (in a worker)."""
+        # A function that is added meanwhile gets this message from here or from add(), not from both.
+        with self._lock:
+            functions = self._functions
+            if header.get("latching") == "1":
+                self._latched[header.get("callerid", "")] = bytes(body), header
+        for function in functions:
+            function(body, header)
 
 
 class Inbox:

@@ -25,6 +25,7 @@ from minirospy.runtime.topics import Publication, Subscription
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType
+from tests.conftest import free_port
 
 BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
@@ -63,9 +64,11 @@ def environment(master: Master) -> Environment:
 
 
 @contextlib.asynccontextmanager
-async def graph(*names: str, watch_seconds: float = 60.0) -> AsyncIterator[tuple[Master, list[Node]]]:
-    """A master and some nodes on this loop."""
-    master = Master(host="127.0.0.1")
+async def graph(
+    *names: str, watch_seconds: float = 60.0, port: int = 0
+) -> AsyncIterator[tuple[Master, list[Node]]]:
+    """Run a master and some nodes on this loop; one that restarts needs a ``port`` which the system gives nobody."""
+    master = Master(host="127.0.0.1", port=port)
     await master.start()
     nodes = [Node(name, environment(master), watch_seconds=watch_seconds) for name in names]
     try:
@@ -487,8 +490,7 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
             subscription.publishers_changed([])
             subscription.publishers_changed([a.uri])
             await eventually(lambda: opened == 2)
-            await eventually(lambda: len(a.publications["/t"].links) == 1)
-            assert len(subscription.links) == 1
+            await eventually(lambda: len(a.publications["/t"].links) == len(subscription.links) == 1)
 
     run(scene)
 
@@ -628,7 +630,7 @@ def test_a_master_that_was_away_for_a_moment_hears_what_it_missed(
 
 def test_a_master_that_restarted_and_heard_of_something_new_hears_of_the_rest() -> None:
     async def scene() -> None:
-        async with graph("/a", watch_seconds=0.3) as (master, (a,)):
+        async with graph("/a", watch_seconds=0.3, port=free_port()) as (master, (a,)):
             await offer(a, "service")
             await publish(a, "/old")
             port = master.port
@@ -668,13 +670,14 @@ def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
 
 def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCaptureFixture) -> None:
     async def scene() -> None:
-        async with graph("/a", "/b", watch_seconds=0.05) as (master, (a, b)):
+        async with graph("/a", "/b", watch_seconds=0.05, port=free_port()) as (master, (a, b)):
             box = Box()
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", box)
             again = threading.Event()
             b.when_registered_again.append(again.set)
-            await eventually(lambda: publication.links)
+            # The publisher's end is open a moment before the subscriber's.
+            await eventually(lambda: publication.links and subscription.links)
             link = subscription.links[0]
             port = master.port
             await master.close()
@@ -686,7 +689,7 @@ def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCapture
             try:
                 await eventually(lambda: restarted.registry.publishers().get("/t"))
                 await eventually(lambda: restarted.registry.subscribers().get("/t"))
-                await asyncio.get_running_loop().run_in_executor(None, again.wait, 10)
+                await asyncio.get_running_loop().run_in_executor(None, again.wait, 30)
                 publication.publish(serialize_frame(b"after"))
                 await eventually(lambda: len(box.bodies) == 2)
                 assert subscription.links == (link,), "the connection outlived the master"
