@@ -70,9 +70,9 @@ class Subscriber(Topic[_M]):
             state = process.subscribed.get(self.resolved_name)
             if state is None:
                 state = process.subscribed[self.resolved_name] = Subscribed(self.resolved_name, data_class)
-            # Looked up before joining: what connects from now on is delivered in the usual way.
-            links = state.connections
             state.join(self, tcp_nodelay)
+            # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
+            links = state.connections
         self.impl = state
         process.when_ready(state.register)
         if callback is not None:
@@ -171,9 +171,9 @@ class Subscribed(Shared):
         """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
         callback = _Callback(cb, cb_args)
         with process.lock:
-            links = self.connections
             self._added.append(callback)
             self._update()
+            links = self.connections
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
@@ -247,7 +247,7 @@ class Subscribed(Shared):
         )
 
     def replay(self, data_class: type[Any], callback: _Callback, links: tuple[InLink, ...]) -> None:
-        """Give a callback, which has joined, the last message of each latched publisher that was there before it."""
+        """Give a callback, which has joined, the last message of each latched publisher."""
         receivers = (_Receiver(data_class, False, (callback,)),)
         for link in links:
             frame = link.latched

@@ -396,3 +396,26 @@ print("alone", flush=True)
     # Python 3.13 shows the line too.
     (warning,) = [text for text in errors.splitlines() if not text.startswith(" ")]
     assert "SyntaxWarning" in warning
+
+
+def test_subscriber_that_joins_while_a_latched_publisher_connects_gets_its_message(start: Start) -> None:
+    """The publisher connects, and its message arrives, between the two halves of the constructor."""
+    output, _ = finished(
+        start("""
+from minirospy.client.subscriber import Subscribed
+rospy.init_node("n")
+first, second = threading.Event(), threading.Event()
+rospy.Subscriber("/t", String, lambda _: first.set())
+join = Subscribed.join
+def join_late(*args):
+    global publisher
+    publisher = rospy.Publisher("/t", String, latch=True, queue_size=1)
+    publisher.publish("latched")
+    assert first.wait(30)
+    join(*args)
+Subscribed.join = join_late
+rospy.Subscriber("/t", String, lambda _: second.set())
+print(second.wait(5))
+""")
+    )
+    assert output == "True\n"
