@@ -199,7 +199,7 @@ class _Listeners:
     """The functions that get the messages of one topic, each message once."""
 
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
-        self._functions = (first,)
+        self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
         self._lock = threading.Lock()
         # The publisher's name -> its last message, of publishers that latch.
         self._latched: dict[str, tuple[bytes, Header]] = {}
