@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from minirospy import names
-from minirospy.client.core import get_ros_root, parse_rosrpc_uri
 from minirospy.client.identity import private_parameters
 from minirospy.client.log import (
     DEBUG,
@@ -40,7 +39,6 @@ from minirospy.client.log import (
     logwarn_throttle,
     logwarn_throttle_identical,
 )
-from minirospy.client.msproxy import MasterProxy, get_master
 from minirospy.client.params import (
     delete_param,
     get_param,
@@ -83,7 +81,6 @@ __all__ = [
     "WARN",
     "AnyMsg",
     "Duration",
-    "MasterProxy",
     "Message",
     "Publisher",
     "ROSException",
@@ -105,7 +102,6 @@ __all__ = [
     "TransportTerminated",
     "delete_param",
     "get_caller_id",
-    "get_master",
     "get_name",
     "get_namespace",
     "get_node_uri",
@@ -113,7 +109,6 @@ __all__ = [
     "get_param_cached",
     "get_param_names",
     "get_published_topics",
-    "get_ros_root",
     "get_rostime",
     "get_time",
     "has_param",
@@ -142,7 +137,6 @@ __all__ = [
     "logwarn_throttle_identical",
     "myargv",
     "on_shutdown",
-    "parse_rosrpc_uri",
     "remap_name",
     "resolve_name",
     "search_param",

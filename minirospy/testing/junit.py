@@ -214,9 +214,9 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
 
 def read_all(filter_: Sequence[str] = ()) -> Result:
     """The results below the folder of results, of the packages in ``filter_`` or of all; not those of rostest itself."""
-    from minirospy.workspace.rospkg import get_test_results_dir
+    from minirospy.workspace.folders import results_dir
 
-    root = Path(get_test_results_dir())
+    root = Path(results_dir())
     results = Result("ros_test_results")
     for path in sorted(root.glob("*/*.xml")):
         if (not filter_ or path.parent.name in filter_) and not path.name.startswith("rostest-"):

@@ -27,7 +27,7 @@ from minirospy.testing.junit import (
     names_of,
     report,
 )
-from minirospy.workspace.rospkg import get_test_results_dir
+from minirospy.workspace.folders import results_dir
 
 __all__ = [
     "XML_OUTPUT_FLAG",
@@ -104,7 +104,7 @@ def xml_results_file(
     """The file for the results of a test: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
-    return os.path.join(get_test_results_dir(env), test_pkg, f"{kind}-{name}.xml")
+    return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")
 
 
 def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:

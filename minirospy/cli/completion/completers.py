@@ -99,9 +99,9 @@ def _logs() -> Path:
 
 
 def _results() -> Path:
-    from minirospy.workspace.rospkg import get_test_results_dir
+    from minirospy.workspace.folders import results_dir
 
-    return Path(get_test_results_dir())
+    return Path(results_dir())
 
 
 _OWN_FOLDERS = {"log": _logs, "test_results": _results}

@@ -65,11 +65,11 @@ def _purge(argv: Sequence[str]) -> None:
 
 def _places() -> list[_Logs]:
     """The folders of logs that there are."""
-    from minirospy.workspace.rospkg import get_log_dir, get_ros_home
+    from minirospy.workspace.folders import log_dir, ros_home
 
     places = (
-        _Logs(Path(get_log_dir()), "ROS node logs"),
-        _Logs(Path(get_ros_home(), "rosmake"), "rosmake logs"),
+        _Logs(Path(log_dir()), "ROS node logs"),
+        _Logs(Path(ros_home(), "rosmake"), "rosmake logs"),
     )
     return [each for each in places if each.folder.is_dir()]
 

@@ -155,9 +155,9 @@ def _told(own: Result, results: Result, runner: str, output: Path | None) -> int
 
 
 def _base(folder: str | None) -> Path:
-    from minirospy.workspace.rospkg import get_test_results_dir
+    from minirospy.workspace.folders import results_dir
 
-    return Path(folder or get_test_results_dir()).absolute()
+    return Path(folder or results_dir()).absolute()
 
 
 def _file(what: list[str], packages: Packages) -> Path:

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 from minirospy.cli.command import Parser, run
 from minirospy.errors import UsageError
+from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
-from minirospy.workspace.rospkg import current_distro_codename
 
 __all__ = ["main"]
 
@@ -35,7 +35,7 @@ def _rosversion(argv: Sequence[str] | None) -> None:
     if (options.package is not None) + options.distro + options.all != 1:
         raise UsageError("name one package, or -d for the distribution, or -a for every package")
     if options.distro:
-        text = current_distro_codename()
+        text = distro_codename()
     elif options.all:
         folders = Packages().folders()
         text = "\n".join(f"{name}: {read_manifest(folders[name]).version}" for name in sorted(folders))

@@ -1,17 +1,18 @@
 """genmsg.base, filled in by minirospy."""
 
-from minirospy.idl.genmsg import InvalidMsgSpec, MsgGenerationException
+from minirospy.compat.genmsg.base import (
+    COMMENTCHAR,
+    CONSTCHAR,
+    EXT_MSG,
+    EXT_SRV,
+    IODELIM,
+    MSG_DIR,
+    SEP,
+    SRV_DIR,
+)
+from minirospy.compat.genmsg.msg_loader import InvalidMsgSpec, MsgGenerationException
 
 __all__ = [
     "COMMENTCHAR", "CONSTCHAR", "EXT_MSG", "EXT_SRV", "IODELIM", "MSG_DIR", "SEP", "SRV_DIR", "InvalidMsgSpec",
     "MsgGenerationException",
 ]  # fmt: skip
-
-SEP = "/"
-MSG_DIR = "msg"
-SRV_DIR = "srv"
-EXT_MSG = ".msg"
-EXT_SRV = ".srv"
-CONSTCHAR = "="
-COMMENTCHAR = "#"
-IODELIM = "---"

@@ -10,7 +10,7 @@ from genmsg.msgs import (
     TIME_MSG,
     is_valid_msg_field_name,
 )
-from minirospy.idl.genmsg import (
+from minirospy.compat.genmsg.msg_loader import (
     MsgContext,
     MsgNotFound,
     get_msg_file,

@@ -1,7 +1,7 @@
 """genmsg.msgs, filled in by minirospy: types and specs of messages."""
 
 from genmsg.base import EXT_MSG, MSG_DIR, SEP, InvalidMsgSpec
-from minirospy.idl.genmsg import (
+from minirospy.compat.genmsg.msg_loader import (
     BUILTIN_TYPES,
     HEADER_FULL_NAME,
     PRIMITIVE_TYPES,
@@ -17,15 +17,10 @@ from minirospy.idl.genmsg import (
     parse_type,
     resolve_type,
 )
+from minirospy.compat.genmsg.msgs import DURATION, DURATION_MSG, HEADER, TIME, TIME_MSG
 
 __all__ = [
     "BUILTIN_TYPES", "DURATION", "DURATION_MSG", "EXT_MSG", "HEADER", "HEADER_FULL_NAME", "MSG_DIR", "PRIMITIVE_TYPES",
     "SEP", "TIME", "TIME_MSG", "Constant", "Field", "InvalidMsgSpec", "MsgSpec", "bare_msg_type", "is_builtin",
     "is_header_type", "is_valid_constant_type", "is_valid_msg_field_name", "is_valid_msg_type", "parse_type", "resolve_type",
 ]  # fmt: skip
-
-HEADER = "Header"
-TIME = "time"
-DURATION = "duration"
-TIME_MSG = "uint32 secs\nuint32 nsecs"
-DURATION_MSG = "int32 secs\nint32 nsecs"

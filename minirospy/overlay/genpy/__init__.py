@@ -4,7 +4,7 @@ from genpy import base as base
 from genpy import dynamic as dynamic
 from genpy import message as message
 from genpy import rostime as rostime
-from minirospy.idl.genpy import register_unicode_errors, struct_I
+from minirospy.compat.genpy.message import struct_I
 from minirospy.idl.message import DeserializationError, Message, MessageException, SerializationError
 from minirospy.times import Duration, Time, TVal
 
@@ -18,5 +18,3 @@ __all__ = [
     "Time",
     "struct_I",
 ]
-
-register_unicode_errors()

@@ -1,5 +1,5 @@
 """genpy.dynamic, filled in by minirospy: message classes from a full text."""
 
-from minirospy.idl.genpy import MsgGenerationException, generate_dynamic
+from minirospy.compat.genpy.message import MsgGenerationException, generate_dynamic
 
 __all__ = ["MsgGenerationException", "generate_dynamic"]

@@ -1,6 +1,6 @@
 """genpy.message, filled in by minirospy."""
 
-from minirospy.idl.genpy import (
+from minirospy.compat.genpy.message import (
     RosMsgUnicodeErrors,
     get_message_class,
     get_service_class,

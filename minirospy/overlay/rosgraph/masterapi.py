@@ -1,169 +1,20 @@
-# ruff: noqa: N802 - the names are those of the API
 """The master as Python code asks it; answers as ROS's own lists. Source: http://wiki.ros.org/ROS/Master_API."""
 
-from __future__ import annotations
-
-import weakref
-from typing import Any
-
-from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
-from minirospy.runtime.master_proxy import MasterProxy
-from rosgraph.names import make_caller_id
-from rosgraph.network import parse_http_host_and_port
+from minirospy.compat.rosgraph.masterapi import (
+    Error,
+    Failure,
+    Master,
+    MasterError,
+    MasterException,
+    MasterFailure,
+    ROSMasterException,
+    is_online,
+)
+from minirospy.compat.rosgraph.names import make_caller_id as make_caller_id
+from minirospy.compat.rosgraph.network import parse_http_host_and_port as parse_http_host_and_port
 from rosgraph.rosenv import get_master_uri
 
 __all__ = [
     "Error", "Failure", "Master", "MasterError", "MasterException", "MasterFailure", "ROSMasterException",
     "get_master_uri", "is_online",
 ]  # fmt: skip
-
-
-class MasterException(Exception):
-    """The master cannot be asked, or says no."""
-
-
-ROSMasterException = MasterException
-"""An older name of it."""
-
-
-class MasterFailure(MasterException):
-    """The call failed at the master."""
-
-
-class MasterError(MasterException):
-    """The call was wrong: an unknown name, a bad argument."""
-
-
-Error, Failure = MasterError, MasterFailure
-
-
-class Master:
-    """The master at ``master_uri`` (default: that of the environment), asked in the name of ``caller_id``."""
-
-    def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
-        uri = master_uri or get_master_uri()
-        self.master_uri = uri
-        try:
-            parse_http_host_and_port(uri)
-        except ValueError as error:
-            raise ValueError(f"invalid master URI: {uri}") from error
-        # As rosgraph has it, without the slash at its end.
-        self.caller_id = make_caller_id(caller_id).rstrip("/")
-        self._proxy = MasterProxy(uri, self.caller_id)
-        # ROS's Master has no close(): its connections go with it.
-        weakref.finalize(self, self._proxy.close)
-
-    def _call(self, method: str, *args: Any) -> Any:
-        try:
-            return self._proxy.call(method, *args)
-        except RpcRefused as error:
-            raise (MasterError if error.code == -1 else MasterFailure)(error.text) from error
-        except MasterUnreachableError as error:
-            # Code that polls for a master expects the socket's own kind of error.
-            raise ConnectionRefusedError(str(error)) from error
-        except RpcError as error:
-            raise MasterException(str(error)) from error
-
-    @property
-    def handle(self) -> Any:
-        """The master as Python's own `xmlrpc.client.ServerProxy`; answers are (code, text, value)."""
-        from xmlrpc.client import ServerProxy
-
-        return ServerProxy(self.master_uri)
-
-    def is_online(self) -> bool:
-        """Whether the master answers."""
-        try:
-            self.getPid()
-        except (OSError, MasterException):
-            return False
-        return True
-
-    def getPid(self) -> int:
-        """The master's process id."""
-        return int(self._call("getPid"))
-
-    def getUri(self) -> str:
-        """The URI that the master tells of itself."""
-        return str(self._call("getUri"))
-
-    def getSystemState(self) -> Any:
-        """[publishers, subscribers, services], each a list of [name, [nodes]]."""
-        return self._call("getSystemState")
-
-    def getPublishedTopics(self, subgraph: str) -> Any:
-        """[[topic, type]] of what is published."""
-        return self._call("getPublishedTopics", subgraph)
-
-    def getTopicTypes(self) -> Any:
-        """[[topic, type]] of all that the master knows."""
-        return self._call("getTopicTypes")
-
-    def lookupNode(self, node_name: str) -> str:
-        """The URI of a node."""
-        return str(self._call("lookupNode", node_name))
-
-    def lookupService(self, service: str) -> str:
-        """The URI of a service."""
-        return str(self._call("lookupService", service))
-
-    def getParam(self, key: str) -> Any:
-        """A parameter's value."""
-        return self._call("getParam", key)
-
-    def setParam(self, key: str, value: Any) -> Any:
-        """Set a parameter."""
-        return self._call("setParam", key, value)
-
-    def hasParam(self, key: str) -> bool:
-        """Whether a parameter is set."""
-        return bool(self._call("hasParam", key))
-
-    def deleteParam(self, key: str) -> Any:
-        """Delete a parameter."""
-        return self._call("deleteParam", key)
-
-    def searchParam(self, key: str) -> Any:
-        """The nearest parameter of this name."""
-        return self._call("searchParam", key)
-
-    def getParamNames(self) -> Any:
-        """The names of all parameters."""
-        return self._call("getParamNames")
-
-    def subscribeParam(self, caller_api: str, key: str) -> Any:
-        """Be told of a parameter's changes; its value."""
-        return self._call("subscribeParam", caller_api, key)
-
-    def unsubscribeParam(self, caller_api: str, key: str) -> Any:
-        """Be told no more."""
-        return self._call("unsubscribeParam", caller_api, key)
-
-    def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> Any:
-        """Register a publisher; the subscribers' URIs."""
-        return self._call("registerPublisher", topic, topic_type, caller_api)
-
-    def unregisterPublisher(self, topic: str, caller_api: str) -> Any:
-        """Take a publisher back."""
-        return self._call("unregisterPublisher", topic, caller_api)
-
-    def registerSubscriber(self, topic: str, topic_type: str, caller_api: str) -> Any:
-        """Register a subscriber; the publishers' URIs."""
-        return self._call("registerSubscriber", topic, topic_type, caller_api)
-
-    def unregisterSubscriber(self, topic: str, caller_api: str) -> Any:
-        """Take a subscriber back."""
-        return self._call("unregisterSubscriber", topic, caller_api)
-
-    def registerService(self, service: str, service_api: str, caller_api: str) -> Any:
-        """Register a service."""
-        return self._call("registerService", service, service_api, caller_api)
-
-    def unregisterService(self, service: str, service_api: str) -> Any:
-        """Take a service back."""
-        return self._call("unregisterService", service, service_api)
-
-
-def is_online(master_uri: str | None = None) -> bool:
-    """Whether a master answers at ``master_uri`` (default: that of the environment)."""
-    return Master("/rosgraph", master_uri).is_online()

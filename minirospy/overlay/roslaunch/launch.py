@@ -1,9 +1,9 @@
 """roslaunch.launch, filled in by minirospy."""
 
-from minirospy.launch.config import Machine, Master, Node, Param, RLException, Test
-from minirospy.launch.monitor import ProcessListener, start_process_monitor
-from minirospy.launch.monitor import ProcessListener as ROSLaunchListener
-from minirospy.launch.parent import ROSLaunchRunner
+from minirospy.compat.roslaunch.config import Machine, Master, Node, Param, RLException, Test
+from minirospy.compat.roslaunch.parent import ROSLaunchRunner
+from minirospy.compat.roslaunch.pmon import ProcessListener, start_process_monitor
+from minirospy.compat.roslaunch.pmon import ProcessListener as ROSLaunchListener
 
 __all__ = [
     "Machine",

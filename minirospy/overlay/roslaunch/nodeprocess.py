@@ -1,9 +1,9 @@
 """roslaunch.nodeprocess, filled in by minirospy."""
 
-from minirospy.launch.config import Machine, Master, Node, RLException
-from minirospy.launch.monitor import Process, create_node_process
-from minirospy.launch.monitor import Process as LocalProcess
-from minirospy.launch.process import Timeouts
+from minirospy.compat.roslaunch.config import Machine, Master, Node, RLException
+from minirospy.compat.roslaunch.nodeprocess import DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM
+from minirospy.compat.roslaunch.pmon import Process, create_node_process
+from minirospy.compat.roslaunch.pmon import Process as LocalProcess
 
 __all__ = [
     "DEFAULT_TIMEOUT_SIGINT",
@@ -16,5 +16,3 @@ __all__ = [
     "RLException",
     "create_node_process",
 ]
-
-DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM = Timeouts.interrupt, Timeouts.terminate

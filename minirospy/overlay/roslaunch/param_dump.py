@@ -1,25 +1,7 @@
 """roslaunch.param_dump, filled in by minirospy."""
 
-from __future__ import annotations
+import yaml as yaml
 
-import sys
-from collections.abc import Sequence
-
-import yaml
-
-from minirospy.errors import MinirospyError
-from minirospy.launch.load import load_files
-from minirospy.workspace.packages import Packages
+from minirospy.compat.roslaunch.param_dump import dump_params
 
 __all__ = ["dump_params"]
-
-
-def dump_params(files: Sequence[str]) -> bool:
-    """Print the parameters of launch files as YAML; whether all could be loaded."""
-    try:
-        params = load_files(list(files), {}, Packages()).params
-    except MinirospyError as error:
-        print(f"Unable to load file {error}", file=sys.stderr)
-        return False
-    sys.stdout.write(yaml.safe_dump(params, default_flow_style=False) + "\n")
-    return True

@@ -1,7 +1,7 @@
 """roslaunch.pmon, filled in by minirospy."""
 
-from minirospy.launch.config import RLException
-from minirospy.launch.monitor import (
+from minirospy.compat.roslaunch.config import RLException
+from minirospy.compat.roslaunch.pmon import (
     Process,
     ProcessListener,
     ProcessMonitor,
@@ -10,7 +10,7 @@ from minirospy.launch.monitor import (
     shutdown_process_monitor,
     start_process_monitor,
 )
-from minirospy.launch.monitor import init_signal_handlers as _init_signal_handlers
+from minirospy.compat.roslaunch.pmon import init_signal_handlers as _init_signal_handlers
 
 __all__ = [
     "Process",

@@ -2,7 +2,6 @@
 
 from minirospy.cli.ros.roslaunch_logs import get_run_id
 from minirospy.cli.ros.roslaunch_logs import main as logs_main
+from minirospy.compat.roslaunch.roslaunch_logs import NAME
 
 __all__ = ["NAME", "get_run_id", "logs_main"]
-
-NAME = "roslaunch-logs"

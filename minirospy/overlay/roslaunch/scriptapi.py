@@ -1,6 +1,6 @@
 """roslaunch.scriptapi, filled in by minirospy."""
 
-from minirospy.launch.config import Master, Node, RLException
-from minirospy.launch.parent import ROSLaunch
+from minirospy.compat.roslaunch.config import Master, Node, RLException
+from minirospy.compat.roslaunch.parent import ROSLaunch
 
 __all__ = ["Master", "Node", "RLException", "ROSLaunch"]

@@ -1,6 +1,6 @@
 """roslaunch.xmlloader, filled in by minirospy."""
 
-from minirospy.launch.config import (
+from minirospy.compat.roslaunch.config import (
     ArgException,
     Machine,
     Node,

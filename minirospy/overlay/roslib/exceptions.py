@@ -1,7 +1,5 @@
 """roslib.exceptions, filled in by minirospy."""
 
+from minirospy.compat.roslib.exceptions import ROSLibException
+
 __all__ = ["ROSLibException"]
-
-
-class ROSLibException(Exception):
-    """The root of roslib's errors."""

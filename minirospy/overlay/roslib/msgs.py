@@ -15,18 +15,9 @@ from genmsg.msgs import (
 )
 from genmsg.msgs import bare_msg_type as base_msg_type
 
-from minirospy.idl.load import Catalogue
-from minirospy.workspace.packages import Packages
+from minirospy.compat.roslib.msgs import EXT, SEP, list_msg_types
 
 __all__ = [
     "BUILTIN_TYPES", "DURATION", "EXT", "HEADER", "PRIMITIVE_TYPES", "SEP", "TIME", "base_msg_type", "is_builtin",
     "is_header_type", "is_valid_constant_type", "is_valid_msg_type", "list_msg_types", "parse_type", "resolve_type",
 ]  # fmt: skip
-
-EXT = ".msg"
-SEP = "/"
-
-
-def list_msg_types(package: str, include_depends: bool) -> list[str]:
-    """The names of the message files of a package, without it; ``include_depends`` is of rosbuild."""
-    return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))

@@ -1,7 +1,5 @@
 """roslib.names, filled in by minirospy: rosgraph's names, and those of resources (``package/name``)."""
 
-import re
-
 from rosgraph.names import (
     ANYTYPE,
     GLOBALNS,
@@ -23,6 +21,17 @@ from rosgraph.names import (
     resolve_name,
 )
 
+from minirospy.compat.roslib.names import (
+    PRN_SEPARATOR,
+    TYPE_SEPARATOR,
+    is_legal_resource_base_name,
+    is_legal_resource_name,
+    package_resource_name,
+    resource_name,
+    resource_name_base,
+    resource_name_package,
+)
+
 __all__ = [
     "ANYTYPE", "GLOBALNS", "PRIV_NAME", "PRN_SEPARATOR", "REMAP", "SEP", "TYPE_SEPARATOR", "anonymous_name",
     "canonicalize_name", "get_ros_namespace", "is_global", "is_legal_base_name", "is_legal_name",
@@ -30,38 +39,3 @@ __all__ = [
     "make_global_ns", "namespace", "ns_join", "package_resource_name", "resolve_name", "resource_name",
     "resource_name_base", "resource_name_package",
 ]  # fmt: skip
-
-PRN_SEPARATOR = TYPE_SEPARATOR = "/"
-
-
-def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """``package/name``, or the name alone in the package itself."""
-    return name if res_pkg_name == my_pkg else f"{res_pkg_name}{PRN_SEPARATOR}{name}"
-
-
-def resource_name_base(name: str) -> str:
-    """The name without its package."""
-    return name.rpartition(PRN_SEPARATOR)[2]
-
-
-def resource_name_package(name: str) -> str | None:
-    """The package of a name, or None."""
-    return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
-
-
-def package_resource_name(name: str) -> tuple[str, str]:
-    """(package, name); the package is empty where the name has none. Raises ValueError on two slashes."""
-    if name.count(PRN_SEPARATOR) > 1:
-        raise ValueError(f"invalid name [{name}]")
-    package, _, base = name.rpartition(PRN_SEPARATOR)
-    return package, base
-
-
-def is_legal_resource_name(name: str) -> bool:
-    """Whether a name is one of a resource, with or without its package."""
-    return name is not None and bool(re.match(r"^[A-Za-z][\w/]*\Z", name, re.ASCII)) and "//" not in name
-
-
-def is_legal_resource_base_name(name: str) -> bool:
-    """Whether a name is one of a resource without its package."""
-    return name is not None and bool(re.match(r"^[A-Za-z]\w*\Z", name, re.ASCII))

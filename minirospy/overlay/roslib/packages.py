@@ -1,6 +1,9 @@
 """roslib.packages, filled in by minirospy."""
 
-from minirospy.workspace.roslib import (
+from minirospy.compat.roslib.packages import (
+    ROS_PACKAGE_PATH,
+    ROS_ROOT,
+    SRC_DIR,
     InvalidROSPkgException,
     MultipleNodesException,
     ROSPkgException,
@@ -12,7 +15,7 @@ from minirospy.workspace.roslib import (
     list_pkgs_by_path,
     resource_file,
 )
-from minirospy.workspace.rospkg import MANIFEST_FILE, PACKAGE_FILE
+from minirospy.compat.rospkg.rospack import MANIFEST_FILE, PACKAGE_FILE
 
 __all__ = [
     "MANIFEST_FILE",
@@ -31,7 +34,3 @@ __all__ = [
     "list_pkgs_by_path",
     "resource_file",
 ]
-
-SRC_DIR = "src"
-ROS_ROOT = "ROS_ROOT"
-ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"

@@ -1,71 +1,24 @@
 """roslib.rosenv, filled in by minirospy: what the environment says, under the words of old."""
 
-from __future__ import annotations
-
-import os
-from collections.abc import Mapping, Sequence
-
-from rosgraph import rosenv
 from rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
 
-from minirospy.workspace import rospkg
-from roslib.exceptions import ROSLibException
+from minirospy.compat.roslib.rosenv import (
+    ROS_HOME,
+    ROS_LOG_DIR,
+    ROS_PACKAGE_PATH,
+    ROS_ROOT,
+    ROSEnvException,
+    get_log_dir,
+    get_master_uri,
+    get_ros_home,
+    get_ros_package_path,
+    get_ros_root,
+    get_test_results_dir,
+    makedirs_with_parent_perms,
+)
 
 __all__ = [
     "ROS_HOME", "ROS_HOSTNAME", "ROS_IP", "ROS_LOG_DIR", "ROS_MASTER_URI", "ROS_NAMESPACE", "ROS_PACKAGE_PATH", "ROS_ROOT",
     "ROSEnvException", "get_log_dir", "get_master_uri", "get_ros_home", "get_ros_package_path", "get_ros_root",
     "get_test_results_dir", "makedirs_with_parent_perms",
 ]  # fmt: skip
-
-ROS_ROOT = "ROS_ROOT"
-ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
-ROS_HOME = "ROS_HOME"
-ROS_LOG_DIR = "ROS_LOG_DIR"
-
-
-class ROSEnvException(ROSLibException):
-    """A variable that is needed is not set."""
-
-
-def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
-    """ROS_ROOT. Raises ROSEnvException where it is not set, if ``required``."""
-    return _variable(ROS_ROOT, required, env)
-
-
-def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """ROS_PACKAGE_PATH. Raises ROSEnvException where it is not set, if ``required``."""
-    return _variable(ROS_PACKAGE_PATH, required, env)
-
-
-def get_master_uri(
-    required: bool = True, env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
-) -> str:
-    """The URI of the master that the command line or the environment names."""
-    return rosenv.get_master_uri(env, argv)
-
-
-def get_ros_home(env: Mapping[str, str] | None = None) -> str:
-    """The folder of ROS's own files: ROS_HOME, or ~/.ros."""
-    return rospkg.get_ros_home(env)
-
-
-def get_log_dir(env: Mapping[str, str] | None = None) -> str:
-    """The folder of log files."""
-    return rospkg.get_log_dir(env)
-
-
-def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
-    """The folder of test results."""
-    return rospkg.get_test_results_dir(env)
-
-
-def makedirs_with_parent_perms(p: str) -> None:
-    """Make a folder and those above it."""
-    os.makedirs(p, exist_ok=True)
-
-
-def _variable(name: str, required: bool, env: Mapping[str, str] | None) -> str | None:
-    value = (os.environ if env is None else env).get(name)
-    if required and not value:
-        raise ROSEnvException(f"The {name} environment variable has not been set.")
-    return value

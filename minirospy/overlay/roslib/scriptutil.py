@@ -1,18 +1,7 @@
 """roslib.scriptutil, filled in by minirospy: the master as scripts of old ask for it."""
 
-from __future__ import annotations
-
-from xmlrpc.client import ServerProxy
-
 from rosgraph.names import script_resolve_name
-from rosgraph.rosenv import get_master_uri
+
+from minirospy.compat.roslib.scriptutil import get_master, get_param_server
 
 __all__ = ["get_master", "get_param_server", "script_resolve_name"]
-
-
-def get_master() -> ServerProxy:
-    """The master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
-    return ServerProxy(get_master_uri())
-
-
-get_param_server = get_master

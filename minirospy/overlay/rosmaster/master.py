@@ -1,46 +1,6 @@
 """rosmaster.master, filled in by minirospy: a master inside a program, as tests start one."""
 
-from __future__ import annotations
-
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.compat.rosmaster.master import Master
+from minirospy.environment import DEFAULT_MASTER_PORT
 
 __all__ = ["DEFAULT_MASTER_PORT", "Master"]
-
-
-class Master:
-    """A master that listens on ``port`` from :meth:`start` to :meth:`stop`; ``uri`` says where. It keeps nothing in files."""
-
-    def __init__(self, port: int = DEFAULT_MASTER_PORT, num_workers: int = 3) -> None:
-        self.port = port
-        self.num_workers = num_workers
-        self.uri: str | None = None
-
-    def start(self) -> None:
-        """Serve from a thread. Raises OSError where the port is taken."""
-        from minirospy.runtime.loop import LoopThread
-        from minirospy.runtime.master import Master as Serving
-
-        if self.uri is not None:
-            return
-        environment = Environment.read()
-        serving = Serving(host=environment.host, bind_host=environment.bind_host, port=self.port)
-        self._loop = LoopThread("rosmaster")
-        try:
-            self._loop.run(serving.start())
-        except BaseException:
-            self._loop.close()
-            raise
-        self._serving = serving
-        self.port = serving.port
-        self.uri = f"http://{environment.uri_host}:{self.port}/"
-
-    def ok(self) -> bool:
-        """Whether it serves."""
-        return self.uri is not None
-
-    def stop(self) -> None:
-        """End it. Idempotent."""
-        if self.uri is not None:
-            self.uri = None
-            self._loop.run(self._serving.close(), 5.0)
-            self._loop.close()

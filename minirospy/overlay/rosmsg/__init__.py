@@ -1,150 +1,24 @@
 """rosmsg, filled in by minirospy: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
 
-from __future__ import annotations
-
-import contextlib
-from collections.abc import Iterator
-from typing import Any
-
-from minirospy.errors import DefinitionError, NotFoundError
-from minirospy.introspect.interfaces import Interfaces, Kind, describe
-from minirospy.times import TVal
-from minirospy.workspace.packages import Packages
+from minirospy.compat.rosmsg import (
+    MODE_MSG,
+    MODE_SRV,
+    ROSMsgException,
+    get_msg_text,
+    get_srv_text,
+    get_yaml_for_msg,
+    iterate_packages,
+    list_msgs,
+    list_srvs,
+    list_types,
+    rosmsg_md5,
+    rosmsg_search,
+    rosmsgmain,
+    spec_to_str,
+)
+from minirospy.compat.rosmsg import _get_package_paths as _get_package_paths
 
 __all__ = [
     "MODE_MSG", "MODE_SRV", "ROSMsgException", "get_msg_text", "get_srv_text", "get_yaml_for_msg", "iterate_packages",
     "list_msgs", "list_srvs", "list_types", "rosmsg_md5", "rosmsg_search", "rosmsgmain", "spec_to_str",
 ]  # fmt: skip
-
-MODE_MSG = ".msg"
-MODE_SRV = ".srv"
-_WIDE = 4
-_KINDS = {MODE_MSG: Kind.MESSAGE, MODE_SRV: Kind.SERVICE}
-
-
-class ROSMsgException(Exception):
-    """A type is not there, or its definition does not parse."""
-
-
-def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """The text of a message type, unfolded, or as it stands in its file. Raises ROSMsgException."""
-    return _text(type_, raw, Kind.MESSAGE)
-
-
-def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """The text of a service type, unfolded, or as it stands in its file. Raises ROSMsgException."""
-    return _text(type_, raw, Kind.SERVICE)
-
-
-def list_msgs(package: str, rospack: object = None) -> list[str]:
-    """The message types of a package. Raises rospkg.ResourceNotFound."""
-    return list_types(package, MODE_MSG)
-
-
-def list_srvs(package: str, rospack: object = None) -> list[str]:
-    """The service types of a package. Raises rospkg.ResourceNotFound."""
-    return list_types(package, MODE_SRV)
-
-
-def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
-    """The types of a package. Raises rospkg.ResourceNotFound, ValueError on a mode that is none."""
-    try:
-        return _interfaces(_kind(mode)).in_package(package)
-    except NotFoundError as error:
-        from minirospy.workspace.rospkg import ResourceNotFound
-
-        raise ResourceNotFound(package) from error
-
-
-def rosmsg_md5(mode: str, type_: str) -> str:
-    """The md5sum of a type. Raises ROSMsgException."""
-    try:
-        return _interfaces(_kind(mode)).md5sum(type_)
-    except (NotFoundError, DefinitionError) as error:
-        raise ROSMsgException(str(error)) from error
-
-
-def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """The types of a name without its package."""
-    with contextlib.suppress(NotFoundError):
-        yield from _interfaces(_kind(mode)).find(base_type)
-
-
-def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
-    """(name, folder of its definitions) of each package that has any."""
-    packages = Packages()
-    for name in Interfaces(packages, _kind(mode)).packages():
-        yield name, str(packages.find(name) / mode.removeprefix("."))
-
-
-def spec_to_str(msg_context: Any, spec: Any, buff: Any = None, indent: str = "") -> str:
-    """A message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
-
-    Raises KeyError where it needs a message that the context does not know.
-    """
-    from minirospy.idl.genmsg import lookup_in, parsed_message
-
-    text = describe(parsed_message(spec), lookup_in(msg_context))
-    text = "".join(indent + line for line in text.splitlines(keepends=True))
-    if buff is not None:
-        buff.write(text)
-    return text
-
-
-def get_yaml_for_msg(msg: Any, prefix: str = "", *, flow_style_: bool | None = None) -> str:
-    """A message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
-
-    Else a message or array of more than four makes all that is flat stand in braces, so that it fits the screen.
-    """
-    import yaml
-
-    plain = _plain(msg)
-    style = flow_style_ if flow_style_ is not None else None if _width(plain) > _WIDE else False
-    text = yaml.safe_dump(plain, default_flow_style=style).removesuffix("\n...\n").rstrip("\n")
-    return "\n".join(prefix + line for line in text.split("\n"))
-
-
-def rosmsgmain(mode: str = MODE_MSG) -> int:
-    """The command on this process's command line. Its exit status."""
-    from minirospy.cli.ros import rosmsg
-
-    return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
-
-
-def _plain(value: Any) -> Any:
-    """A value as dictionaries, lists and what YAML knows."""
-    if isinstance(value, TVal):
-        return {"secs": value.secs, "nsecs": value.nsecs}
-    if hasattr(value, "__slots__"):
-        return {name: _plain(getattr(value, name)) for name in value.__slots__}
-    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def _width(plain: Any) -> int:
-    """The number of entries of the widest dictionary or list."""
-    inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
-    return max(len(inner), *map(_width, inner), 0)
-
-
-def _get_package_paths(pkgname: str, rospack: Any) -> list[str]:
-    """The folders that hold a package's definitions, as programs ask for them that load them by genmsg."""
-    return [rospack.get_path(pkgname)]
-
-
-def _text(type_: str, raw: bool, kind: Kind) -> str:
-    interfaces = _interfaces(kind)
-    try:
-        return interfaces.text(type_) if raw else interfaces.description(type_)
-    except (NotFoundError, DefinitionError) as error:
-        raise ROSMsgException(str(error)) from error
-
-
-def _kind(mode: str) -> Kind:
-    try:
-        return _KINDS[mode]
-    except KeyError:
-        raise ValueError(f"Unknown mode: {mode}") from None
-
-
-def _interfaces(kind: Kind) -> Interfaces:
-    return Interfaces(Packages(), kind)

@@ -1,5 +1,5 @@
 """rospkg.distro, filled in by minirospy."""
 
-from minirospy.workspace.rospkg import current_distro_codename
+from minirospy.compat.rospkg.distro import current_distro_codename
 
 __all__ = ["current_distro_codename"]

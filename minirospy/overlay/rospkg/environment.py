@@ -1,6 +1,12 @@
 """rospkg.environment, filled in by minirospy: the names of variables, and what they say."""
 
-from minirospy.workspace.rospkg import (
+from minirospy.compat.rospkg.environment import (
+    ROS_ETC_DIR,
+    ROS_HOME,
+    ROS_LOG_DIR,
+    ROS_PACKAGE_PATH,
+    ROS_ROOT,
+    ROS_TEST_RESULTS_DIR,
     get_etc_ros_dir,
     get_log_dir,
     get_ros_home,
@@ -27,10 +33,3 @@ __all__ = [
     "get_test_results_dir",
     "on_ros_path",
 ]
-
-ROS_ROOT = "ROS_ROOT"
-ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
-ROS_HOME = "ROS_HOME"
-ROS_ETC_DIR = "ROS_ETC_DIR"
-ROS_LOG_DIR = "ROS_LOG_DIR"
-ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"

@@ -1,6 +1,6 @@
 """rospkg.manifest, filled in by minirospy."""
 
-from minirospy.workspace.rospkg import (
+from minirospy.compat.rospkg.rospack import (
     Depend,
     Export,
     InvalidManifest,

@@ -1,6 +1,6 @@
 """rospkg.rospack, filled in by minirospy."""
 
-from minirospy.workspace.rospkg import (
+from minirospy.compat.rospkg.rospack import (
     ManifestManager,
     RosPack,
     RosStack,

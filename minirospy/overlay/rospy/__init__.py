@@ -9,7 +9,6 @@ from minirospy.client import INFO as INFO
 from minirospy.client import WARN as WARN
 from minirospy.client import AnyMsg as AnyMsg
 from minirospy.client import Duration as Duration
-from minirospy.client import MasterProxy as MasterProxy
 from minirospy.client import Message as Message
 from minirospy.client import Publisher as Publisher
 from minirospy.client import Rate as Rate
@@ -27,10 +26,8 @@ from minirospy.client import Timer as Timer
 from minirospy.client import TransportException as TransportException
 from minirospy.client import TransportInitError as TransportInitError
 from minirospy.client import TransportTerminated as TransportTerminated
-from minirospy.client import __all__ as __all__
 from minirospy.client import delete_param as delete_param
 from minirospy.client import get_caller_id as get_caller_id
-from minirospy.client import get_master as get_master
 from minirospy.client import get_name as get_name
 from minirospy.client import get_namespace as get_namespace
 from minirospy.client import get_node_uri as get_node_uri
@@ -38,7 +35,6 @@ from minirospy.client import get_param as get_param
 from minirospy.client import get_param_cached as get_param_cached
 from minirospy.client import get_param_names as get_param_names
 from minirospy.client import get_published_topics as get_published_topics
-from minirospy.client import get_ros_root as get_ros_root
 from minirospy.client import get_rostime as get_rostime
 from minirospy.client import get_time as get_time
 from minirospy.client import has_param as has_param
@@ -67,7 +63,6 @@ from minirospy.client import logwarn_throttle as logwarn_throttle
 from minirospy.client import logwarn_throttle_identical as logwarn_throttle_identical
 from minirospy.client import myargv as myargv
 from minirospy.client import on_shutdown as on_shutdown
-from minirospy.client import parse_rosrpc_uri as parse_rosrpc_uri
 from minirospy.client import remap_name as remap_name
 from minirospy.client import resolve_name as resolve_name
 from minirospy.client import search_param as search_param
@@ -79,6 +74,11 @@ from minirospy.client import wait_for_message as wait_for_message
 from minirospy.client import wait_for_service as wait_for_service
 from minirospy.client.life import ROSInterruptException as ROSInterruptException
 from minirospy.client.time import ROSTimeMovedBackwardsException as ROSTimeMovedBackwardsException
+from minirospy.compat.rospy import live as _live  # noqa: F401 - after the modules that it completes
+from minirospy.compat.rospy.core import get_ros_root as get_ros_root
+from minirospy.compat.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
+from minirospy.compat.rospy.msproxy import MasterProxy as MasterProxy
+from minirospy.compat.rospy.msproxy import get_master as get_master
 from rospy import client as client
 from rospy import core as core
 from rospy import exceptions as exceptions
@@ -91,4 +91,17 @@ from rospy import service as service
 from rospy import timer as timer
 from rospy import topics as topics
 
-__all__ += ["Header"]
+__all__ = [
+    "DEBUG", "ERROR", "FATAL", "INFO", "WARN", "AnyMsg", "Duration", "Header", "MasterProxy", "Message", "Publisher",
+    "ROSException", "ROSInitException", "ROSInternalException", "ROSInterruptException", "ROSSerializationException",
+    "ROSTimeMovedBackwardsException", "Rate", "Service", "ServiceException", "ServiceProxy", "SubscribeListener",
+    "Subscriber", "Time", "Timer", "TransportException", "TransportInitError", "TransportTerminated", "delete_param",
+    "get_caller_id", "get_master", "get_name", "get_namespace", "get_node_uri", "get_param", "get_param_cached",
+    "get_param_names", "get_published_topics", "get_ros_root", "get_rostime", "get_time", "has_param", "init_node",
+    "is_shutdown", "logdebug", "logdebug_once", "logdebug_throttle", "logdebug_throttle_identical", "logerr",
+    "logerr_once", "logerr_throttle", "logerr_throttle_identical", "logfatal", "logfatal_once", "logfatal_throttle",
+    "logfatal_throttle_identical", "loginfo", "loginfo_once", "loginfo_throttle", "loginfo_throttle_identical",
+    "logout", "logwarn", "logwarn_once", "logwarn_throttle", "logwarn_throttle_identical", "myargv", "on_shutdown",
+    "parse_rosrpc_uri", "remap_name", "resolve_name", "search_param", "set_param", "signal_shutdown", "sleep", "spin",
+    "wait_for_message", "wait_for_service",
+]  # fmt: skip

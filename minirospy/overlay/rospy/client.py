@@ -12,7 +12,6 @@ from minirospy.client import (
     WARN,
     Service,
     delete_param,
-    get_master,
     get_param,
     get_param_cached,
     get_param_names,
@@ -31,10 +30,9 @@ from minirospy.client import (
     spin,
     wait_for_message,
 )
-from minirospy.client.params import UNSPECIFIED
+from minirospy.client.params import UNSPECIFIED as _unspecified  # noqa: F401, N811 - as before
 from minirospy.client.params import Unspecified as _Unspecified  # noqa: F401 - programs hand it on as the default
-from minirospy.client.process import process as _process
-from rospy.impl.live import live_names as _live_names
+from minirospy.compat.rospy.msproxy import get_master
 
 __all__ = [
     "DEBUG", "ERROR", "FATAL", "INFO", "WARN", "GetLoggers", "GetLoggersResponse", "Log", "Logger", "Service",
@@ -42,9 +40,3 @@ __all__ = [
     "get_param_names", "get_published_topics", "has_param", "init_node", "load_command_line_node_params", "logdebug",
     "logerr", "loginfo", "logwarn", "myargv", "on_shutdown", "search_param", "set_param", "spin", "wait_for_message",
 ]  # fmt: skip
-
-_unspecified = UNSPECIFIED
-_live_names(
-    __name__,
-    _init_node_args=(lambda: _process.init_arguments, lambda value: value or _process.begin_again()),
-)

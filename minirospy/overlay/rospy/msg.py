@@ -1,7 +1,7 @@
 """rospy.msg, filled in by minirospy."""
 
-from minirospy.client.msg import deserialize_messages, serialize_message
 from minirospy.client.topics import AnyMsg
+from minirospy.compat.rospy.msg import deserialize_messages, serialize_message
 from minirospy.idl.message import args_kwds_to_message
 
 __all__ = ["AnyMsg", "args_kwds_to_message", "deserialize_messages", "serialize_message"]

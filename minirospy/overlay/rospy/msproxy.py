@@ -1,5 +1,5 @@
 """rospy.msproxy, filled in by minirospy."""
 
-from minirospy.client.msproxy import MasterProxy
+from minirospy.compat.rospy.msproxy import MasterProxy
 
 __all__ = ["MasterProxy"]

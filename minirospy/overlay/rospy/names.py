@@ -1,7 +1,7 @@
 """rospy.names, filled in by minirospy."""
 
 from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
-from minirospy.client.naming import (
+from minirospy.compat.rospy.names import (
     ANYTYPE,
     GLOBALNS,
     REMAP,
@@ -29,7 +29,9 @@ from minirospy.client.naming import (
     valid_name_validator_resolved,
     valid_name_validator_unresolved,
 )
-from minirospy.client.process import process as _process
+from minirospy.compat.rospy.names import (
+    _set_caller_id as _set_caller_id,
+)
 from minirospy.errors import ROSException, ROSInitException
 
 __all__ = [
@@ -40,5 +42,3 @@ __all__ = [
     "resolve_name", "resolve_name_without_node_name", "scoped_name", "valid_name", "valid_name_validator_resolved",
     "valid_name_validator_unresolved",
 ]  # fmt: skip
-
-_set_caller_id = _process.be_called

@@ -1,8 +1,7 @@
 """rospy.rosconsole, filled in by minirospy: the command rosconsole."""
 
 from minirospy.cli.ros.rosconsole import main
+from minirospy.compat.rospy.rosconsole import NAME
 from rospy.logger_level_service_caller import LoggerLevelServiceCaller, ROSConsoleException
-
-NAME = "rosconsole"
 
 __all__ = ["NAME", "LoggerLevelServiceCaller", "ROSConsoleException", "main"]

@@ -1,17 +1,13 @@
 """rospy.service, filled in by minirospy."""
 
-import logging
-
-from minirospy.client.manager import ServiceManager as ServiceManager
 from minirospy.client.services import Service as Service
 from minirospy.client.services import ServiceProxy as ServiceProxy
+from minirospy.compat.rospy.impl.registration import ServiceManager as ServiceManager
+from minirospy.compat.rospy.service import __dir__ as __dir__
+from minirospy.compat.rospy.service import __getattr__ as __getattr__
+from minirospy.compat.rospy.service import logger as logger
 from minirospy.errors import ServiceException as ServiceException
-from rospy import core as _core
-from rospy.impl.passing import passing_on
 from rospy.impl.registration import Registration as Registration
 from rospy.impl.transport import BIDIRECTIONAL as BIDIRECTIONAL
 from rospy.impl.transport import INBOUND as INBOUND
 from rospy.impl.transport import OUTBOUND as OUTBOUND
-
-logger = logging.getLogger("rospy.service")
-__getattr__, __dir__ = passing_on(__name__, _core)

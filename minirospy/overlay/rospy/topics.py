@@ -1,18 +1,16 @@
 """rospy.topics, filled in by minirospy."""
 
-from minirospy.client.msg import serialize_message as serialize_message
 from minirospy.client.topics import Publisher as Publisher
 from minirospy.client.topics import SubscribeListener as SubscribeListener
 from minirospy.client.topics import Subscriber as Subscriber
 from minirospy.client.topics import Topic as Topic
+from minirospy.compat.rospy.msg import serialize_message as serialize_message
+from minirospy.compat.rospy.topics import __dir__ as __dir__
+from minirospy.compat.rospy.topics import __getattr__ as __getattr__
 from minirospy.errors import ROSSerializationException as ROSSerializationException
 from minirospy.errors import TransportTerminated as TransportTerminated
 from minirospy.idl.message import Message as Message
 from minirospy.idl.message import args_kwds_to_message as args_kwds_to_message
-from rospy import core as _core
-from rospy.impl.passing import passing_on
 from rospy.impl.registration import Registration as Registration
 from rospy.impl.registration import get_topic_manager as get_topic_manager
 from rospy.impl.tcpros_base import DEFAULT_BUFF_SIZE as DEFAULT_BUFF_SIZE
-
-__getattr__, __dir__ = passing_on(__name__, _core)

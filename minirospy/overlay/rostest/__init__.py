@@ -1,5 +1,6 @@
 """rostest, filled in by minirospy: tests that are nodes. Source: http://wiki.ros.org/rostest."""
 
+from minirospy.compat.rostest import rostestmain
 from minirospy.testing.node import get_master, is_publisher, is_subscriber, rosrun, run, unitrun
 from minirospy.testing.unit import XML_OUTPUT_FLAG
 
@@ -13,12 +14,3 @@ __all__ = [
     "run",
     "unitrun",
 ]
-
-
-def rostestmain() -> None:
-    """What the command `rostest` runs; ends the process."""
-    import sys
-
-    from minirospy.cli.ros.rostest import rostest
-
-    sys.exit(rostest())

@@ -1,21 +1,31 @@
 """rostopic, filled in by minirospy: what user code asks of topics. Source: http://wiki.ros.org/rostopic."""
 
-from __future__ import annotations
-
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from typing import Any
-
 import rosgraph as rosgraph
 
-from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
-from minirospy.introspect import topics
-from minirospy.introspect.fields import field_value, parse_path
-from minirospy.introspect.graph import Graph
-from rostopic._echo import CallbackEcho, create_field_filter, create_value_transform
-from rostopic._rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
+from minirospy.compat.rostopic import (
+    NAME,
+    ROSTopicException,
+    ROSTopicIOException,
+    create_publisher,
+    find_by_type,
+    get_api,
+    get_info_text,
+    get_topic_class,
+    get_topic_list,
+    get_topic_type,
+    msgevalgen,
+    publish_message,
+    rostopicmain,
+)
+from minirospy.compat.rostopic import _check_master as _check_master
+from minirospy.compat.rostopic import _get_topic_type as _get_topic_type
+from minirospy.compat.rostopic import _master_get_topic_types as _master_get_topic_types
+from minirospy.compat.rostopic import _rostopic_echo as _rostopic_echo
+from minirospy.compat.rostopic import _rostopic_info as _rostopic_info
+from minirospy.compat.rostopic import _rostopic_list as _rostopic_list
+from minirospy.compat.rostopic import _rostopic_type as _rostopic_type
+from minirospy.compat.rostopic.echo import CallbackEcho, create_field_filter, create_value_transform
+from minirospy.compat.rostopic.rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
 
 __all__ = [
     "NAME", "CallbackEcho", "ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicException", "ROSTopicHz",
@@ -23,266 +33,3 @@ __all__ = [
     "get_api", "get_info_text", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "publish_message",
     "rostopicmain",
 ]  # fmt: skip
-
-NAME = "rostopic"
-_LATCH_SECONDS = 3.0
-
-
-class ROSTopicException(Exception):
-    """A topic cannot be used as asked."""
-
-
-class ROSTopicIOException(ROSTopicException):
-    """The master does not answer."""
-
-
-class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """As programs expect it of ROS's get_topic_list, also an error of sockets."""
-
-
-def get_topic_type(
-    topic: str, blocking: bool = False
-) -> tuple[str | None, str | None, Callable[[Any], Any] | None]:
-    """(type, topic, function that takes the field out of a message); three times None where it is not there.
-
-    ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
-    """
-    with _graph() as graph:
-        name = graph.resolve(topic)
-        field = topics.find_topic(graph, name)
-        if field is None and blocking:
-            from minirospy.cli.command import warn_unpublished
-
-            warn_unpublished(graph, name)
-            while field is None and not _is_shutdown():
-                time.sleep(0.1)
-                field = topics.find_topic(graph, name)
-    if field is None:
-        return None, None, None
-    return field.type, field.topic, msgevalgen(field.path)
-
-
-def get_topic_class(
-    topic: str, blocking: bool = False
-) -> tuple[type[Any] | None, str | None, Callable[[Any], Any] | None]:
-    """Like :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
-    from minirospy.idl.load import get_message_class
-
-    type_, real_topic, function = get_topic_type(topic, blocking)
-    if type_ is None:
-        return None, None, None
-    cls: type[Any] | None = get_message_class(type_)
-    if cls is None:
-        raise ROSTopicException(f"Cannot load message class for [{type_}]. Are your messages built?")
-    return cls, real_topic, function
-
-
-def get_topic_list(master: Any = None) -> tuple[list[Any], list[Any]]:
-    """(published, subscribed), each a list of (topic, type, nodes)."""
-    with _graph(_NoMaster) as graph:
-        found = topics.list_topics(graph)
-    published, subscribed = ([(each.name, each.type, list(each.nodes)) for each in side] for side in found)
-    return published, subscribed
-
-
-def find_by_type(topic_type: str) -> list[str]:
-    """The topics of a type."""
-    with _graph() as graph:
-        return topics.find_topics_of_type(graph, topic_type)
-
-
-def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
-    """A function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
-
-    None, too, where the path does not parse, which is then said on stderr.
-    """
-    try:
-        steps = parse_path(pattern.strip("/"))
-    except UsageError as error:
-        print(f"rostopic: {error}", file=sys.stderr)
-        return None
-    return (lambda message: field_value(message, steps)) if steps else None
-
-
-def get_info_text(topic: str) -> str:
-    """The type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
-    from minirospy.introspect.texts import topic_text
-
-    with _graph() as graph:
-        try:
-            return topic_text(topics.topic_detail(graph, graph.resolve(topic)))
-        except NotFoundError as error:
-            raise ROSTopicException(f"Unknown topic {topic}") from error
-
-
-def get_api(master: rosgraph.Master, caller_id: str) -> str:
-    """The URI of a node, or `unknown address` and its name. Raises ROSTopicIOException."""
-    try:
-        return master.lookupNode(caller_id)
-    except rosgraph.MasterException:
-        return f"unknown address {caller_id}"
-    except OSError as error:
-        raise ROSTopicIOException(str(error)) from error
-
-
-def create_publisher(
-    topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
-) -> tuple[Any, type[Any]]:
-    """(publisher, message class) for a topic, by the type's name; makes the program a node, unless it is one.
-
-    Raises ROSTopicException where the type is not installed.
-    """
-    import rospy
-
-    from minirospy.idl.genpy import get_message_class
-
-    try:
-        cls: type[Any] | None = get_message_class(topic_type)
-    except ValueError as error:
-        raise ROSTopicException(f"invalid topic type: {topic_type}") from error
-    if cls is None:
-        raise ROSTopicException(f"invalid message type: {topic_type}.\nIs its package built and sourced?")
-    if not rospy.core.is_initialized():
-        rospy.init_node(NAME, anonymous=True, disable_rosout=True, disable_rostime=disable_rostime)
-    name = rosgraph.names.script_resolve_name(NAME, topic_name)
-    return rospy.Publisher(name, cls, latch=latch, queue_size=100), cls
-
-
-def publish_message(
-    pub: Any,
-    msg_class: type[Any],
-    pub_args: Sequence[Any],
-    rate: float | None = None,
-    once: bool = False,
-    verbose: bool = False,
-    substitute_keywords: bool = False,
-) -> None:
-    """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
-
-    ``substitute_keywords``: `now` and `auto` are filled in anew for each. Raises ROSTopicException on values that do
-    not fit.
-    """
-    import rospy
-
-    from minirospy.errors import MessageException
-    from minirospy.introspect.echo import fill_message
-
-    def message() -> Any:
-        try:
-            return fill_message(msg_class, pub_args, rospy.Time.now().to_nsec())
-        except MessageException as error:
-            raise ROSTopicException(f"Unable to publish message. {error}") from error
-
-    value = message()
-    shown = f"[{value}]" if verbose else "message"
-    if rate is None:
-        pause = f" for {_LATCH_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
-        print(f"publishing and latching {shown}{pause}")
-        pub.publish(value)
-        if not once:
-            rospy.spin()
-            return
-        end = time.monotonic() + _LATCH_SECONDS
-        while time.monotonic() < end and not rospy.is_shutdown():
-            time.sleep(0.05)
-        return
-    pauses = rospy.Rate(rate)
-    with suppress(rospy.ROSInterruptException):
-        while not rospy.is_shutdown():
-            if verbose:
-                print(f"publishing {shown}")
-            pub.publish(message() if substitute_keywords else value)
-            if once:
-                return
-            pauses.sleep()
-
-
-def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
-    _command(list(sys.argv if argv is None else argv)[1:])
-
-
-# Of ROS's private functions those that programs call.
-
-
-def _check_master() -> None:
-    """Raises ROSTopicIOException where no master answers."""
-    with _graph() as graph:
-        graph.master.get_pid()
-
-
-def _master_get_topic_types(master: rosgraph.Master) -> Any:
-    """[[topic, type]] of all that the master knows."""
-    return master.getTopicTypes()
-
-
-_get_topic_type = get_topic_type
-
-
-def _rostopic_list(
-    topic: str | None,
-    verbose: bool = False,
-    subscribers_only: bool = False,
-    publishers_only: bool = False,
-    group_by_host: bool = False,
-) -> None:
-    """Print what `rostopic list` prints. Raises ROSTopicIOException."""
-    _check_master()
-    chosen = {"-v": verbose, "-s": subscribers_only, "-p": publishers_only, "--host": group_by_host}
-    _command(["list", *(option for option, on in chosen.items() if on), *([topic] if topic else [])])
-
-
-def _rostopic_info(topic: str) -> None:
-    """Print what `rostopic info` prints. Raises ROSTopicException."""
-    print(get_info_text(topic))
-
-
-def _rostopic_type(topic: str) -> None:
-    """Print what `rostopic type` prints. Raises ROSTopicIOException."""
-    _check_master()
-    _command(["type", topic])
-
-
-def _rostopic_echo(
-    topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
-) -> None:
-    """Give the messages of a topic, or a field of them, to ``callback_echo`` until it has enough of them."""
-    import rospy
-
-    if bag_file:
-        raise ROSTopicException(f"[{bag_file}]: bags are not read by this function")
-    if not rospy.core.is_initialized():
-        rospy.init_node(NAME, anonymous=True)
-    cls, real_topic, field = get_topic_class(topic, blocking=True)
-    if real_topic is None or cls is None:
-        return
-    callback_echo.msg_eval = field
-    information = {"topic": real_topic, "type_information": cls._type}
-    subscriber = rospy.Subscriber(real_topic, cls, callback_echo.callback, information)
-    while not rospy.is_shutdown() and not callback_echo.done:
-        time.sleep(0.05)
-    subscriber.unregister()
-
-
-def _is_shutdown() -> bool:
-    """Whether the program is a node that shuts down; one that never imported rospy is none."""
-    rospy: Any = sys.modules.get("rospy")
-    return rospy is not None and bool(rospy.is_shutdown())
-
-
-def _command(words: Sequence[str]) -> None:
-    from minirospy.cli.ros.rostopic import main
-
-    if status := main(list(words)):
-        sys.exit(status)
-
-
-@contextmanager
-def _graph(unreachable: type[Exception] = ROSTopicIOException) -> Iterator[Graph]:
-    try:
-        with Graph.open(NAME) as graph:
-            yield graph
-    except MasterUnreachableError as error:
-        raise unreachable(str(error)) from error
-    except MinirospyError as error:
-        raise ROSTopicException(str(error)) from error

@@ -1,5 +1,6 @@
 """rosunit, filled in by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
 
+from minirospy.compat.rosunit import __version__ as __version__
 from minirospy.testing.unit import (
     XML_OUTPUT_FLAG,
     create_xml_runner,
@@ -19,5 +20,3 @@ __all__ = [
     "XML_OUTPUT_FLAG", "create_xml_runner", "junitxml", "print_runner_summary", "print_unittest_summary",
     "rostest_name_from_path", "unitrun", "xml_results_file",
 ]  # fmt: skip
-
-__version__ = "1.0.0"

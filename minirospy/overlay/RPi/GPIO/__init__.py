@@ -1,7 +1,7 @@
 """RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
 # ruff: noqa: N999 - the name of the real package
 
-from minirospy.gpio.raspberry import warn_of_missing_library
+from minirospy.compat import rpi as _rpi  # noqa: F401 - warns where a Raspberry Pi lacks its library
 from minirospy.gpio.rpigpio import BCM as BCM
 from minirospy.gpio.rpigpio import BOARD as BOARD
 from minirospy.gpio.rpigpio import BOTH as BOTH
@@ -37,5 +37,3 @@ from minirospy.gpio.rpigpio import setmode as setmode
 from minirospy.gpio.rpigpio import setup as setup
 from minirospy.gpio.rpigpio import setwarnings as setwarnings
 from minirospy.gpio.rpigpio import wait_for_edge as wait_for_edge
-
-warn_of_missing_library()

@@ -1,10 +1,6 @@
 """rospy.impl.init, filled in by minirospy."""
 
 from minirospy.client.log import RosStreamHandler
+from minirospy.compat.rospy.impl.init import DEFAULT_MASTER_PORT, DEFAULT_MASTER_URI, DEFAULT_NODE_PORT
 
 __all__ = ["DEFAULT_MASTER_PORT", "DEFAULT_MASTER_URI", "DEFAULT_NODE_PORT", "RosStreamHandler"]
-
-DEFAULT_NODE_PORT = 0
-"""Any."""
-DEFAULT_MASTER_PORT = 11311
-DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"

@@ -1,5 +1,5 @@
 """rospy.impl.registration, filled in by minirospy."""
 
-from minirospy.client.manager import Registration, get_service_manager, get_topic_manager
+from minirospy.compat.rospy.impl.registration import Registration, get_service_manager, get_topic_manager
 
 __all__ = ["Registration", "get_service_manager", "get_topic_manager"]

@@ -1,8 +1,7 @@
 """rospy.impl.rosout, filled in by minirospy: the handler that publishes log records, and the levels' numbers."""
 
-from minirospy.client.log import PYTHON_LEVELS, RosOutHandler
+from minirospy.client.log import RosOutHandler
+from minirospy.compat.rospy.impl.rosout import _logging_to_rospy_levels as _logging_to_rospy_levels
+from minirospy.compat.rospy.impl.rosout import _rospy_to_logging_levels as _rospy_to_logging_levels
 
 __all__ = ["RosOutHandler"]
-
-_rospy_to_logging_levels = PYTHON_LEVELS
-_logging_to_rospy_levels = {python: ros for ros, python in PYTHON_LEVELS.items()}

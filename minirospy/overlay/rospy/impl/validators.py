@@ -1,5 +1,5 @@
 """rospy.impl.validators, filled in by minirospy."""
 
-from minirospy.client.naming import ParameterInvalid
+from minirospy.compat.rospy.names import ParameterInvalid
 
 __all__ = ["ParameterInvalid"]

@@ -1,0 +1,1 @@
+"""catkin: the workspaces of the environment."""

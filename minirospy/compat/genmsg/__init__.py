@@ -1,0 +1,1 @@
+"""genmsg: definitions of messages and services, as code generators read them."""

@@ -1,0 +1,1 @@
+"""genpy: what generated messages import."""

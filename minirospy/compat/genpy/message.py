@@ -1,0 +1,115 @@
+"""genpy's functions where they differ from ours; `import genpy` re-exports them.
+
+Also what modules that real genpy generated need at run time: ``struct_I`` and the error handler ``rosmsg``.
+Source: http://docs.ros.org/api/genpy/html/.
+"""
+
+from __future__ import annotations
+
+import codecs
+import struct
+from typing import Any
+
+from minirospy.errors import DefinitionError, MessageException
+
+__all__ = [
+    "SIMPLE_TYPES",
+    "SIMPLE_TYPES_DICT",
+    "MsgGenerationException",
+    "RosMsgUnicodeErrors",
+    "generate_dynamic",
+    "get_message_class",
+    "get_service_class",
+    "is_simple",
+    "isstring",
+    "register_unicode_errors",
+    "struct_I",
+]
+
+struct_I = struct.Struct("<I")  # noqa: N816 - genpy's name
+
+SIMPLE_TYPES_DICT = {
+    "int8": "b", "uint8": "B", "bool": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
+    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d", "char": "B", "byte": "b",
+}  # fmt: skip
+SIMPLE_TYPES = list(SIMPLE_TYPES_DICT)
+
+
+class MsgGenerationException(MessageException):
+    """A definition that no class can be made from."""
+
+
+class RosMsgUnicodeErrors:
+    """Replaces bytes that are not UTF-8, and says so once for a message type."""
+
+    def __init__(self) -> None:
+        self.msg_type: str | None = None
+        self._warned: set[str | None] = set()
+
+    def __call__(self, error: UnicodeError) -> tuple[str | bytes, int]:
+        if self.msg_type not in self._warned:
+            self._warned.add(self.msg_type)
+            import logging
+
+            logging.getLogger("rosout").error(
+                "Characters replaced when decoding message %s (will print only once): %s",
+                self.msg_type,
+                error,
+            )
+        return codecs.replace_errors(error)
+
+
+def register_unicode_errors() -> None:
+    """Make ``errors="rosmsg"`` known to codecs, unless it is: modules that real genpy generated name it."""
+    try:
+        codecs.lookup_error("rosmsg")
+    except LookupError:
+        codecs.register_error("rosmsg", RosMsgUnicodeErrors())
+
+
+def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, Any]:
+    """The class of a full text, and those of all types in it, by name. Raises InvalidMsgSpec on a text that is none."""
+    from minirospy.compat.genmsg import msg_loader
+    from minirospy.idl import load
+
+    try:
+        return dict(load.classes_from_text(core_type, msg_cat))
+    except DefinitionError as error:
+        raise msg_loader.InvalidMsgSpec(str(error)) from error
+
+
+def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:
+    """The class of ``pkg/Name``, or None. Raises ValueError on what is no name of a type."""
+    from minirospy.idl import load
+
+    return load.get_message_class(_checked(message_type))
+
+
+def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
+    """The class of the service ``pkg/Name``, or None. Raises ValueError on what is no name of a type."""
+    from minirospy.idl import load
+
+    return load.get_service_class(_checked(service_type))
+
+
+def is_simple(type_: str) -> bool:
+    """Whether ``struct`` packs a type."""
+    return type_ in SIMPLE_TYPES_DICT
+
+
+def isstring(s: object) -> bool:
+    """Whether a value is text or bytes."""
+    return isinstance(s, str | bytes)
+
+
+def _checked(type_: str) -> str:
+    if type_ == "Header":
+        return "std_msgs/Header"
+    if type_.count("/") > 1:
+        raise ValueError(f"invalid name [{type_}]")
+    if "/" not in type_[1:]:
+        raise ValueError(f"message type is missing package name: {type_}")
+    return type_
+
+
+register_unicode_errors()

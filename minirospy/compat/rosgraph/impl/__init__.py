@@ -1,0 +1,1 @@
+"""rosgraph.impl: the graph as it is polled."""

@@ -1,0 +1,155 @@
+"""How this machine is reached, and connection headers, under the words of rosgraph.
+
+Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
+from minirospy.environment import Environment
+from minirospy.errors import WireError
+from minirospy.wire.header import parse_header, serialize_header
+
+__all__ = [
+    "ROSHandshakeException",
+    "create_local_xmlrpc_uri",
+    "decode_ros_handshake_header",
+    "encode_ros_handshake_header",
+    "get_address_override",
+    "get_bind_address",
+    "get_host_name",
+    "get_local_address",
+    "get_local_addresses",
+    "is_local_address",
+    "parse_http_host_and_port",
+    "read_ros_handshake_header",
+    "use_ipv6",
+    "write_ros_handshake_header",
+]
+
+_LENGTH_BYTES = 4
+
+
+class ROSHandshakeException(Exception):
+    """A connection header that does not read."""
+
+
+def get_address_override() -> str | None:
+    """What ROS_HOSTNAME, or else ROS_IP, says; None where neither is set."""
+    return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
+
+
+def get_host_name() -> str:
+    """The name that other nodes reach this machine by."""
+    return Environment.read().host
+
+
+def get_local_address() -> str:
+    """The address that other nodes reach this machine by."""
+    host = get_address_override()
+    if host:
+        return host
+    return next((each for each in get_local_addresses() if not each.startswith("127.")), "127.0.0.1")
+
+
+def get_local_addresses() -> list[str]:
+    """The addresses of this machine, IPv6 ones where ROS_IPV6 is on."""
+    import psutil
+
+    families = {socket.AF_INET, socket.AF_INET6} if use_ipv6() else {socket.AF_INET}
+    interfaces = psutil.net_if_addrs().values()
+    return [
+        each.address.partition("%")[0] for found in interfaces for each in found if each.family in families
+    ]
+
+
+def is_local_address(hostname: str) -> bool:
+    """Whether a host is this machine."""
+    try:
+        found = {str(info[4][0]) for info in socket.getaddrinfo(hostname, 0, 0, 0, socket.SOL_TCP)}
+    except OSError:
+        return False
+    return bool(found & set(get_local_addresses())) or any(
+        each.startswith("127.") or each == "::1" for each in found
+    )
+
+
+def use_ipv6() -> bool:
+    """Whether ROS_IPV6 is on."""
+    return Environment.read(host="localhost").ipv6
+
+
+def get_bind_address(address: str | None = None) -> str:
+    """The address that servers listen on."""
+    return (Environment.read(host=address) if address else Environment.read()).bind_host
+
+
+def create_local_xmlrpc_uri(port: int) -> str:
+    """The URI of a server on this machine."""
+    return f"http://{Environment.read().uri_host}:{port}/"
+
+
+def parse_http_host_and_port(url: str) -> tuple[str, int]:
+    """(host, port) of a URL; port 80 where it has none. Raises ValueError."""
+    if not url:
+        raise ValueError("not a valid URL")
+    parts = urlsplit(url)
+    if not parts.hostname:
+        raise ValueError("not a valid URL")
+    return parts.hostname, parts.port or 80
+
+
+def encode_ros_handshake_header(header: Mapping[str, Any]) -> bytes:
+    """A connection header's bytes, its length in front."""
+    return serialize_header({key: str(value) for key, value in header.items()})
+
+
+def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
+    """The fields of a connection header, its length in front. Raises ROSHandshakeException."""
+    size = int.from_bytes(header_str[:_LENGTH_BYTES], "little")
+    body = header_str[_LENGTH_BYTES : _LENGTH_BYTES + size]
+    if len(body) < size:
+        raise ROSHandshakeException(
+            f"Incomplete header. Expected {size + _LENGTH_BYTES} bytes but only have {len(header_str)}"
+        )
+    try:
+        return dict(parse_header(body))
+    except WireError as error:
+        raise ROSHandshakeException(str(error)) from error
+
+
+def read_ros_handshake_header(sock: socket.socket, b: Any, buff_size: int) -> dict[str, str]:
+    """The connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
+
+    Raises ROSHandshakeException where the peer ends before.
+    """
+    data = b.getvalue()
+    while len(data) < _LENGTH_BYTES or len(data) < _LENGTH_BYTES + int.from_bytes(
+        data[:_LENGTH_BYTES], "little"
+    ):
+        more = sock.recv(buff_size)
+        if not more:
+            raise ROSHandshakeException(
+                "connection from sender terminated before handshake header received. "
+                f"{len(data)} bytes were received. Please check sender for additional details."
+            )
+        data += more
+    end = _LENGTH_BYTES + int.from_bytes(data[:_LENGTH_BYTES], "little")
+    b.seek(0)
+    b.truncate(0)
+    b.write(data[end:])
+    b.seek(0)
+    return decode_ros_handshake_header(data[:end])
+
+
+def write_ros_handshake_header(sock: socket.socket, header: Mapping[str, Any]) -> int:
+    """Send a connection header; the number of its bytes."""
+    data = encode_ros_handshake_header(header)
+    sock.sendall(data)
+    return len(data)

@@ -1,0 +1,33 @@
+"""roslaunch, filled in by minirospy. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from minirospy.environment import DEFAULT_MASTER_PORT
+
+__all__ = ["NAME", "configure_logging", "main", "write_pid_file"]
+
+NAME = "roslaunch"
+
+
+def configure_logging(uuid: str) -> None:
+    """Nothing is left to do: what roslaunch says goes into roslaunch-HOST-PID.log of the run's folder by itself."""
+
+
+def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | None) -> None:
+    """Write the process id to a file; of a core, where none is named, to roscore-PORT.pid in ROS_HOME."""
+    if not options_pid_fn and options_core:
+        home = os.environ.get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
+        options_pid_fn = os.path.join(home, f"roscore-{port or DEFAULT_MASTER_PORT}.pid")
+    if options_pid_fn:
+        with open(os.path.expanduser(options_pid_fn), "w", encoding="utf-8") as file:
+            file.write(str(os.getpid()))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command ``roslaunch``; ``argv`` with the command's name in front."""
+    from minirospy.cli.ros import roslaunch
+
+    return roslaunch.main(None if argv is None else argv[1:])

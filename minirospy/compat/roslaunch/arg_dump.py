@@ -1,0 +1,21 @@
+"""roslaunch.arg_dump, filled in by minirospy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from minirospy.compat.roslaunch.config import LaunchFile, assignments
+from minirospy.launch.load import resolved_arg_docs
+from minirospy.workspace.packages import Packages
+
+__all__ = ["get_args"]
+
+
+def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
+    """The args that launch files declare: name -> (doc, default)."""
+    packages, found = Packages(), {}
+    for each in roslaunch_files:
+        file, argv = (each, []) if isinstance(each, str) else each
+        for arg in resolved_arg_docs(file, assignments(argv), packages):
+            found[arg.name] = (arg.doc, arg.default)
+    return found

@@ -1,0 +1,14 @@
+"""roslaunch.loader, filled in by minirospy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy.launch import substitution
+
+__all__ = ["convert_value"]
+
+
+def convert_value(value: str, type_: str) -> Any:
+    """A parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
+    return substitution.convert(value, type_)

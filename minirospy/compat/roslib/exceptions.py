@@ -1,0 +1,7 @@
+"""roslib.exceptions, filled in by minirospy."""
+
+__all__ = ["ROSLibException"]
+
+
+class ROSLibException(Exception):
+    """The root of roslib's errors."""

@@ -1,0 +1,175 @@
+"""roslib's functions about packages, over rospkg's; `import roslib` re-exports them.
+
+Source: http://wiki.ros.org/roslib, http://docs.ros.org/api/roslib/html/python/.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from minirospy.compat.rospkg.rospack import InvalidManifest, ResourceNotFound, RosPack, get_package_name
+from minirospy.workspace.packages import package_name
+
+__all__ = [
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "SRC_DIR",
+    "InvalidROSPkgException",
+    "MultipleNodesException",
+    "ROSPkgException",
+    "find_node",
+    "find_resource",
+    "get_dir_pkg",
+    "get_pkg_dir",
+    "get_pkg_subdir",
+    "list_pkgs_by_path",
+    "load_manifest",
+    "resource_file",
+]
+
+SRC_DIR = "src"
+ROS_ROOT = "ROS_ROOT"
+ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
+
+
+class ROSPkgException(Exception):
+    """A package cannot be used."""
+
+
+class InvalidROSPkgException(ROSPkgException):
+    """No package of a name."""
+
+
+class MultipleNodesException(ROSPkgException):
+    """Several nodes of a name in a package."""
+
+
+def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
+    """Put the ``src`` folders of a package and of all that it needs on sys.path, as scripts of old ask for.
+
+    A package that the script itself lies in, or that can be imported, need not be on ROS_PACKAGE_PATH.
+    Raises ResourceNotFound.
+    """
+    rospack = RosPack()
+    try:
+        names = [package_name, *rospack.get_depends(package_name)]
+        folders = [Path(rospack.get_path(name)) for name in names]
+    except ResourceNotFound:
+        own = _folder_of_script(package_name)
+        if own is None and not _is_importable(package_name):
+            raise
+        folders = [own] if own else []
+    except InvalidManifest:
+        folders = [Path(rospack.get_path(package_name))]
+    for folder in reversed(folders):
+        source = str(folder / "src")
+        if source not in sys.path and any(Path(source).glob("*/__init__.py")):
+            # After the script's own folder, as rospack's packages come before what is installed.
+            sys.path.insert(1, source)
+
+
+def get_pkg_dir(
+    package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
+) -> str | None:
+    """The folder of a package. Raises InvalidROSPkgException where there is none, if ``required``; else None."""
+    paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
+    rospack = RosPack([*paths, *RosPack().get_ros_paths()])
+    try:
+        return rospack.get_path(package)
+    except ResourceNotFound as error:
+        if required:
+            raise InvalidROSPkgException(f"Cannot locate installation of package {error}") from error
+        return None
+
+
+def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
+    """(folder, name) of the package that a path lies in; (None, None) where it lies in none."""
+    name = get_package_name(d)
+    place = Path(d).absolute()
+    folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)
+    return (str(folder), name) if folder else (None, None)
+
+
+def get_pkg_subdir(
+    package: str, subdir: str, required: bool = True, env: dict[str, str] | None = None
+) -> str | None:
+    """A folder in a package, made where it is not there if ``required``; else None. Raises InvalidROSPkgException."""
+    folder = get_pkg_dir(package, required)
+    if folder is None:
+        return None
+    path = Path(folder, subdir)
+    if required:
+        path.mkdir(parents=True, exist_ok=True)
+    return str(path) if path.is_dir() else None
+
+
+def resource_file(package: str, subdir: str, resource_name: str) -> str:
+    """The path that a file in a folder of a package has, or would have. Raises InvalidROSPkgException."""
+    return os.path.join(str(get_pkg_dir(package)), subdir, resource_name)
+
+
+def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[str]:
+    """The programs of a name in a package. Raises ResourceNotFound."""
+    return find_resource(pkg, node_type, _is_program, rospack)
+
+
+def find_resource(
+    pkg: str,
+    resource_name: str,
+    filter_fn: Callable[[str], bool] | None = None,
+    rospack: RosPack | None = None,
+) -> list[str]:
+    """The files of a name in a package, and where its workspace puts what it builds. Raises ResourceNotFound."""
+    folder = Path((rospack or RosPack()).get_path(pkg))
+    if len(Path(resource_name).parts) > 1:
+        found: Iterator[Path] = filter(Path.is_file, [folder / resource_name])
+    else:
+        found = _files(folder, pkg, resource_name)
+    return [str(path) for path in found if filter_fn is None or filter_fn(str(path))]
+
+
+def list_pkgs_by_path(
+    path: str,
+    packages: list[str] | None = None,
+    cache: dict[str, str] | None = None,
+    env: dict[str, str] | None = None,
+) -> list[str]:
+    """The packages below a folder, added to ``packages``."""
+    found = [] if packages is None else packages
+    found += [name for name in RosPack([path]).list() if name not in found]
+    return found
+
+
+def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
+    for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
+        for built in (Path(prefix, "lib", package, name), Path(prefix, "share", package, name)):
+            if prefix and built.is_file():
+                yield built
+    for path, folders, names in os.walk(folder):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        if name in names:
+            yield Path(path, name)
+
+
+def _is_program(path: str) -> bool:
+    return path.endswith(".py") or os.access(path, os.X_OK)
+
+
+def _folder_of_script(package: str) -> Path | None:
+    """The package that the running script lies in, if it has this name."""
+    script: Sequence[str] = sys.argv[:1]
+    if not script or not script[0]:
+        return None
+    folder, name = get_dir_pkg(str(Path(script[0]).resolve().parent))
+    return Path(folder) if folder and name == package else None
+
+
+def _is_importable(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False

@@ -1,0 +1,17 @@
+"""roslib.scriptutil, filled in by minirospy: the master as scripts of old ask for it."""
+
+from __future__ import annotations
+
+from xmlrpc.client import ServerProxy
+
+from minirospy.compat.rosgraph.rosenv import get_master_uri
+
+__all__ = ["get_master", "get_param_server"]
+
+
+def get_master() -> ServerProxy:
+    """The master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
+    return ServerProxy(get_master_uri())
+
+
+get_param_server = get_master

@@ -1,0 +1,1 @@
+"""What `import rospy` offers in addition to `minirospy.client`: rospy's submodules, which programs reach into."""

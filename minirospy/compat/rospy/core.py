@@ -1,0 +1,157 @@
+"""What rospy.core and rospy.rostime offer beside the names of `minirospy.client`: the inside of a node's life.
+
+Source: the behaviour of rospy.core and rospy.rostime; the log functions of rospy's own lines go to the log file only.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from minirospy.client.log import logerr
+from minirospy.client.process import process
+from minirospy.clock import SimulatedClock, WallClock
+from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
+from minirospy.compat.rospy.passing import passing_on
+from minirospy.environment import split_uri
+from minirospy.errors import ROSException
+from minirospy.times import Time
+
+__all__ = [
+    "MASTER_NAME",
+    "ROSRPC",
+    "add_client_shutdown_hook",
+    "add_preshutdown_hook",
+    "add_shutdown_hook",
+    "get_ros_root",
+    "get_rostime_cond",
+    "is_initialized",
+    "is_rostime_initialized",
+    "is_shutdown_requested",
+    "is_topic",
+    "is_wallclock",
+    "logerror",
+    "parse_rosrpc_uri",
+    "register_signals",
+    "rospydebug",
+    "rospyerr",
+    "rospyinfo",
+    "rospywarn",
+    "set_rostime",
+    "set_rostime_initialized",
+    "switch_to_wallclock",
+    "wallsleep",
+]
+
+MASTER_NAME = "master"
+ROSRPC = "rosrpc://"
+__getattr__, __dir__ = passing_on("rospy.core", "rospy.names")
+
+_internal = logging.getLogger("rospy.internal")
+rospydebug = _internal.debug
+rospyinfo = _internal.info
+rospywarn = _internal.warning
+rospyerr = _internal.error
+logerror = logerr
+
+
+def is_initialized() -> bool:
+    """Whether init_node has been called."""
+    return process.initialized
+
+
+def is_shutdown_requested() -> bool:
+    """Whether a shutdown has begun; while its hooks run, is_shutdown() is still false."""
+    return process.is_shutdown_requested
+
+
+def add_preshutdown_hook(h: Callable[[object], object]) -> None:
+    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
+    process.before_shutdown(h)
+
+
+def add_shutdown_hook(h: Callable[[object], object]) -> None:
+    """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
+    process.after_shutdown(h)
+
+
+def add_client_shutdown_hook(h: Callable[[], object]) -> None:
+    """The same as rospy.on_shutdown."""
+    process.on_shutdown(h)
+
+
+def register_signals() -> None:
+    """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
+    process.signals.take()
+
+
+def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
+    """ROS_ROOT of the environment. Raises ROSException where it is ``required`` and not set."""
+    root = (os.environ if env is None else env).get("ROS_ROOT")
+    if required and not root:
+        raise ROSException("ROS_ROOT is not set")
+    return root
+
+
+def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
+    """(host, port) of a service's ``rosrpc://host:port``. Raises ParameterInvalid."""
+    if not uri.startswith(ROSRPC):
+        raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
+    try:
+        host, port, _ = split_uri(uri, "rosrpc")
+    except ValueError:
+        raise ParameterInvalid(f"ROS service URL is invalid: {uri}") from None
+    return host, port
+
+
+def is_topic(param_name: str) -> Validator:
+    """A check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
+    return valid_name(param_name)
+
+
+def wallsleep(duration: float) -> None:
+    """Sleep so many seconds of the wall clock, whatever the node's time is. Raises ValueError where negative."""
+    time.sleep(duration)
+
+
+def is_wallclock() -> bool:
+    """Whether the node's time is the machine's, not a simulated one."""
+    return not isinstance(process.clock, SimulatedClock)
+
+
+def get_rostime_cond() -> threading.Condition:
+    """What is notified of each simulated time."""
+    return process.time_changed
+
+
+def is_rostime_initialized() -> bool:
+    """Whether the time may be asked for."""
+    return process.has_time
+
+
+def set_rostime_initialized(val: bool) -> None:
+    """Say that the time may be asked for, so that a program without a node can use Time.now()."""
+    process.has_time = bool(val)
+
+
+def set_rostime(t: Any) -> None:
+    """Set the node's time, which is simulated from now on. Raises ValueError on what is no Time."""
+    if not isinstance(t, Time):
+        raise ValueError(f"must be Time instance: {t.__class__}")
+    clock = process.clock
+    if not isinstance(clock, SimulatedClock):
+        clock = process.clock = SimulatedClock(changed=process.time_changed)
+    clock.set(t.to_nsec())
+
+
+def switch_to_wallclock() -> None:
+    """Go by the machine's time from now on."""
+    before, process.clock = process.clock, WallClock()
+    if isinstance(before, SimulatedClock):
+        # Who sleeps by it wakes up.
+        before.set(process.clock.now())
+    process.has_time = True

@@ -1,0 +1,8 @@
+"""rospy.impl.init, filled in by minirospy."""
+
+__all__ = ["DEFAULT_MASTER_PORT", "DEFAULT_MASTER_URI", "DEFAULT_NODE_PORT"]
+
+DEFAULT_NODE_PORT = 0
+"""Any."""
+DEFAULT_MASTER_PORT = 11311
+DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"

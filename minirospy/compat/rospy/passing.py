@@ -1,0 +1,30 @@
+"""What rospy's modules have of one another by accident: ROS's import each other's names with a star.
+
+Programs that say `rospy.core.resolve_name` find it; an editor sees only the names that a module defines.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+__all__ = ["passing_on"]
+
+
+def passing_on(name: str, source: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also has the public names of ``source``."""
+
+    def get(attribute: str) -> Any:
+        if not attribute.startswith("_"):
+            module = import_module(source)
+            if hasattr(module, attribute):
+                return getattr(module, attribute)
+        raise AttributeError(f"module {name!r} has no attribute {attribute!r}")
+
+    def names() -> list[str]:
+        public = (each for each in dir(import_module(source)) if not each.startswith("_"))
+        return sorted({*vars(sys.modules[name]), *public})
+
+    return get, names

@@ -1,0 +1,146 @@
+"""rosservice, filled in by minirospy: what user code asks of services. Source: http://wiki.ros.org/rosservice."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from minirospy.errors import (
+    MasterUnreachableError,
+    MessageException,
+    MinirospyError,
+    NodeUnreachableError,
+    NotFoundError,
+    ServiceException,
+)
+from minirospy.introspect import services
+from minirospy.introspect.graph import Graph
+
+__all__ = [
+    "NAME",
+    "ROSServiceException",
+    "ROSServiceIOException",
+    "call_service",
+    "get_service_args",
+    "get_service_class_by_name",
+    "get_service_headers",
+    "get_service_list",
+    "get_service_node",
+    "get_service_type",
+    "get_service_uri",
+    "has_service_args",
+    "rosservice_find",
+    "rosservicemain",
+]
+
+NAME = "rosservice"
+
+
+class ROSServiceException(Exception):
+    """A service cannot be used as asked."""
+
+
+class ROSServiceIOException(ROSServiceException):
+    """The master or the service does not answer."""
+
+
+def get_service_list(
+    node: str | None = None, namespace: str | None = None, include_nodes: bool = False
+) -> list[Any]:
+    """The names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
+    with _graph() as graph:
+        found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
+        owner = graph.resolve(node) if node else None
+    found = [each for each in found if owner is None or owner in each.nodes]
+    return [[each.name, list(each.nodes)] if include_nodes else each.name for each in found]
+
+
+def get_service_type(service_name: str) -> str | None:
+    """The type of a service; None where it is not there. Raises ROSServiceIOException where it does not answer."""
+    with _graph() as graph:
+        try:
+            return services.service_type(graph, graph.resolve(service_name))
+        except NotFoundError:
+            return None
+
+
+def get_service_uri(service_name: str) -> str | None:
+    """Where a service is called; None where it is not there."""
+    with _graph() as graph:
+        try:
+            return services.service_uri(graph, graph.resolve(service_name))
+        except NotFoundError:
+            return None
+
+
+def get_service_node(service_name: str) -> str | None:
+    """The node that offers a service; None where it is not there."""
+    with _graph() as graph:
+        nodes = graph.state().services.get(graph.resolve(service_name))
+    return nodes[0] if nodes else None
+
+
+def get_service_args(service_name: str) -> str:
+    """The names of the fields of a service's request, with spaces between. Raises ROSServiceException."""
+    with _graph() as graph:
+        return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
+
+
+def get_service_class_by_name(service_name: str) -> Any:
+    """The class of a running service. Raises ROSServiceException where it is not there or not installed."""
+    from minirospy.idl.load import service_class
+
+    with _graph() as graph:
+        return service_class(services.service_type(graph, graph.resolve(service_name)))
+
+
+def rosservice_find(service_type: str) -> list[str]:
+    """The services of a type."""
+    with _graph() as graph:
+        return services.find_services_of_type(graph, service_type)
+
+
+def call_service(
+    service_name: str, service_args: Sequence[Any], service_class: Any = None
+) -> tuple[Any, Any]:
+    """(request, response) of a call with the request's values. Raises ROSServiceException."""
+    with _graph() as graph:
+        name = graph.resolve(service_name)
+        type_ = service_class._type if service_class else services.service_type(graph, name)
+        request = services.fill_request(type_, service_args)
+        return request, services.call_service(graph, name, type_, request)
+
+
+def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
+    """The connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    with _graph() as graph:
+        return services.service_header(graph, graph.resolve(service_name), service_uri)
+
+
+def has_service_args(service_name: str, service_class: Any = None) -> bool:
+    """Whether a service's request has fields."""
+    return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
+
+
+def rosservicemain(argv: Sequence[str] | None = None) -> None:
+    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
+    from minirospy.cli.ros.rosservice import main
+
+    if status := main(list(sys.argv if argv is None else argv)[1:]):
+        sys.exit(status)
+
+
+@contextmanager
+def _graph() -> Iterator[Graph]:
+    try:
+        with Graph.open("rosservice") as graph:
+            yield graph
+    except (MasterUnreachableError, NodeUnreachableError) as error:
+        raise ROSServiceIOException(str(error)) from error
+    except NotFoundError as error:
+        text = f"Service [{error.name}] is not available." if error.kind == "service" else str(error)
+        raise ROSServiceException(text) from error
+    except (MinirospyError, MessageException, ServiceException) as error:
+        raise ROSServiceException(str(error)) from error

@@ -1,0 +1,17 @@
+"""RPi.GPIO: the virtual board's functions; importing it warns where a Raspberry Pi lacks its library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy.gpio import rpigpio
+from minirospy.gpio.raspberry import warn_of_missing_library
+
+__all__: list[str] = []
+
+
+def __getattr__(name: str) -> Any:
+    return getattr(rpigpio, name)
+
+
+warn_of_missing_library()

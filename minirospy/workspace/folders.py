@@ -1,0 +1,35 @@
+"""Where ROS keeps its own files, by the environment: ROS_HOME and the folders in it.
+
+Source: http://wiki.ros.org/ROS/EnvironmentVariables.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+__all__ = ["distro_codename", "log_dir", "results_dir", "ros_home"]
+
+
+def ros_home(environ: Mapping[str, str] | None = None) -> str:
+    """Return ROS_HOME, or ``~/.ros``."""
+    return _environ(environ).get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
+
+
+def log_dir(environ: Mapping[str, str] | None = None) -> str:
+    """Return ROS_LOG_DIR, or ``log`` in ROS_HOME."""
+    return _environ(environ).get("ROS_LOG_DIR") or os.path.join(ros_home(environ), "log")
+
+
+def results_dir(environ: Mapping[str, str] | None = None) -> str:
+    """Return ROS_TEST_RESULTS_DIR, or ``test_results`` in ROS_HOME."""
+    return _environ(environ).get("ROS_TEST_RESULTS_DIR") or os.path.join(ros_home(environ), "test_results")
+
+
+def distro_codename(environ: Mapping[str, str] | None = None) -> str:
+    """Return ROS_DISTRO, or the last distribution of ROS 1."""
+    return _environ(environ).get("ROS_DISTRO") or "noetic"
+
+
+def _environ(environ: Mapping[str, str] | None) -> Mapping[str, str]:
+    return os.environ if environ is None else environ

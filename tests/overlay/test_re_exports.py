@@ -1,0 +1,40 @@
+"""The overlay's hand-written modules only re-export: a docstring, imports with explicit names, `__all__`."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
+HAND_WRITTEN = sorted(
+    path for path in OVERLAY.rglob("*.py") if not {"msg", "srv"} & set(path.relative_to(OVERLAY).parts)
+)
+
+
+def is_docstring(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def is_import(statement: ast.stmt) -> bool:
+    if isinstance(statement, ast.ImportFrom):
+        return all(alias.name != "*" for alias in statement.names)
+    return isinstance(statement, ast.Import)
+
+
+def is_list_of_names(statement: ast.stmt) -> bool:
+    if not (isinstance(statement, ast.Assign) and isinstance(statement.value, ast.List)):
+        return False
+    return [ast.unparse(target) for target in statement.targets] == ["__all__"]
+
+
+@pytest.mark.parametrize("path", HAND_WRITTEN, ids=lambda path: str(path.relative_to(OVERLAY)))
+def test_an_overlay_module_only_re_exports(path: Path) -> None:
+    first, *rest = ast.parse(path.read_text(encoding="utf-8")).body
+    assert is_docstring(first)
+    assert [ast.unparse(each) for each in rest if not (is_import(each) or is_list_of_names(each))] == []
+
+
+def test_there_are_hand_written_modules() -> None:
+    assert len(HAND_WRITTEN) > 100
