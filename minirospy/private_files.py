@@ -10,8 +10,9 @@ import errno
 import os
 import stat
 from pathlib import Path
+from typing import IO
 
-__all__ = ["create_file", "open_file", "read_file"]
+__all__ = ["create_file", "open_file", "open_text", "read_file"]
 
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
@@ -26,8 +27,8 @@ _FLAGS = (
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
 
-    Raises OSError, also where the name is that of a link, or of anything but a regular file with one name. With
-    O_TRUNC the file is emptied after these checks.
+    Raises OSError, also where the name is that of a link, or of anything but a device or a regular file with one
+    name. With O_TRUNC the file is emptied after these checks.
     """
     if os.path.islink(path):
         # Windows has no O_NOFOLLOW. Elsewhere this is for the text alone.
@@ -36,12 +37,13 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
     try:
         found = os.fstat(file)
-        if not stat.S_ISREG(found.st_mode):
+        # Nobody but root makes devices: /dev/null is what a user has named.
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISCHR(found.st_mode)):
             raise _refusal(path, "it is not a regular file")
         if found.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
             raise _refusal(path, "it is a hard link to another file")
 
-        if flags & os.O_TRUNC:
+        if flags & os.O_TRUNC and stat.S_ISREG(found.st_mode):
             os.ftruncate(file, 0)
         if os.name != "nt":
             os.set_blocking(file, True)
@@ -49,6 +51,12 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
         os.close(file)
         raise
     return file
+
+
+def open_text(path: Path, mode: str) -> IO[str]:
+    """Open ``path`` to write text in UTF-8, ``mode`` "a" to append or "w" to empty it first. Raises OSError."""
+    how = {"a": os.O_APPEND, "w": os.O_TRUNC}[mode]
+    return os.fdopen(open_file(path, os.O_WRONLY | os.O_CREAT | how), mode, encoding="utf-8")
 
 
 def create_file(path: Path, mode: int = 0o600) -> int:

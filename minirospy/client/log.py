@@ -308,12 +308,10 @@ def _configured_by_file(node: NodeProcess) -> bool:
 
 def _log_to_file(node: NodeProcess, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
-    from logging.handlers import RotatingFileHandler
+    from minirospy.runtime.log_file import LogFileHandler
 
     try:
-        file = RotatingFileHandler(
-            path, maxBytes=_FILE_BYTES, backupCount=_FILE_BACKUPS, encoding="utf-8", delay=False
-        )
+        file = LogFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
     except OSError as error:
         if path.parent.is_dir():
             _warn(f"cannot write the log file [{path}]: {error.strerror}")

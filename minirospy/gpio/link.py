@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from minirospy import private_files
 from minirospy.errors import BoardError
 from minirospy.gpio.model import Function, Operation, Pin, Position, Setup, Write
 from minirospy.gpio.place import Place
@@ -324,7 +325,7 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
     flags = 0
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    with place.log_path.open("ab") as log:
+    with private_files.open_text(place.log_path, "a") as log:
         process = subprocess.Popen(
             [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
             stdin=subprocess.DEVNULL,

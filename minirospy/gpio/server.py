@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from minirospy import private_files
 from minirospy.gpio.model import BoardModel, Operation, OperationError
 from minirospy.gpio.place import Place
 from minirospy.gpio.protocol import (
@@ -200,8 +201,7 @@ def _saved(place: Place) -> BoardModel:
 def _write_private(path: Path, data: bytes) -> None:
     """Replace ``path`` whole, readable by this user only."""
     fresh = path.with_name(path.name + ".new")
-    fresh.unlink(missing_ok=True)
-    with os.fdopen(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+    with os.fdopen(private_files.create_file(fresh), "wb") as file:
         file.write(data)
     fresh.replace(path)
 
@@ -210,7 +210,7 @@ def _write_private(path: Path, data: bytes) -> None:
 def _locked(place: Place) -> Iterator[bool]:
     """Whether this process got the board's lock; waits a little for one that is about to end."""
     deadline = time.monotonic() + LOCK_PATIENCE
-    with os.fdopen(os.open(place.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:
+    with os.fdopen(private_files.open_file(place.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:
         while not (owned := _try_lock(file.fileno())):
             if time.monotonic() > deadline or _somebody_answers(place):
                 break

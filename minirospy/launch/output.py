@@ -12,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
+from minirospy import private_files
+
 __all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
@@ -54,7 +56,8 @@ class Output:
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            path.write_text("".join(self._unlogged), encoding="utf-8")
+            with private_files.open_text(path, "w") as file:
+                file.write("".join(self._unlogged))
             self._log = path
         finally:
             self._unlogged.clear()
@@ -79,7 +82,7 @@ class Output:
         if self._log is None:
             self._unlogged.append(line)
             return
-        with contextlib.suppress(OSError), self._log.open("a", encoding="utf-8") as file:
+        with contextlib.suppress(OSError), private_files.open_text(self._log, "a") as file:
             file.write(line)
 
 

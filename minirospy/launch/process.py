@@ -12,8 +12,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
+from minirospy import private_files
 from minirospy.errors import MinirospyError
 from minirospy.launch import guardian
 from minirospy.launch.spec import NodeSpec
@@ -177,10 +178,9 @@ def _opened(path: Path | None) -> Any:
     if path is None:
         yield None
         return
-    file: IO[bytes]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = path.open("ab")
+        file = private_files.open_text(path, "a")
     except OSError as error:
         raise MinirospyError(f"cannot write the log file {path}: {error.strerror}") from error
     with file:

@@ -9,15 +9,30 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from io import TextIOWrapper
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
+from typing import cast
 
-__all__ = ["LogFile"]
+from minirospy import private_files
+
+__all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
 
 
-class LogFile(RotatingFileHandler):
+class LogFileHandler(RotatingFileHandler):
+    """A handler of logging that follows no link: a log file's name can be predicted."""
+
+    def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
+        """``most_bytes`` 0: no limit. Raises OSError."""
+        super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
+
+    def _open(self) -> TextIOWrapper:
+        return cast("TextIOWrapper", private_files.open_text(Path(self.baseFilename), "a"))
+
+
+class LogFile(LogFileHandler):
     """``path``, of ``most_bytes`` at most, with three older ones beside it.
 
     Records of logging come as to any handler, warnings and worse written at once; :meth:`line` and :meth:`text`
@@ -25,7 +40,7 @@ class LogFile(RotatingFileHandler):
     """
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
-        super().__init__(path, maxBytes=most_bytes, backupCount=3, encoding="utf-8")
+        super().__init__(path, most_bytes, older_files=3)
         self.setFormatter(_Formatter(self._stamp))
         self._line_head = f"[{name}][INFO] "
         self._lines: list[str] = []

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import ClassVar
 from xml.etree import ElementTree
 
+from minirospy import private_files
+
 __all__ = [
     "Result",
     "TestCaseResult",
@@ -185,7 +187,8 @@ class Result:
     def write(self, file: Path) -> None:
         """Write the file, as a whole or not at all."""
         part = file.with_name(f"{file.name}.part")
-        part.write_bytes(self.xml())
+        with os.fdopen(private_files.create_file(part, 0o666), "wb") as stream:
+            stream.write(self.xml())
         part.replace(file)
 
 

@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import minirospy
+from minirospy import private_files
 from minirospy.cli.command import Parser, run, warn
 from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
@@ -188,10 +189,11 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
 
 
 def _write_pid(path: Path) -> None:
-    """For scripts that look there, as in ROS, whom to end."""
+    """Write the pid where scripts, as in ROS, look for it."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(str(os.getpid()))
+        with private_files.open_text(path, "w") as file:
+            file.write(str(os.getpid()))
 
 
 async def _run(

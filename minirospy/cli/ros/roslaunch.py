@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from minirospy import private_files
 from minirospy.cli.command import Parser, run
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
@@ -74,7 +75,8 @@ def _run(
 
     if options.pid:
         try:
-            Path(options.pid).write_text(f"{os.getpid()}\n", encoding="utf-8")
+            with private_files.open_text(Path(options.pid), "w") as pid_file:
+                pid_file.write(f"{os.getpid()}\n")
         except OSError as error:
             raise MinirospyError(f"cannot write [{options.pid}]: {error.strerror}") from error
     output = Output(title=not options.disable_title)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy import private_files
 from minirospy.cli.command import Parser, run
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
@@ -98,7 +99,8 @@ def _rostest(words: list[str]) -> int:
         print()
     status = _told(test.own, test.results, "ROSTEST", output)
     log_file.parent.mkdir(parents=True, exist_ok=True)
-    log_file.write_text(test.own.system_out, encoding="utf-8")
+    with private_files.open_text(log_file, "w") as stream:
+        stream.write(test.own.system_out)
     print(f"rostest log file is in {log_file}")
     return status
 

@@ -23,11 +23,12 @@ def configure_logging(
     from pathlib import Path
 
     from minirospy.compat.rospkg.environment import get_log_dir
+    from minirospy.runtime.log_file import LogFileHandler
 
     path = Path(get_log_dir(env)) / (filename or f"{logname}-{os.getpid()}.log")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handler = logging.FileHandler(path, encoding="utf-8")
+        handler = LogFileHandler(path)
     except OSError as error:
         raise LoggingException(f"cannot write the log file [{path}]: {error.strerror}") from error
     handler.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 
 from minirospy.environment import DEFAULT_MASTER_PORT
+from minirospy.private_files import open_text
 
 __all__ = ["NAME", "configure_logging", "main", "write_pid_file"]
 
@@ -22,7 +24,7 @@ def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | N
         home = os.environ.get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
         options_pid_fn = os.path.join(home, f"roscore-{port or DEFAULT_MASTER_PORT}.pid")
     if options_pid_fn:
-        with open(os.path.expanduser(options_pid_fn), "w", encoding="utf-8") as file:
+        with open_text(Path(options_pid_fn).expanduser(), "w") as file:
             file.write(str(os.getpid()))
 
 
