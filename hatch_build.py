@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from hatchling.builders.config import BuilderConfig
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class CompileDefinitions(BuildHookInterface):
+class CompileDefinitions(BuildHookInterface[BuilderConfig]):
     """Runs before each build of a wheel."""
 
     PLUGIN_NAME = "custom"

@@ -62,7 +62,7 @@ def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def _own_environment(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _board_folder: Path
-) -> Iterator[None]:
+) -> None:
     """No ROS variable of the outside gets in; files go to a temporary folder, sockets to loopback."""
     home: Path = tmp_path_factory.mktemp("ros")
     for name in list(os.environ):

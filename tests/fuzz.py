@@ -150,7 +150,7 @@ def seeds() -> list[bytes]:
 
 def with_atheris(minutes: float) -> int:
     """Coverage-guided; does not return on a finding."""
-    import atheris  # type: ignore[import-not-found, unused-ignore]
+    import atheris  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     with atheris.instrument_imports(include=["minirospy"]):
         import minirospy.runtime.master  # noqa: F401

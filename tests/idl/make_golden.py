@@ -8,14 +8,15 @@ The types of packages that Debian does not have come from golden_elsewhere.json:
 
 import importlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 HERE = Path(__file__).parent
 MSGS = HERE.parents[1] / "msgs"
 
 
-def types():
-    """kind, pkg/Name of every definition; the messages of an action are seven."""
+def types() -> Iterator[tuple[str, str]]:
+    """Yield the kind and pkg/Name of every definition; the messages of an action are seven."""
     for folder in sorted(MSGS.iterdir()):
         for path in sorted(folder.glob("*/*.*")):
             names = [path.stem]
@@ -30,9 +31,9 @@ def types():
 PARTS = ["Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback"]
 
 
-def main():
+def main() -> None:
     elsewhere = json.loads((HERE / "golden_elsewhere.json").read_text())
-    golden = {"msg": {}, "srv": {}}
+    golden: dict[str, dict[str, str]] = {"msg": {}, "srv": {}}
     for kind, full_name in types():
         package, name = full_name.split("/")
         try:

@@ -1,5 +1,9 @@
 """A node with something of everything for the tools to show; runs on rospy and on ours alike."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from geometry_msgs.msg import Point32, PolygonStamped
 from sensor_msgs.msg import Image, JointState, LaserScan
@@ -19,16 +23,16 @@ from std_srvs.srv import Empty as EmptySrv
 from std_srvs.srv import SetBool, Trigger
 
 rospy.init_node("scene")
-kept = []
+kept: list[object] = []
 
 
-def latch(topic, message):
+def latch(topic: str, message: Any) -> None:
     publisher = rospy.Publisher(topic, type(message), queue_size=1, latch=True)
     publisher.publish(message)
     kept.append(publisher)
 
 
-def fail(request):
+def fail(request: object) -> Any:
     raise ValueError("bad thing")
 
 

@@ -26,7 +26,7 @@ __all__ = [
     "struct_I",
 ]
 
-struct_I = struct.Struct("<I")  # noqa: N816 - genpy's name
+struct_I = struct.Struct("<I")
 
 SIMPLE_TYPES_DICT = {
     "int8": "b", "uint8": "B", "bool": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",

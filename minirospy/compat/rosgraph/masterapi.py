@@ -1,4 +1,3 @@
-# ruff: noqa: N802 - the names are those of the API
 """The master as Python code asks it; answers as ROS's own lists. Source: http://wiki.ros.org/ROS/Master_API."""
 
 from __future__ import annotations

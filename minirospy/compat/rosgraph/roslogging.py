@@ -47,4 +47,4 @@ _logging_to_rospy_names = {
     "ERROR": ("ERROR", "\033[31m"),
     "CRITICAL": ("FATAL", "\033[31m"),
 }
-_defaultFormatter = logging.Formatter()  # noqa: N816 - rosgraph's name
+_defaultFormatter = logging.Formatter()

@@ -125,7 +125,7 @@ class ROSLaunchRunner:
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
         )
 
-    def add_process_listener(self, l: ProcessListener) -> None:  # noqa: E741 - ROS's name
+    def add_process_listener(self, l: ProcessListener) -> None:
         """Have it told of each end."""
         self._launcher.listeners.append(l)
 

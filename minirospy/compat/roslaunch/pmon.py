@@ -271,7 +271,7 @@ class ProcessMonitor:
         """No further process comes: the monitor ends with the last one."""
         self._launcher.end_with_nodes()
 
-    def add_process_listener(self, l: ProcessListener) -> None:  # noqa: E741 - ROS's name
+    def add_process_listener(self, l: ProcessListener) -> None:
         """Have it told of each end."""
         self._launcher.listeners.append(l)
 

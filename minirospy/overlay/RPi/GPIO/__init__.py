@@ -1,5 +1,4 @@
 """RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
-# ruff: noqa: N999 - the name of the real package
 
 from minirospy.compat import rpi as _rpi  # noqa: F401 - warns where a Raspberry Pi lacks its library
 from minirospy.gpio.rpigpio import BCM as BCM
