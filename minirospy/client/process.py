@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["NodeProcess", "process"]
 
 _T = TypeVar("_T")
-_LEAVE_SECONDS, _LEAVE_AT_ONCE_SECONDS, _HOOKS_SECONDS = 3.0, 0.6, 3.0
-"""How long leaving the graph may take, after a signal, and the hooks of a shutdown whose program has ended meanwhile."""
+_HOOKS_SECONDS = 3.0
+"""How long the hooks of a shutdown may take whose program has ended meanwhile."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
@@ -245,12 +245,11 @@ class NodeProcess(Identity, Life):
         super().spin()
 
     def leave(self) -> None:
-        """Leave the graph."""
+        """Leave the graph. Takes as long as the master answers: see Node.close(), which sets the limits."""
         if self._made and self._loop:
-            seconds = _LEAVE_AT_ONCE_SECONDS if self.signals.is_ended else _LEAVE_SECONDS
             try:
-                self._loop.run(self._made.close(), seconds)
-            except (TimeoutError, RuntimeError) as error:
+                self._loop.run(self._made.close())
+            except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
             self._loop.close()
         if self._master:
@@ -301,7 +300,8 @@ class NodeProcess(Identity, Life):
     def _at_exit(self) -> None:
         """The program has ended. Where another thread shuts down, let it take the node out of the graph first."""
         self.signal_shutdown("atexit")
-        self.gone.wait(_HOOKS_SECONDS)
+        if self.shutting_down.wait(_HOOKS_SECONDS):
+            self.gone.wait()
         self.signals.at_exit()
 
     def _asked_to_shut_down(self, reason: str) -> None:

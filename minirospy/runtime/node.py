@@ -10,15 +10,24 @@ import asyncio
 import contextlib
 import logging
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 from weakref import WeakValueDictionary
 
 from minirospy.environment import Environment
-from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused, RpcUnreachable, WireError
+from minirospy.errors import (
+    MasterUnreachableError,
+    RpcError,
+    RpcFault,
+    RpcProtocolError,
+    RpcRefused,
+    RpcUnreachable,
+    WireError,
+)
 from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.links import Readers
+from minirospy.runtime.master_proxy import unwrap
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.services import Handler, ServiceServer
@@ -31,7 +40,17 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_UNREGISTER_SECONDS = 1.0
+_CALL_SECONDS = 5.0
+_SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
+"""A closing node gives up on a master that answers nothing for this long; the shorter limit is for one that was already
+silent before. There is no limit on the whole: a busy master that answers call after call is waited for."""
+
+_NOTICE_SECONDS = 3.0
+"""A node that is still waiting for the master after this says so."""
+
+_CALLS_AT_ONCE = 100
+"""Unregistrations in one system.multicall."""
+
 _MOST_IDLE = 200
 """Clients of the Slave API that are connected and ask nothing; a graph has about as many as this node has peers."""
 
@@ -43,6 +62,8 @@ _ASK_AGAIN_SECONDS = 0.5
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
 """What a part is to the master, as the names of its calls have it ("Publisher"), and its topic or name."""
+_Call: TypeAlias = tuple[str, tuple[Any, ...]]
+"""A method of the Master API, and its arguments after the caller's name."""
 
 
 class Node:
@@ -105,6 +126,7 @@ class Node:
         self.unix_name = ""
         """Where topics are served to processes of this machine; "" where they are not."""
         self._watching: asyncio.Task[None] | None = None
+        self._is_master_silent = False
         self._closed = False
 
     @property
@@ -140,10 +162,18 @@ class Node:
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
     async def close(self) -> None:
-        """Leave the graph: what is written goes out, the master is told, links end. Idempotent."""
+        """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
+
+        Takes as long as the master answers. One that refuses connections is not waited for; one that answers nothing is
+        given up after ``_SILENT_SECONDS``, and keeps the registrations that it has.
+        """
         if self._closed:
             return
         self._closed = True
+        unregistering = asyncio.ensure_future(self._unregister_all())
+        # Its first call is sent before anything else is done.
+        await asyncio.sleep(0)
+
         watching = [self._watching] if self._watching else []
         for task in watching:
             task.cancel()
@@ -151,11 +181,12 @@ class Node:
             timer.cancel()
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
-            asyncio.wait_for(self._unregister_all(), _UNREGISTER_SECONDS),
+            unregistering,
             *(link.drain(_FLUSH_SECONDS) for link in links),
             *watching,
             return_exceptions=True,
         )
+
         # Its name goes before the port, which the next server takes with a name of its own.
         await self._nearby.close()
         await self._listener.close()
@@ -165,6 +196,7 @@ class Node:
         if self._server:
             await self._server.close()
         await self._rpc.close()
+
         # A master that does not answer has had its time.
         for telling in self._telling:
             telling.cancel()
@@ -175,18 +207,23 @@ class Node:
 
         Raises MasterUnreachableError, or RpcRefused with the master's text.
         """
+        return unwrap(method, await self._call_master(method, self.name, *args))
+
+    async def _call_master(self, method: str, *args: Any) -> Any:
+        """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self.environment.master_uri
+        seconds = self._patience() if self._closed else _CALL_SECONDS
         try:
-            answer = await self._rpc.call(uri, method, self.name, *args)
+            answer = await self._rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
+            self._is_master_silent = True
             raise MasterUnreachableError(uri) from error
-        match answer:
-            case [1, _, value]:
-                return value
-            case [int(code), str(text), *_]:
-                raise RpcRefused(method, code, text)
-            case _:
-                raise RpcRefused(method, -1, f"the master answered {answer!r}")
+        self._is_master_silent = False
+        return answer
+
+    def _patience(self) -> float:
+        """Return how many seconds a closing node waits for one answer of the master."""
+        return _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
 
     async def advertise(self, publication: Publication) -> None:
         """Publish a topic from now on. One publication a topic: a second is a ValueError."""
@@ -382,9 +419,8 @@ class Node:
                 self._known[key] = part
             elif part is None and key in self._known:
                 self._known[key] = None
-                kind, name = key
-                uri = self.service_uri if kind == "Service" else self.uri
-                await self.master(f"unregister{kind}", name, uri)
+                method, args = self._unregistration(key)
+                await self.master(method, *args)
                 # A look at a master that has restarted may have come first.
                 self._known.pop(key, None)
 
@@ -392,6 +428,10 @@ class Node:
         """What the master is to have of one name."""
         kind, name = key
         return None if self._closed else self._tables[kind].get(name)
+
+    def _unregistration(self, key: _Key) -> _Call:
+        kind, name = key
+        return f"unregister{kind}", (name, self.service_uri if kind == "Service" else self.uri)
 
     async def _register(self, part: _Part, *, again: bool) -> None:
         if isinstance(part, Publication):
@@ -473,11 +513,54 @@ class Node:
                 _log.debug("telling the master of %s: %s", key, error)
 
     async def _unregister_all(self) -> None:
-        with contextlib.suppress(MasterUnreachableError):
-            await self._tell_all()
-            for parameter in list(self.parameters):
-                with contextlib.suppress(RpcError):
-                    await self.master("unsubscribeParam", self.uri, parameter)
+        """Take everything back that the master has of this node, in as few calls as it allows."""
+        # A name with a call under way comes after that call, which would undo its unregistration.
+        under_way = {key for key, turn in self._turns.items() if turn.locked()}
+        calls = [self._unregistration(key) for key in self._known if key not in under_way]
+        calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]
+        for key in self._known.keys() - under_way:
+            del self._known[key]
+
+        notice = asyncio.get_running_loop().call_later(_NOTICE_SECONDS, self._log_waiting)
+        tasks = [asyncio.ensure_future(self._call_all(calls))]
+        tasks += [asyncio.ensure_future(self._tell(key)) for key in under_way]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
+            for task in done:
+                if isinstance(error := task.exception(), MasterUnreachableError):
+                    _log.debug("leaving without the master: %s", error)
+        finally:
+            notice.cancel()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _log_waiting(self) -> None:
+        _log.warning(
+            "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s",
+            self.environment.master_uri,
+            self._patience(),
+        )
+
+    async def _call_all(self, calls: Sequence[_Call]) -> None:
+        """Make all calls, whatever is answered; many in one where the master has system.multicall (not all masters do).
+
+        Raises MasterUnreachableError.
+        """
+        for start in range(0, len(calls), _CALLS_AT_ONCE):
+            part = calls[start : start + _CALLS_AT_ONCE]
+            batch = [{"methodName": method, "params": [self.name, *args]} for method, args in part]
+            answers: Any = None
+            if len(part) > 1:
+                with contextlib.suppress(RpcFault, RpcProtocolError):
+                    answers = await self._call_master("system.multicall", batch)
+            if not isinstance(answers, list) or len(answers) != len(part):
+                answers = [None] * len(part)
+            for (method, args), answer in zip(part, answers, strict=True):
+                # What the master has not answered as one of many, such as a fault for a batch that is too long.
+                if not isinstance(answer, list):
+                    with contextlib.suppress(RpcFault, RpcProtocolError, RpcRefused):
+                        await self.master(method, *args)
 
 
 def _is_loopback(host: str) -> bool:

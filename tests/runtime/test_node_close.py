@@ -1,0 +1,200 @@
+"""runtime/node: a node that closes unregisters everything, however slow its master is, and waits for no dead one."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Sequence
+from typing import Any
+
+import pytest
+
+from minirospy.environment import Environment
+from minirospy.errors import RpcFault
+from minirospy.runtime import node as node_module
+from minirospy.runtime.loop import new_event_loop
+from minirospy.runtime.node import Node
+from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.topics import Publication
+from minirospy.wire.tcpros import InterfaceType
+
+STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+TOPICS = 5
+
+
+class FakeMaster:
+    """Records calls and answers them after a pause; ``multicall`` says whether it has system.multicall."""
+
+    def __init__(self, *, multicall: bool, seconds: float = 0.0) -> None:
+        self.calls: list[tuple[str, Sequence[Any]]] = []
+        self.seconds = seconds
+        self.release = asyncio.Event()
+        self.release.set()
+        self._has_multicall = multicall
+        self._server = RpcServer(self._dispatch)
+
+    async def __aenter__(self) -> FakeMaster:
+        await self._server.start()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._server.close()
+
+    @property
+    def uri(self) -> str:
+        return f"http://127.0.0.1:{self._server.port}"
+
+    @property
+    def unregistered(self) -> list[str]:
+        return sorted(args[1] for method, args in self.calls if method.startswith("unregister"))
+
+    async def _dispatch(self, method: str, args: Sequence[Any]) -> Any:
+        self.calls.append((method, args))
+        if not method.startswith("register"):
+            await self.release.wait()
+            await asyncio.sleep(self.seconds)
+        if method == "system.multicall":
+            if not self._has_multicall:
+                raise RpcFault(1, "no such method")
+            self.calls += [(call["methodName"], call["params"]) for call in args[0]]
+            return [[[1, "", 1]] for _ in args[0]]
+        return [1, "", []]
+
+
+def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    loop = new_event_loop()
+    try:
+        loop.run_until_complete(asyncio.wait_for(scene(), 30))
+    finally:
+        loop.run_until_complete(loop.shutdown_asyncgens())
+        loop.close()
+
+
+async def publishing_node(uri: str) -> Node:
+    node = Node("/node", Environment.read({"ROS_MASTER_URI": uri, "ROS_IP": "127.0.0.1"}), watch_seconds=60)
+    await node.start()
+    for number in range(TOPICS):
+        await node.advertise(Publication(f"/t{number}", STRING))
+    return node
+
+
+ALL = [f"/t{number}" for number in range(TOPICS)]
+
+
+def test_close_unregisters_all_names_in_one_call() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            node.parameters.add("/p")
+            master.calls.clear()
+            await node.close()
+            (method, _), *inside = master.calls
+            assert method == "system.multicall"
+            assert inside == [
+                *(("unregisterPublisher", ["/node", topic, node.uri]) for topic in ALL),
+                ("unsubscribeParam", ["/node", node.uri, "/p"]),
+            ]
+
+    run(scene)
+
+
+def test_close_makes_single_calls_where_the_master_lacks_multicall() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=False) as master:
+            node = await publishing_node(master.uri)
+            await node.close()
+            assert master.unregistered == ALL
+
+    run(scene)
+
+
+def test_close_repeats_what_a_multicall_did_not_do() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            dispatch = master._dispatch
+
+            async def refuse_most(method: str, args: Sequence[Any]) -> Any:
+                answer = await dispatch(method, args)
+                if method == "system.multicall":
+                    master.calls = master.calls[: 1 - TOPICS]
+                    answer[1:] = [{"faultCode": 1, "faultString": "too long"}] * (TOPICS - 1)
+                return answer
+
+            master._server.dispatch = refuse_most
+            await node.close()
+            assert master.unregistered == ALL
+
+    run(scene)
+
+
+def test_close_waits_for_a_master_that_answers_slowly() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=False, seconds=0.3) as master:
+            node = await publishing_node(master.uri)
+            await node.close()
+            assert master.unregistered == ALL
+
+    run(scene)
+
+
+def test_close_sends_the_unregistration_before_it_flushes() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            master.release.clear()
+            closing = asyncio.ensure_future(node.close())
+            while "system.multicall" not in [method for method, _ in master.calls]:
+                await asyncio.sleep(0)
+            assert not closing.done()
+            master.release.set()
+            await closing
+
+    run(scene)
+
+
+def test_close_leaves_a_name_with_a_call_under_way_to_the_end_of_that() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            master.calls.clear()
+            master.release.clear()
+            publication = node.publications["/t0"]
+            leaving = asyncio.ensure_future(node.unadvertise(publication))
+            while not master.calls:
+                await asyncio.sleep(0)
+            closing = asyncio.ensure_future(node.close())
+            while len(master.calls) < 2:
+                await asyncio.sleep(0)
+            master.release.set()
+            await asyncio.gather(leaving, closing)
+            assert master.unregistered == ALL
+
+    run(scene)
+
+
+def test_close_gives_up_on_a_master_that_is_silent(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(node_module, "_SILENT_SECONDS", 0.2)
+    monkeypatch.setattr(node_module, "_NOTICE_SECONDS", 0.1)
+
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            master.release.clear()
+            await node.close()
+            assert not master.unregistered
+            master.release.set()
+
+    run(scene)
+    assert "waiting for the master at" in caplog.text
+
+
+def test_close_does_not_wait_for_a_master_that_refuses_connections() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+        # The limit for a silent one would fail the scene's.
+        await node.close()
+
+    run(scene)
