@@ -27,24 +27,25 @@ def execute(goal):
                 rospy.sleep(0.01)
             server.set_preempted(TestResult(number), "stopped")
             return
-    rospy.sleep(0.2)
+    # Feedback and result travel by connections of their own: the test says when the feedback has arrived.
+    sys.stdin.readline()
     server.set_succeeded(TestResult(goal.goal))
 server = actionlib.SimpleActionServer("count", TestAction, execute, False)
 server.start()
 print("ready", flush=True)
-sys.stdin.read()
-rospy.signal_shutdown("")
+rospy.spin()
 """
 
 
 @pytest.fixture
-def server(master: str) -> Iterator[None]:
+def server(master: str) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
         [sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout
     assert process.stdout.readline() == "ready\n"
-    yield
+    yield process
+    process.terminate()
     process.communicate(timeout=30)
 
 
@@ -59,10 +60,34 @@ def ask(answers: str, *words: str) -> tuple[str, str, int]:
     return done.stdout, done.stderr, done.returncode
 
 
-@pytest.mark.usefixtures("server")
+def ask_server(server: subprocess.Popen[str], answers: str, *words: str, until: str) -> tuple[str, str, int]:
+    """Run axclient; the server succeeds once the client has printed a line with ``until``."""
+    process = subprocess.Popen(
+        [*command("axclient"), *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdin
+    assert process.stdout
+    assert server.stdin
+    process.stdin.write(answers)
+    process.stdin.flush()
+    said = ""
+    while until not in said:
+        line = process.stdout.readline()
+        assert line, said + process.communicate(timeout=30)[1]
+        said += line
+    server.stdin.write("succeed\n")
+    server.stdin.flush()
+    rest, errors = process.communicate(timeout=30)
+    return said + rest, errors, process.returncode
+
+
 class TestClient:
-    def test_the_form_of_the_type_that_the_server_has(self) -> None:
-        assert ask("2\n", "/count") == (
+    def test_form_has_the_fields_of_the_servers_type(self, server: subprocess.Popen[str]) -> None:
+        assert ask_server(server, "2\n", "/count", until="100%") == (
             "goal (int32) [0]: Sent\nActive\n"
             "Feedback: feedback: 1  [###############...............] 50%\n"
             "Feedback: feedback: 2  [##############################] 100%\n"
@@ -71,10 +96,11 @@ class TestClient:
             0,
         )
 
-    def test_the_goal_as_yaml_and_the_type_by_name(self) -> None:
-        said, errors, status = ask("", "count", "actionlib/Test", "{goal: 0}")
+    def test_goal_as_yaml_and_type_by_name(self, server: subprocess.Popen[str]) -> None:
+        said, errors, status = ask_server(server, "", "count", "actionlib/Test", "{goal: 0}", until="Active")
         assert (said, errors, status) == ("Sent\nActive\nSucceeded\nresult: 0\n", "", 0)
 
+    @pytest.mark.usefixtures("server")
     def test_wrong_answers_and_names(self) -> None:
         for answers, words, wrong in [
             ("x\n", ["/count"], "field goal must be an integer type"),
@@ -88,6 +114,7 @@ class TestClient:
             assert errors.count("\n") == 1, errors
             assert status == 1
 
+    @pytest.mark.usefixtures("server")
     @pytest.mark.skipif(os.name != "posix", reason="Ctrl-C of a single process")
     def test_ctrl_c_cancels_the_goal(self) -> None:
         process = subprocess.Popen(

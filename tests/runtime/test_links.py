@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import statistics
 import struct
 import threading
 import time
@@ -18,6 +17,7 @@ import pytest
 from minirospy.errors import WireError
 from minirospy.runtime import links
 from minirospy.runtime.loop import LoopThread
+from minirospy.runtime.sockets import is_writable
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 
 KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
@@ -428,9 +428,12 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
 # --- a subscriber that is slower than its publisher
 
 
-def test_who_reads_is_waited_for_rather_than_dropped(
-    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+def test_slow_reader_gets_every_frame_while_it_reads(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The sender's wait for room is never over here, however long another program has the reader's processor."""
+    monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: 0.0, perf_counter=time.perf_counter))
+    monkeypatch.setattr(links, "is_writable", lambda sock, _: is_writable(sock, 30_000))
     link = open_link(loop, pair[0], 10, lambda _: None)
     frames: list[Frame] = []
     reader = read_in_thread(pair[1], frames)
@@ -439,25 +442,27 @@ def test_who_reads_is_waited_for_rather_than_dropped(
     loop.run(link.drain(30))
     loop.loop.call_soon_threadsafe(link.close)
     reader.join(30)
-    # Another program may take the reader's processor away for longer than it is waited for.
-    assert len(frames) + link.dropped == 50_000
-    assert link.dropped < 25_000
-    numbers = [int.from_bytes(frame, "little") for frame in frames]
-    assert numbers == sorted(numbers)
+
+    assert link.dropped == 0
+    assert [int.from_bytes(frame, "little") for frame in frames] == list(range(50_000))
 
 
-def test_who_does_not_read_is_not_waited_for(
-    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+def test_peer_that_does_not_read_is_not_waited_for(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    waits: list[int] = []
+
+    def wait(sock: socket.socket, milliseconds: int) -> bool:
+        waits.append(milliseconds)
+        return is_writable(sock, milliseconds)
+
+    monkeypatch.setattr(links, "is_writable", wait)
     link = open_link(loop, pair[0], 2, lambda _: None)
     frame = serialize_frame(bytes(60_000))
     while not link.dropped:
         link.send(frame)
-    took = []
     for _ in range(1000):
-        begin = time.monotonic()
         link.send(frame)
-        took.append(time.monotonic() - begin)
-    # Each wait would be a millisecond; one may be as long on a machine that stands still.
-    assert statistics.median(took) < 0.0005
+    # TCP finds a little more room for a while, and each time the peer is given another chance.
+    assert 1 <= len(waits) < 20
     assert link.waiting <= 3

@@ -203,9 +203,9 @@ def test_a_request_that_never_ends_is_hung_up_on(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
-    monkeypatch.setattr(rpc_server, "_REQUEST_SECONDS", 0.3)
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/large", "x" * 1_000_000)
+        monkeypatch.setattr(rpc_server, "_REQUEST_SECONDS", 0.3)
         with socket.create_connection(("127.0.0.1", int(master.rsplit(":", 1)[1])), 20) as sock:
             hung_up = False
             while not hung_up:
@@ -213,6 +213,7 @@ def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch
                     sock.sendall(called("getParam", "/x", "/large"))
                 except (BrokenPipeError, ConnectionError):
                     hung_up = True
+        monkeypatch.undo()
         assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
 
 
