@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import UsageError
+from minirospy.escape import escaped, has_controls
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -130,6 +131,9 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
     By hand: importing urllib.parse takes a command a twentieth of its time.
     """
+    # The path goes into the first line of a request, and all of it into lines of logs.
+    if has_controls(uri) or " " in uri:
+        raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")
     address, slash, path = rest.partition("/")
     host, _, port = address.rpartition(":")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment, run_folder
+from minirospy.environment import Environment, run_folder, split_uri
 from minirospy.errors import UsageError
 
 
@@ -125,3 +125,21 @@ def test_run_id_that_is_not_one_folder_is_refused(run_id: object) -> None:
 @pytest.mark.parametrize("run_id", ["a-run", "9c1c52e0-c7b5-11ee-b3b5-0242ac110002", "run_1.2", "my run"])
 def test_run_id_is_a_folder_of_the_logs(run_id: str) -> None:
     assert run_folder(Path("/log"), run_id) == Path("/log") / run_id
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "http://a:1/ HTTP/1.1\r\nX: y",
+        "http://a:1/\nx",
+        "http://a b:1/",
+        "http://a\t:1/",
+        "http://a:1/\x9b",
+        "http://\x1ba:1",
+        "http://a:1/\u2028",
+    ],
+)
+def test_uri_with_control_characters_is_refused(uri: str) -> None:
+    with pytest.raises(ValueError, match="is not of the form") as raised:
+        split_uri(uri)
+    assert str(raised.value).isprintable()

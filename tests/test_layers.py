@@ -20,7 +20,7 @@ LAYERS = [
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
     {"clock", "environment", "names", "private_files", "scanner", "times"},
-    {"errors"},
+    {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 PURE = {"graph", "wire", "idl"}

@@ -32,6 +32,7 @@ from minirospy.errors import (
     UsageError,
     did_you_mean,
 )
+from minirospy.escape import SafeTerminal, escaped
 
 if TYPE_CHECKING:
     from minirospy.introspect.graph import Graph
@@ -147,6 +148,11 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 it stays for the process
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if type(stream) is io.TextIOWrapper and stream.isatty():
+            # What a robot says is shown on a terminal, and never obeyed by it.
+            setattr(sys, name, SafeTerminal.around(stream))
 
 
 def warn(what: str, name: str = "") -> None:
@@ -155,7 +161,7 @@ def warn(what: str, name: str = "") -> None:
 
     why = why_illegal(name) if name else ""
     sys.stdout.flush()
-    print(f"WARNING: {what}{why and f'; {why}'}", file=sys.stderr)
+    print(escaped(f"WARNING: {what}{why and f'; {why}'}", "\n"), file=sys.stderr)
 
 
 def warn_unpublished(graph: Graph, topic: str) -> None:
@@ -168,7 +174,7 @@ def hint_near(name: str, known: Iterable[str]) -> None:
     """A line on stderr, below the warning that ``name`` is waited for: the nearest names, where one is near."""
     near = did_you_mean(name, (each for each in known if each != name))
     if near:
-        print(near.removeprefix("; "), file=sys.stderr)
+        print(escaped(near.removeprefix("; ")), file=sys.stderr)
 
 
 @contextlib.contextmanager
@@ -202,7 +208,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
 def complain(name: str, error: Exception, status: int = 1) -> int:
     """One line on stderr, after all that was printed before; ``status`` comes back."""
     _flush()
-    print(f"{name}: ERROR: {error}", file=sys.stderr)
+    print(escaped(f"{name}: ERROR: {error}", "\n"), file=sys.stderr)
     return status
 
 

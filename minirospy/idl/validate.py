@@ -59,4 +59,5 @@ def check_spec(spec: MessageSpec) -> None:
 def _shown(text: str) -> str:
     """Return a text from a peer for an error's line: printable, and not endless."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
+    # A letter of another script may look like one of ours.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 
+from minirospy.escape import escaped
+
 __all__ = ["Complaints"]
 
 _SECONDS = 10.0
@@ -45,4 +47,6 @@ class Complaints:
             self._held += 1
             return
         self._told += 1
-        self._log.log(level, text, *args, stacklevel=3)
+        # Names and errors of peers: what is not text is ours.
+        shown = [escaped(str(arg)) if isinstance(arg, str | Exception) else arg for arg in args]
+        self._log.log(level, text, *shown, stacklevel=3)

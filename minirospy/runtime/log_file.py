@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import cast
 
 from minirospy import private_files
+from minirospy.escape import escaped
 
 __all__ = ["LogFile", "LogFileHandler"]
 
@@ -50,7 +51,7 @@ class LogFile(LogFileHandler):
 
     def line(self, text: str) -> None:
         """A line of level INFO (on the loop)."""
-        self.text(f"{self._line_head}{self._stamp(time.time())}: {text}")
+        self.text(f"{self._line_head}{self._stamp(time.time())}: {escaped(text)}")
 
     def text(self, text: str) -> None:
         """A line that has its time and level already (on the loop)."""
@@ -122,3 +123,8 @@ class _Formatter(logging.Formatter):
 
     def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802 - logging's
         return self._stamp(record.created)
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
+        # Names and URIs in it are a peer's choice: none may begin another line.
+        record.message = escaped(record.message)
+        return super().formatMessage(record)

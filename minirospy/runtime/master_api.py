@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from minirospy import names
 from minirospy.errors import RpcFault
+from minirospy.escape import escaped, has_controls
 from minirospy.graph.parameters import ParameterTree, check_value
 from minirospy.graph.registry import Registry
 from minirospy.runtime.notifier import PARAMETERS, Notice
@@ -122,6 +123,8 @@ class MasterApi(ABC):
             return [_ERROR, "Error: bad call arity", entry.refused]
         if not isinstance(args[0], str):
             return [_ERROR, "caller_id must be a string", entry.refused]
+        if has_controls(args[0]):
+            return [_ERROR, "caller_id contains illegal chars", entry.refused]
         try:
             return entry.function(*args)
         except _Refusal as refusal:
@@ -139,7 +142,7 @@ class MasterApi(ABC):
 
     def shutdown(self, caller_id: str, msg: str = "") -> Answer:
         """Stop the master."""
-        _log.info("shutdown request from %s: %s", caller_id, msg)
+        _log.info("shutdown request from %s: %s", caller_id, escaped(str(msg)))
         self.stop()
         return [_SUCCESS, "shutdown", 0]
 
@@ -366,7 +369,7 @@ def _name(value: Any, what: str, caller_id: str) -> str:
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
     # rosmaster lets in much that is no legal name: many a robot's topics have a dash.
-    if ":" in value or " " in value:
+    if ":" in value or " " in value or has_controls(value):
         raise _Refusal(f"ERROR: parameter [{what}] contains illegal chars")
     resolved = _resolve(value, caller_id)
     if resolved == "/" and what != "node":
@@ -397,7 +400,7 @@ def _type(value: Any, what: str) -> str:
     """A type ``pkg/Name``, or ``*``."""
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
-    if value != "*" and value.count("/") != 1:
+    if value != "*" and (value.count("/") != 1 or has_controls(value)):
         raise _Refusal(f"ERROR: parameter [{what}] is not a valid package resource name")
     return value
 
@@ -407,6 +410,9 @@ def _uri(value: Any, what: str) -> str:
         raise _Refusal(f"ERROR: parameter [{what}] is not an XMLRPC URI")
     if not value.startswith(("http://", "rosrpc://")):
         raise _Refusal(f"ERROR: parameter [{what}] is not an RPC URI")
+    if " " in value or has_controls(value):
+        # It becomes part of the requests to the node, and of lines of logs.
+        raise _Refusal(f"ERROR: parameter [{what}] contains illegal chars")
     return value
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from minirospy.environment import Environment
 from minirospy.errors import DeserializationError, ServiceException
+from minirospy.escape import escaped
 from minirospy.runtime.log_file import LogFile
 from minirospy.runtime.node import Node
 from minirospy.runtime.services import AsyncHandler, LoopServiceServer
@@ -132,10 +133,12 @@ class RosoutNode:
             return
         stamp = message.header.stamp
         topics = "" if self._omits_topics() else f" [topics: {', '.join(message.topics)}]"
-        file.text(
+        head = (
             f"{stamp.secs}.{stamp.nsecs:09d} {_LEVELS.get(message.level, message.level)} {message.name} "
-            f"[{message.file}:{message.line}({message.function})]{topics} {message.msg}"
+            f"[{message.file}:{message.line}({message.function})]{topics} "
         )
+        # A text may have several lines, as in the real file; nothing else may.
+        file.text(escaped(head) + escaped(message.msg, "\n\t"))
 
 
 def _bytes_of(message: Any) -> bytes:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from minirospy.errors import HandshakeRefused, WireError
+from minirospy.escape import escaped, has_controls
 from minirospy.wire.header import Header
 
 __all__ = [
@@ -24,6 +25,8 @@ __all__ = [
     "service_header",
     "subscriber_header",
 ]
+
+_NOT_A_NAME = "field [callerid] contains illegal chars"
 
 ANY = "*"
 """The type and md5sum of one who takes whatever comes."""
@@ -76,6 +79,8 @@ def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | 
         if name not in fields:
             return f"Missing required '{name}' field"
     theirs, their_type = fields["md5sum"], fields.get("type", ANY)
+    if has_controls(fields["callerid"]):
+        return _NOT_A_NAME
     if _fits(theirs, type_):
         return None
     if their_type not in (ANY, type_.name):
@@ -92,7 +97,7 @@ def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
     for name in ("md5sum", "type"):
         if name not in fields:
             raise HandshakeRefused(f"publisher of [{topic}] sent a connection header without [{name}]")
-    theirs, their_type = fields["md5sum"], fields["type"]
+    theirs, their_type = escaped(fields["md5sum"]), escaped(fields["type"])
     if _fits(theirs, type_):
         return
     if their_type not in (ANY, type_.name):
@@ -141,6 +146,8 @@ def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
+    if has_controls(fields["callerid"]):
+        return _NOT_A_NAME
     if fields["md5sum"] not in (ANY, type_.md5sum):
         return (
             f"request from [{fields['callerid']}]: md5sums do not match: "
@@ -158,7 +165,7 @@ def check_service(fields: Header) -> None:
 
 def _raise_error_field(fields: Header) -> None:
     if "error" in fields:
-        raise HandshakeRefused(fields["error"])
+        raise HandshakeRefused(escaped(fields["error"], "\n"))
 
 
 def _fits(md5sum: str, type_: InterfaceType) -> bool:

@@ -218,7 +218,7 @@ while not (publisher.get_num_connections() and subscriber.get_num_connections())
 message = Log(name="/talk", file="f.py", function="g", line=7, topics=["/t", "/rosout"])
 message.header.stamp = rospy.Time(5, 6)
 for omit, message.level, message.msg in (
-    (False, 4, "a\\nb \u00e9"), (True, 2, "no topics"), (1, 16, "no boolean"), (False, 1, "last")
+    (False, 4, "a\\nb \u00e9"), (True, 2, "no topics"), (1, 16, "no boolean"), (False, 1, "last\\x1b[2J")
 ):
     rospy.set_param("/rosout/omit_topics", omit)
     publisher.publish(message)
@@ -236,7 +236,7 @@ def test_what_nodes_log(start: Start) -> None:
         "5.000000006 WARN /talk [f.py:7(g)] [topics: /t, /rosout] a\nb \u00e9\n"
         "5.000000006 INFO /talk [f.py:7(g)] no topics\n"
         "5.000000006 FATAL /talk [f.py:7(g)] [topics: /t, /rosout] no boolean\n"
-        "5.000000006 DEBUG /talk [f.py:7(g)] [topics: /t, /rosout] last\n"
+        "5.000000006 DEBUG /talk [f.py:7(g)] [topics: /t, /rosout] last\\x1b[2J\n"
     )
 
 

@@ -45,3 +45,9 @@ def test_so_many_lines_as_were_asked_for_and_the_number_of_the_others_at_the_end
         "100 % 2",
         "5 more like the last ones",
     ]
+
+
+def test_text_of_a_peer_does_not_start_another_line(caplog: pytest.LogCaptureFixture) -> None:
+    log = Complaints(complaints.logging.getLogger("test-complaints"), 3)
+    log.warning("%s: %s, %d", "/a\nWARN forged\x1b[2J", OSError("x\ny"), 1)
+    assert caplog.records[0].getMessage() == "/a\\nWARN forged\\x1b[2J: x\\ny, 1"

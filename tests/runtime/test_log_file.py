@@ -96,3 +96,17 @@ def test_a_disk_that_is_full_for_a_while_hurts_nobody(tmp_path: Path) -> None:
     warn("lost")
     file.close()
     assert (tmp_path / "master.log").read_text().endswith(": kept\n")
+
+
+def test_text_of_a_peer_does_not_start_another_line(tmp_path: Path) -> None:
+    async def scene() -> None:
+        file = LogFile(tmp_path / "master.log", 1_000_000, "master")
+        file.line("+PUB [/a\n+PUB [/forged]] /x\x1b[2J")
+        record = logging.LogRecord("x", logging.WARNING, "", 0, "from %s", ("/a\nforged\x9b",), None)
+        file.handle(record)
+        file.close()
+
+    asyncio.run(scene())
+    first, second = (tmp_path / "master.log").read_text().splitlines()
+    assert first.endswith(": +PUB [/a\\n+PUB [/forged]] /x\\x1b[2J")
+    assert second.endswith(": from /a\\nforged\\x9b")

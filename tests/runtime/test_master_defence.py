@@ -126,6 +126,26 @@ BAD: dict[str, tuple[bytes, str]] = {
         called("registerPublisher", "/x", "/t a", "a/B", "http://x:1/"),
         "ERROR: parameter [topic] contains illegal chars",
     ),
+    "a name with a line feed": (
+        called("registerPublisher", "/x", "/t\n+PUB [/forged]", "a/B", "http://x:1/"),
+        "ERROR: parameter [topic] contains illegal chars",
+    ),
+    "a name with a terminal's control sequence of one character": (
+        called("registerService", "/x", "/t\x9b2J", "rosrpc://x:1", "http://x:1/"),
+        "ERROR: parameter [service] contains illegal chars",
+    ),
+    "a caller_id with a line feed": (
+        called("registerPublisher", "/x\ny", "/t", "a/B", "http://x:1/"),
+        "caller_id contains illegal chars",
+    ),
+    "a type with a line feed": (
+        called("registerPublisher", "/x", "/t", "a/B\n", "http://x:1/"),
+        "ERROR: parameter [topic_type] is not a valid package resource name",
+    ),
+    "a URI with a header of HTTP": (
+        called("registerPublisher", "/x", "/t", "a/B", "http://x:1/ HTTP/1.1\r\nX: y"),
+        "ERROR: parameter [caller_api] contains illegal chars",
+    ),
     "a URI that is none": (
         called("registerPublisher", "/x", "/t", "a/B", "file:///x"),
         "ERROR: parameter [caller_api] is not an RPC URI",

@@ -93,3 +93,19 @@ def test_services() -> None:
     check_service(service_header("/s", BOOL, "/server", "a/BRequest", "a/BResponse"))
     with pytest.raises(HandshakeRefused):
         check_service({"error": "no"})
+
+
+@pytest.mark.parametrize("caller_id", ["/a\nb", "/a\x1b[2J", "/a\r", "/a\x9b"])
+def test_caller_id_with_control_characters_is_refused(caller_id: str) -> None:
+    why = "field [callerid] contains illegal chars"
+    assert check_subscriber(subscriber_header("/t", BOOL, caller_id), "/t", BOOL) == why
+    assert check_service_client(service_client_header("/s", BOOL.md5sum, caller_id), BOOL) == why
+
+
+def test_text_of_a_refusal_is_escaped() -> None:
+    with pytest.raises(HandshakeRefused, match=r"^no\\x1b\[2J$"):
+        check_publisher({"error": "no\x1b[2J"}, "/t", BOOL)
+    evil = InterfaceType("a/B\x1b", "m\x1b")
+    with pytest.raises(HandshakeRefused, match=r"\\x1b") as raised:
+        check_publisher(publisher_header("/t", evil, "/pub", latch=False), "/t", BOOL)
+    assert "\x1b" not in str(raised.value)
