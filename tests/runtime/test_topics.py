@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from minirospy.environment import Environment
-from minirospy.errors import HandshakeRefused, MasterUnreachableError, WireError
+from minirospy.errors import HandshakeRefused, MasterUnreachableError, RpcUnreachable, WireError
 from minirospy.runtime import tcp, topics
 from minirospy.runtime.loop import new_event_loop
 from minirospy.runtime.master import Master
@@ -26,6 +26,7 @@ from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType
 from tests.conftest import free_port
+from tests.manual_loop import ManualLoop, run_manually
 
 BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
@@ -575,23 +576,30 @@ def test_the_end_of_the_node_does_not_overtake_a_registration(
     run(scene)
 
 
-def test_a_node_does_not_wait_long_for_a_master_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is on its way, and what waits for its turn behind it, is given up."""
+def test_close_gives_up_a_registration_that_a_silent_master_leaves_unanswered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What is on its way, and what waits for its turn behind it: within the documented ten seconds."""
 
-    async def scene() -> None:
+    async def scene(clock: ManualLoop) -> None:
         async with graph("/a") as (_, (a,)):
 
-            async def never(method: str, *args: Any) -> Any:
-                await asyncio.Event().wait()
+            async def silent(uri: str, method: str, *_: Any, timeout: float) -> Any:
+                await asyncio.sleep(timeout)
+                raise RpcUnreachable(uri, f"{method}: timed out")
 
-            monkeypatch.setattr(a, "master", never)
+            monkeypatch.setattr(a._rpc, "call", silent)
             offering = asyncio.ensure_future(offer(a, "publisher"))
             await asyncio.sleep(0)
-            await asyncio.wait_for(a.close(), 10)
-            with pytest.raises(asyncio.CancelledError):
-                await offering
+            closing = asyncio.ensure_future(a.close())
+            for _ in range(20):
+                await clock.advance(0.5)
+            assert closing.done()
+            assert isinstance(
+                (await asyncio.gather(offering, return_exceptions=True))[0], MasterUnreachableError
+            )
 
-    run(scene)
+    run_manually(scene)
 
 
 @pytest.mark.parametrize("kind", KINDS)
