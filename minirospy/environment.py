@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import UsageError
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 __all__ = [
     "DEFAULT_MASTER_PORT",
     "DISTRO",
+    "LOOPBACK",
     "ROS_VERSION",
     "Environment",
+    "export_local",
+    "is_local",
     "is_own_host",
     "master_and_namespace",
     "run_folder",
@@ -30,6 +33,8 @@ __all__ = [
 ]
 
 DEFAULT_MASTER_PORT = 11311
+
+_SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
 """What /rosdistro says: the ROS 1 distribution whose behaviour is ours; with its line end, as ROS sets it."""
@@ -41,6 +46,11 @@ ROS_VERSION = "1.17.0\n"
 _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
+LOOPBACK = "127.0.0.0/8, ::1"
+"""Whose connections a local process takes. That it listens on loopback alone is not enough: a kernel with
+net.ipv4.route_localnet, as hosts of containers set it, lets neighbours in."""
+
+
 class Environment(NamedTuple):
     """Where the master is, how this process is reached, and where its files go.
 
@@ -48,6 +58,7 @@ class Environment(NamedTuple):
     (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
     that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
     the networks whose machines may connect ("": all). ``transport`` "tcp" keeps connections off Unix sockets.
+    ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
     """
 
     master_uri: str
@@ -60,23 +71,25 @@ class Environment(NamedTuple):
     ports: range | None = None
     allow: str = ""
     transport: str = ""
+    local: bool = False
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """The record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
         Raises UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
-        more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, and on a MINIROSPY_TRANSPORT
-        that there is not.
+        more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
+        or MINIROSPY_LOCAL, and on a master of another machine with MINIROSPY_LOCAL=1.
         """
         from pathlib import Path
 
         environ = os.environ if environ is None else environ
         home = Path(environ.get("ROS_HOME") or Path.home() / ".ros")
         master_uri, namespace = master_and_namespace(environ, **overrides)
-        return cls(
+        local = is_local(environ)
+        environment = cls(
             master_uri=master_uri,
-            host=overrides.get("host") or _advertised_host(environ),
+            host="localhost" if local else overrides.get("host") or _advertised_host(environ),
             namespace=namespace,
             home=home,
             log_dir=Path(environ.get("ROS_LOG_DIR") or home / "log"),
@@ -86,6 +99,11 @@ class Environment(NamedTuple):
             allow=environ.get("MINIROSPY_ALLOW", ""),
             transport=_checked_transport(environ.get("MINIROSPY_TRANSPORT", "")),
         )
+        return environment.on_this_machine() if local else environment
+
+    def on_this_machine(self) -> Environment:
+        """Return the record of a process that listens on loopback, advertises localhost and refuses other machines."""
+        return self._replace(host="localhost", allow=LOOPBACK, local=True)
 
     @property
     def bind_host(self) -> str:
@@ -123,7 +141,29 @@ def master_and_namespace(
 ) -> tuple[str, str]:
     """The master's URI and the namespace of names: all that a tool needs which only asks. As Environment.read."""
     uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
-    return _checked_uri(uri), "/" + (namespace or environ.get("ROS_NAMESPACE") or "").strip("/")
+    uri = _checked_uri(uri)
+    if is_local(environ):
+        uri = _local_uri(uri)
+    return uri, "/" + (namespace or environ.get("ROS_NAMESPACE") or "").strip("/")
+
+
+def is_local(environ: Mapping[str, str]) -> bool:
+    """Return whether MINIROSPY_LOCAL keeps this process on this machine. Raises UsageError on an unknown value."""
+    text = environ.get("MINIROSPY_LOCAL", "")
+    if text.lower() not in _SWITCH:
+        raise UsageError(f"MINIROSPY_LOCAL [{text}] is neither 1 nor 0")
+    return _SWITCH[text.lower()]
+
+
+def export_local(environ: MutableMapping[str, str]) -> None:
+    """Have the programs that are started with ``environ`` stay on this machine, where MINIROSPY_LOCAL asks for it.
+
+    Those of other ROS clients do not know the variable. Raises UsageError as Environment.read.
+    """
+    if is_local(environ):
+        environ["ROS_MASTER_URI"], _ = master_and_namespace(environ)
+        environ["ROS_HOSTNAME"] = "localhost"
+        environ.pop("ROS_IP", None)
 
 
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
@@ -182,6 +222,19 @@ def _checked_uri(uri: str) -> str:
             f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311"
         ) from error
     return uri
+
+
+def _local_uri(uri: str) -> str:
+    """Return the URI of a master of this machine as one that listens on loopback alone is reached."""
+    host, port, path = split_uri(uri)
+    if host in ("localhost", "127.0.0.1", "::1"):
+        return uri
+    if is_own_host(host):
+        return f"http://localhost:{port}{path}"
+    raise UsageError(
+        f"MINIROSPY_LOCAL=1 keeps everything on this machine, but the master [{uri}] is on another one: "
+        f"`unset MINIROSPY_LOCAL`, or `export ROS_MASTER_URI=http://localhost:{port}`"
+    )
 
 
 def _checked_host(host: str, variable: str) -> str:

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.environment import Environment, run_folder, split_uri
+from minirospy.environment import (
+    LOOPBACK,
+    Environment,
+    export_local,
+    is_local,
+    master_and_namespace,
+    run_folder,
+    split_uri,
+)
 from minirospy.errors import UsageError
 
 
@@ -143,3 +151,75 @@ def test_uri_with_control_characters_is_refused(uri: str) -> None:
     with pytest.raises(ValueError, match="is not of the form") as raised:
         split_uri(uri)
     assert str(raised.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "elsewhere", [{}, {"ROS_IP": "192.0.2.7"}, {"ROS_HOSTNAME": "robot"}, {"MINIROSPY_ALLOW": "192.0.2.7"}]
+)
+def test_minirospy_local_wins_over_what_leads_elsewhere(elsewhere: dict[str, str]) -> None:
+    environment = Environment.read({"MINIROSPY_LOCAL": "1", **elsewhere}, host="here")
+    assert (environment.host, environment.bind_host, environment.allow) == (
+        "localhost",
+        "127.0.0.1",
+        LOOPBACK,
+    )
+    assert environment.local
+    assert environment.master_uri == "http://localhost:11311"
+    assert not Environment.read({"MINIROSPY_LOCAL": "0", **elsewhere}).local
+
+
+def test_minirospy_local_with_ipv6_binds_its_loopback() -> None:
+    assert Environment.read({"MINIROSPY_LOCAL": "1", "ROS_IPV6": "on"}).bind_host == "::1"
+
+
+@pytest.mark.parametrize(
+    ("uri", "reached"),
+    [
+        (f"http://{socket.gethostname()}:11411/", "http://localhost:11411/"),
+        ("http://127.0.1.1:11411", "http://localhost:11411/"),
+        ("http://localhost:11411", "http://localhost:11411"),
+        ("http://[::1]:11411", "http://[::1]:11411"),
+    ],
+)
+def test_minirospy_local_reaches_a_master_of_this_machine_by_loopback(uri: str, reached: str) -> None:
+    """A master that listens on 127.0.0.1 is not at the address that this machine's name has."""
+    environ = {"MINIROSPY_LOCAL": "1", "ROS_MASTER_URI": uri}
+    assert Environment.read(environ).master_uri == reached
+    assert master_and_namespace(environ)[0] == reached
+
+
+def test_minirospy_local_refuses_a_master_of_another_machine() -> None:
+    environ = {"MINIROSPY_LOCAL": "1", "ROS_MASTER_URI": "http://192.0.2.200:11311"}
+    for read in (Environment.read, master_and_namespace, export_local):
+        with pytest.raises(UsageError) as refused:
+            read(environ)
+        assert str(refused.value) == (
+            "MINIROSPY_LOCAL=1 keeps everything on this machine, but the master [http://192.0.2.200:11311] is on another "
+            "one: `unset MINIROSPY_LOCAL`, or `export ROS_MASTER_URI=http://localhost:11311`"
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "local"), [("", False), ("0", False), ("off", False), ("1", True), ("ON", True)]
+)
+def test_minirospy_local_is_on_or_off(text: str, local: bool) -> None:
+    assert is_local({"MINIROSPY_LOCAL": text}) == local
+
+
+def test_an_unknown_minirospy_local_is_refused() -> None:
+    """A misspelt value must not open what was meant to be closed."""
+    with pytest.raises(UsageError, match=r"MINIROSPY_LOCAL \[yes please\] is neither 1 nor 0"):
+        Environment.read({"MINIROSPY_LOCAL": "yes please"})
+
+
+def test_export_local_keeps_nodes_of_other_clients_on_this_machine() -> None:
+    environ = {"ROS_IP": "192.0.2.7"}
+    export_local(environ)
+    assert environ == {"ROS_IP": "192.0.2.7"}
+    environ = {"MINIROSPY_LOCAL": "1", "ROS_IP": "192.0.2.7", "ROS_MASTER_URI": "http://127.0.1.1:11411"}
+    export_local(environ)
+    assert environ == {
+        "MINIROSPY_LOCAL": "1",
+        "ROS_HOSTNAME": "localhost",
+        "ROS_MASTER_URI": "http://localhost:11411/",
+    }

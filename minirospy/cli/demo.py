@@ -87,7 +87,7 @@ def _own_world() -> Iterator[Path]:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        os.environ["ROS_HOSTNAME"] = "localhost"
+        os.environ["MINIROSPY_LOCAL"] = "1"
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
         os.environ["ROS_LOG_DIR"] = folder
         os.environ.setdefault("MINIROSPY_BOARD", f"demo-{os.getpid()}")

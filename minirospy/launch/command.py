@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
-from minirospy.environment import DEFAULT_MASTER_PORT, Environment
+from minirospy.environment import DEFAULT_MASTER_PORT, Environment, export_local
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import NotExecutableError, Packages
@@ -40,6 +40,7 @@ def node_environment(
     """The environment of a node's process."""
     variables = {**(os.environ if environ is None else environ), **dict(node.env)}
     variables["ROS_MASTER_URI"] = environment.master_uri
+    export_local(variables)
     namespace = node.namespace.rstrip("/")
     if namespace:
         variables["ROS_NAMESPACE"] = namespace

@@ -23,6 +23,7 @@ from minirospy.errors import LaunchError, MinirospyError, RpcError, RpcFault
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, Timeouts, end_processes, start_process
 from minirospy.launch.spec import MachineSpec, NodeSpec
+from minirospy.runtime.access import Access
 from minirospy.runtime.loop import LoopThread
 from minirospy.runtime.master_proxy import unwrap
 from minirospy.runtime.rpc_client import RpcClient
@@ -53,7 +54,12 @@ class Api:
     def __init__(self, environment: Environment, methods: Mapping[str, Method]) -> None:
         self._methods = dict(methods)
         self._loop = LoopThread("roslaunch-server")
-        self._server = RpcServer(self._dispatch, bind_host=environment.bind_host, ports=environment.ports)
+        self._server = RpcServer(
+            self._dispatch,
+            bind_host=environment.bind_host,
+            ports=environment.ports,
+            access=Access.parse(environment.allow),
+        )
         self._loop.run(self._server.start())
         self.uri = f"http://{environment.uri_host}:{self._server.port}/"
 

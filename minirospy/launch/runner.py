@@ -21,7 +21,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_own_host, run_folder
-from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, ValueTextError
+from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, RpcError, ValueTextError
 from minirospy.launch.command import node_command, node_environment, node_folder
 from minirospy.launch.output import Output
 from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
@@ -162,6 +162,16 @@ class Launcher:
         Raises LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt where stop() was called meanwhile.
         """
         here, elsewhere = self._nodes()
+        if elsewhere and self._environment.local:
+            node = elsewhere[0]
+            why = f"node [{node.name}] is for machine [{node.machine or self._spec.default_machine}]"
+            raise LaunchError(
+                node.file,
+                node.line,
+                f"{why}, and MINIROSPY_LOCAL=1 keeps everything on this machine: `unset MINIROSPY_LOCAL`, or leave such "
+                "nodes out with `roslaunch --local`",
+            )
+
         if self._options.strict:
             for node in here:
                 node_command(node, self._packages)

@@ -54,11 +54,19 @@ class Access:
         return ", ".join(map(str, self.networks)) or "everybody"
 
 
-def listening_lines(bind_host: str, port: int, access: Access) -> list[str]:
-    """Where a server can be reached, and a warning where that is from the open internet."""
+def listening_lines(bind_host: str, port: int, access: Access, *, local: bool = False) -> list[str]:
+    """Return where a server can be reached, and a warning where that is from the open internet."""
     import ipaddress
 
-    lines = [f"listening on {_address(bind_host)}:{port}, open to {access}"]
+    if local:
+        who = "open to this machine alone; nodes stay on it with `export MINIROSPY_LOCAL=1`"
+    elif access.networks:
+        who = f"open to {access}"
+    elif bind_host.startswith("127.") or bind_host == "::1":
+        who = "open to this machine alone"
+    else:
+        who = "open to everybody; `roscore --local` opens it to this machine alone"
+    lines = [f"listening on {_address(bind_host)}:{port}, {who}"]
     if bind_host not in {"0.0.0.0", "::"} or access.networks:
         own = [bind_host] if not access.networks else []
     else:

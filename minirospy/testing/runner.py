@@ -20,6 +20,7 @@ from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.launch.runner import Launcher, RunOptions
 from minirospy.launch.spec import LaunchSpec, TestSpec
+from minirospy.runtime.access import Access
 from minirospy.runtime.loop import LoopThread
 from minirospy.runtime.master import Master
 from minirospy.runtime.master_proxy import MasterProxy
@@ -189,7 +190,7 @@ class RosTest:
 
         async def start() -> Master:
             host, bind_host = environment.uri_host, environment.bind_host
-            serving = Master(host=host, bind_host=bind_host)
+            serving = Master(host=host, bind_host=bind_host, access=Access.parse(environment.allow))
             await serving.start()
             return serving
 

@@ -308,7 +308,9 @@ def test_networks() -> None:
 def test_the_start_up_line_warns_of_the_open_internet(monkeypatch: pytest.MonkeyPatch) -> None:
     from minirospy.runtime import access
 
-    assert listening_lines("127.0.0.1", 1, Access()) == ["listening on 127.0.0.1:1, open to everybody"]
+    assert listening_lines("127.0.0.1", 1, Access()) == [
+        "listening on 127.0.0.1:1, open to this machine alone"
+    ]
     monkeypatch.setattr(access, "_own_addresses", lambda: ["127.0.0.1", "192.168.1.5", "fe80::1%eth0"])
     assert len(listening_lines("0.0.0.0", 1, Access())) == 1
     monkeypatch.setattr(access, "_own_addresses", lambda: ["127.0.0.1", "9.9.9.9", "2620:fe::9"])

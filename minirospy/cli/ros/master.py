@@ -20,7 +20,7 @@ from pathlib import Path
 import minirospy
 from minirospy import private_files
 from minirospy.cli.command import Parser, run, warn
-from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment, is_own_host
+from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment, is_local, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
 from minirospy.runtime.access import Access, listening_lines
 from minirospy.runtime.log_file import LogFile
@@ -76,6 +76,11 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
         help="only these may connect, as 192.168.65.0/24 (again for more; default: MINIROSPY_ALLOW, else all)",
     )
     parser.add_argument(
+        "--local",
+        action="store_true",
+        help="listen on loopback and refuse other machines, as MINIROSPY_LOCAL=1 has it for nodes and commands too",
+    )
+    parser.add_argument(
         "--no-journal",
         action="store_true",
         help="keep no file of the graph: a master that is killed forgets it",
@@ -106,18 +111,21 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
     def body() -> int:
         arguments = [a for a in (sys.argv[1:] if argv is None else argv) if ":=" not in a]
         options = parser.parse_args(arguments)
-        environment = Environment.read()
+        environment = _environment(local=options.local)
         port = environment.master_address[1] if options.port is None else options.port
         if not 0 <= port < 65536:
             parser.error(f"port {port} is not between 0 and 65535")
         if options.status:
-            return _status(environment, port)
+            return _status(Environment.read(), port)
         if not options.timeout > 0:
             parser.error("the timeout is more than 0 seconds")
         if not all(each.strip(" ,") for each in options.allow):
             # A variable that is not set, perhaps: surely not what lets everybody in.
             parser.error("--allow wants a network, as 192.168.65.0/24, or an address")
-        environment = environment._replace(allow=",".join(options.allow) or environment.allow)
+        if environment.local:
+            _warn_of_contradictions(environment, options)
+        else:
+            environment = environment._replace(allow=",".join(options.allow) or environment.allow)
         loop = new_event_loop()
         try:
             return loop.run_until_complete(_serve(name, environment, port, options))
@@ -125,6 +133,28 @@ def _command(name: str, argv: Sequence[str] | None) -> int:
             loop.close()
 
     return run(name, body)
+
+
+def _environment(*, local: bool) -> Environment:
+    """Return the environment of a master; a ROS_MASTER_URI of another machine only gives it the port."""
+    environ = dict(os.environ)
+    local = is_local(environ) or local
+    environ.pop("MINIROSPY_LOCAL", None)
+    environment = Environment.read(environ)
+    return environment.on_this_machine() if local else environment
+
+
+def _warn_of_contradictions(environment: Environment, options: argparse.Namespace) -> None:
+    """Name, in one line, what asks for other machines and has no effect in a local master."""
+    asked = ["--allow"] if options.allow else []
+    asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
+    for name in ("ROS_HOSTNAME", "ROS_IP"):
+        host = os.environ.get(name, "")
+        if host and environment._replace(host=host).bind_host in ("0.0.0.0", "::"):
+            asked.append(f"{name}={host}")
+    if asked:
+        how = "--local" if options.local else "MINIROSPY_LOCAL=1"
+        warn(f"{how} keeps the master on this machine: {', '.join(asked)} has no effect")
 
 
 async def _serve(name: str, environment: Environment, port: int, options: argparse.Namespace) -> int:
@@ -156,7 +186,7 @@ async def _serve(name: str, environment: Environment, port: int, options: argpar
         )
         for key, value in (("/run_id", run_id), ("/rosdistro", DISTRO), ("/rosversion", ROS_VERSION)):
             master.set_param("/roslaunch", key, value)
-        where = listening_lines(environment.bind_host, master.port, access)
+        where = listening_lines(environment.bind_host, master.port, access, local=environment.local)
         if not options.quiet:
             logs = f"log file {log_file}" if log_file else "no log file"
             _show(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")

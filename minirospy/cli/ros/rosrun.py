@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import run
+from minirospy.environment import export_local
 from minirospy.errors import NotFoundError, UsageError
 from minirospy.workspace.packages import Packages
 
@@ -58,6 +59,7 @@ def _rosrun(words: list[str]) -> int:
         print(f"[rosrun] Looking in rospack dir: {packages.find(package)}", file=sys.stderr)
         print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)
     sys.stdout.flush()
+    export_local(os.environ)
     return _replace(command)
 
 

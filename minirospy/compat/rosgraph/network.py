@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
-from minirospy.environment import Environment
+from minirospy.environment import Environment, is_local
 from minirospy.errors import WireError
 from minirospy.wire.header import parse_header, serialize_header
 
@@ -41,7 +41,9 @@ class ROSHandshakeException(Exception):
 
 
 def get_address_override() -> str | None:
-    """What ROS_HOSTNAME, or else ROS_IP, says; None where neither is set."""
+    """Return ROS_HOSTNAME, or else ROS_IP; None where neither is set. With MINIROSPY_LOCAL=1 it is localhost."""
+    if is_local(os.environ):
+        return "localhost"
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
 
 

@@ -17,13 +17,19 @@ class Master:
 
     def start(self) -> None:
         """Serve from a thread. Raises OSError where the port is taken."""
+        from minirospy.runtime.access import Access
         from minirospy.runtime.loop import LoopThread
         from minirospy.runtime.master import Master as Serving
 
         if self.uri is not None:
             return
         environment = Environment.read()
-        serving = Serving(host=environment.host, bind_host=environment.bind_host, port=self.port)
+        serving = Serving(
+            host=environment.host,
+            bind_host=environment.bind_host,
+            port=self.port,
+            access=Access.parse(environment.allow),
+        )
         self._loop = LoopThread("rosmaster")
         try:
             self._loop.run(serving.start())

@@ -28,6 +28,7 @@ _MEANT = (
     "ROS_NAMESPACE",
     "MINIROSPY_PORTS",
     "MINIROSPY_ALLOW",
+    "MINIROSPY_LOCAL",
 )
 
 
