@@ -9,7 +9,14 @@ import contextlib
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.errors import NodeUnreachableError, NotFoundError, RpcError, RpcRefused, RpcUnreachable
+from minirospy.errors import (
+    NodeUnreachableError,
+    NotFoundError,
+    RpcError,
+    RpcProtocolError,
+    RpcRefused,
+    RpcUnreachable,
+)
 from minirospy.introspect.graph import Graph, NodeAddress, in_namespace, node_host
 from minirospy.introspect.topics import UNKNOWN_TYPE
 from minirospy.runtime.master_proxy import SlaveProxy
@@ -17,7 +24,7 @@ from minirospy.runtime.master_proxy import SlaveProxy
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from minirospy.runtime.master_proxy import BusConnection, SystemState
+    from minirospy.runtime.master_proxy import BusConnection, MasterProxy, SystemState
 
 __all__ = [
     "Connections",
@@ -26,6 +33,7 @@ __all__ = [
     "TypedName",
     "find_node",
     "forget_node",
+    "has_exited",
     "kill_node",
     "list_nodes",
     "neighbours",
@@ -175,24 +183,56 @@ def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
     return [node for node in nodes if node.uri is not None and not _answers(graph, node, timeout)]
 
 
-def forget_node(graph: Graph, node: NodeAddress) -> None:
-    """Take everything that a node registered out of the master."""
+def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
+    """Unregister everything that a node registered with the master; without effect on a newer node of its name.
+
+    ``state``: the master's, where the caller has it. Raises MasterUnreachableError.
+    """
     from minirospy.runtime.master_proxy import MasterProxy
 
-    state = graph.state()
+    state = state or graph.state()
     uri = node.uri or ""
     # In the node's own name: the master removes only what the caller registered.
     master = MasterProxy(graph.master.uri, node.name)
     try:
+        # A topic is unregistered together with the node's URI, a service with its own. Where the name still has this URI
+        # after the services were looked up, none of them can be a newer node's.
+        services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
+        with contextlib.suppress(RpcRefused):
+            if master.lookup_node(node.name) == uri:
+                for service, service_uri in services.items():
+                    master.unregister_service(service, service_uri)
         for topic in _held_by(state.publishers, node.name):
             master.unregister_publisher(topic, uri)
         for topic in _held_by(state.subscribers, node.name):
             master.unregister_subscriber(topic, uri)
-        for service in _held_by(state.services, node.name):
-            with contextlib.suppress(RpcRefused):
-                master.unregister_service(service, master.lookup_service(service))
     finally:
         master.close()
+
+
+def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
+    """Return whether nobody listens at a node's address any more, or another process.
+
+    A node that does not answer in time may be alive: False.
+    """
+    with contextlib.closing(_slave(graph, node, timeout)) as slave:
+        try:
+            return bool(slave.call("getName") != node.name)
+        except RpcUnreachable as error:
+            # EOFError: what has the port now, such as a TCPROS server, hung up.
+            return isinstance(error.__cause__, ConnectionError | EOFError)
+        except RpcProtocolError:
+            return True
+        except RpcError:
+            # roscpp's nodes have no such method.
+            return False
+
+
+def _service_uri(master: MasterProxy, service: str) -> str:
+    try:
+        return master.lookup_service(service)
+    except RpcRefused:
+        return ""
 
 
 def _is_same_host(one: str, other: str) -> bool:

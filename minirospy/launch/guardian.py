@@ -1,8 +1,9 @@
 """A process that outlives roslaunch by a moment: it ends the nodes that a killed roslaunch has left. A script.
 
-From its input it reads a line for each process group: ``+PID`` began, ``*PID`` began and is to end last (the master),
-``-PID`` has ended. Where the input ends, roslaunch has, however it came: what is left then gets SIGINT, SIGTERM, SIGKILL.
-Nothing but the standard library is imported, and little of that: it starts while the first nodes do.
+From its input it reads a line for each process group: ``+PID NAME`` has started, a node; ``*PID`` has started and is to end
+last (the master); ``-PID`` has ended. Where the input ends, roslaunch has, for whatever reason: the groups that are left get
+SIGINT, SIGTERM, SIGKILL, and what their nodes leave registered with a master that goes on is unregistered. Nothing but the
+standard library is imported, and little of that: it starts while the first nodes do.
 """
 
 from __future__ import annotations
@@ -13,27 +14,43 @@ import sys
 import time
 from collections.abc import Iterable
 
+_UNREGISTER_SECONDS = 60.0
 
-def watch(lines: Iterable[str], interrupt_seconds: float, terminate_seconds: float) -> None:
-    """Keep book until ``lines`` end; then end what is left."""
-    groups: dict[int, bool] = {}
+
+def watch(lines: Iterable[str], interrupt_seconds: float, terminate_seconds: float, master_uri: str) -> None:
+    """Keep a list of the groups until ``lines`` end; then end those that are left."""
+    nodes: dict[int, str] = {}
+    masters: dict[int, str] = {}
     for line in lines:
-        pid = int(line[1:])
+        pid, _, name = line[1:].rstrip("\n").partition(" ")
         if line[0] == "-":
-            groups.pop(pid, None)
+            nodes.pop(int(pid), None)
+            masters.pop(int(pid), None)
         else:
-            groups[pid] = line[0] == "*"
-    for is_last in (False, True):
-        group = left = [pid for pid, last in groups.items() if last == is_last]
-        for name, seconds in (("SIGINT", interrupt_seconds), ("SIGTERM", terminate_seconds)):
-            left = [pid for pid in left if send(pid, name)]
-            end = time.monotonic() + seconds
-            while left and time.monotonic() < end:
-                time.sleep(0.02)
-                left = [pid for pid in left if is_running(pid)]
-        for pid in group:
-            # With what a node left behind in its group.
-            send(pid, "SIGKILL")
+            (masters if line[0] == "*" else nodes)[int(pid)] = name
+
+    end_groups(list(nodes), interrupt_seconds, terminate_seconds)
+    names = [name for name in nodes.values() if name]
+    if names and not masters:
+        import subprocess
+
+        command = [sys.executable, "-m", "minirospy.launch.registrations", master_uri, *names]
+        subprocess.run(command, check=False, timeout=_UNREGISTER_SECONDS)
+    end_groups(list(masters), interrupt_seconds, terminate_seconds)
+
+
+def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: float) -> None:
+    """End process groups, step by step."""
+    left = group
+    for name, seconds in (("SIGINT", interrupt_seconds), ("SIGTERM", terminate_seconds)):
+        left = [pid for pid in left if send(pid, name)]
+        end = time.monotonic() + seconds
+        while left and time.monotonic() < end:
+            time.sleep(0.02)
+            left = [pid for pid in left if is_running(pid)]
+    for pid in group:
+        # With what a node left behind in its group.
+        send(pid, "SIGKILL")
 
 
 def send(pid: int, name: str) -> bool:
@@ -65,4 +82,4 @@ def is_running(pid: int) -> bool:
 
 
 if __name__ == "__main__":
-    watch(sys.stdin, float(sys.argv[1]), float(sys.argv[2]))
+    watch(sys.stdin, float(sys.argv[1]), float(sys.argv[2]), sys.argv[3])

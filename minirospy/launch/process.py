@@ -67,10 +67,10 @@ class Process:
 
 
 class Guardian:
-    """Hears of each process that begins and ends; where this process is killed, it ends those that are left."""
+    """Is notified of each process that starts and ends; where this process is killed, it ends those that are left."""
 
-    def __init__(self, timeouts: Timeouts) -> None:
-        words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate)]
+    def __init__(self, timeouts: Timeouts, master_uri: str) -> None:
+        words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate), master_uri]
         self._guard = threading.Lock()
         self._popen = subprocess.Popen(
             [sys.executable, "-I", "-S", *words],
@@ -82,7 +82,7 @@ class Guardian:
 
     def add(self, process: Process) -> None:
         """A process has begun."""
-        self._tell(f"{'+' if process.node else '*'}{process.pid}\n")
+        self._tell(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
         """A process has ended."""

@@ -25,6 +25,7 @@ from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError
 from minirospy.launch.command import node_command, node_environment, node_folder
 from minirospy.launch.output import Output
 from minirospy.launch.process import Guardian, Process, Timeouts, end_processes, start_process
+from minirospy.launch.registrations import DeadNodes
 from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
 from minirospy.launch.summary import summary
 from minirospy.launch.watch import FileWatch
@@ -116,6 +117,7 @@ class Launcher:
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         self._restarts: list[tuple[float, Process]] = []
         self._master = MasterProxy(environment.master_uri, "/roslaunch")
+        self._dead = DeadNodes(environment.master_uri)
         self._guardian: Guardian | None = None
         self._remote: RemoteMachines | None = None
         self._files = FileWatch(packages)
@@ -384,7 +386,7 @@ class Launcher:
     def _ready_guardian(self) -> Guardian:
         """The guardian; asked for before a process starts, too, so that it is there from the first moment on."""
         if self._guardian is None:
-            self._guardian = Guardian(self._options.timeouts)
+            self._guardian = Guardian(self._options.timeouts, self._environment.master_uri)
         return self._guardian
 
     # --- watching
@@ -451,6 +453,7 @@ class Launcher:
             return None
         node, code = process.node, process.exit_code
         assert node
+        self._dead.add(node.name)
         self._on_end(process)
         if process.is_restarting:
             self._restart(process)
@@ -547,12 +550,15 @@ class Launcher:
         if self._remote:
             self._remote.close()
             self._remote = None
+        exited = [process.node.name for process in self.processes if process.node]
         nodes = [process for process in reversed(self.processes) if process.is_running]
         master = [self._master_process] if self._master_process else []
         for group in (nodes, master):
             for process in group:
                 self._output.say(f"[{process.name}] killing on exit")
             killed += end_processes(group, self._options.timeouts, self._output.warn)
+            if group is nodes:
+                self._unregister(exited)
         self.processes.clear()
         self._restarts.clear()
         self._master_process = None
@@ -574,6 +580,13 @@ class Launcher:
             self._output.say("done", bold=True)
             self._has_run = False
         self._master.close()
+
+    def _unregister(self, nodes: list[str]) -> None:
+        """Unregister what nodes have left, unless the master ends with them."""
+        if not self._master_process:
+            for node in nodes:
+                self._dead.add(node)
+        self._dead.close()
 
     @contextlib.contextmanager
     def signals(self) -> Iterator[None]:
