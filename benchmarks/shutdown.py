@@ -27,12 +27,13 @@ from pathlib import Path
 
 import psutil
 
-from minirospy.errors import RpcError
+from minirospy.errors import MinirospyError
 from minirospy.runtime.master_proxy import MasterProxy
 
 TESTED = "/tested"
 START_SECONDS = 300.0
 EXIT_SECONDS = 120.0
+STARTING = 20
 
 NODE = """\
 import rospy
@@ -67,16 +68,20 @@ def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None
         time.sleep(0.05)
 
 
-def fork_nodes(count: int) -> list[int]:
-    """Fork nodes, which saves each of them the imports; their process ids."""
+def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
+    """Fork nodes, which saves each of them the imports, some at a time; puts their process ids into ``pids``."""
     import rospy
     import std_srvs.srv  # noqa: F401
 
-    pids = []
     for number in range(count):
         pid = os.fork()
         if pid:
             pids.append(pid)
+            wait_until(
+                lambda: ready(master) > len(pids) - STARTING,
+                START_SECONDS,
+                f"node {len(pids)} has not started",
+            )
             continue
         status = 1
         try:
@@ -94,22 +99,22 @@ def fork_nodes(count: int) -> list[int]:
             atexit._run_exitfuncs()
             sys.stdout.flush()
             os._exit(status)
-    return pids
 
 
 def round_of_forks(master: MasterProxy, nodes: int) -> tuple[float, int]:
     """Start nodes, interrupt all; seconds until the last process has exited, and how many exited with an error."""
-    pids = fork_nodes(nodes)
+    pids: list[int] = []
     try:
+        fork_nodes(master, nodes, pids)
         wait_until(lambda: ready(master) >= nodes, START_SECONDS, f"{nodes} nodes have not started")
         start = time.monotonic()
         os.killpg(pids[0], signal.SIGINT)
-        statuses = [os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) for pid in pids]
-        pids = []
+        failed = sum(os.waitpid(pid, 0)[1] != 0 for pid in pids)
+        pids.clear()
     finally:
         for pid in pids:
             os.kill(pid, signal.SIGKILL)
-    return time.monotonic() - start, sum(map(bool, statuses))
+    return time.monotonic() - start, failed
 
 
 def ready(master: MasterProxy) -> int:
@@ -141,7 +146,7 @@ def round_of_launch(
     master: MasterProxy, nodes: int, file: Path, environ: dict[str, str], *, kill: bool
 ) -> tuple[float, int]:
     """Launch the nodes and end them; seconds that it took, and the exit status of roslaunch."""
-    command = [sys.executable, "-m", "minirospy.cli.roslaunch", "--wait", str(file)]
+    command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "--wait", str(file)]
     launch = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
     try:
         wait_until(lambda: ready(master) >= nodes, START_SECONDS, f"{nodes} nodes have not started")
@@ -164,7 +169,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
     from minirospy.environment import split_uri
 
     port = str(split_uri(environ["ROS_MASTER_URI"], "http")[1])
-    command = [sys.executable, "-m", "minirospy.cli.master", "-q", "-p", port]
+    command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", port]
     if is_real:
         command = [shutil.which("rosmaster", path="/usr/bin") or "rosmaster", "--core", "-p", port]
     process = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
@@ -233,7 +238,7 @@ def main() -> int:
                 print(
                     f"{options.nodes} nodes, {seconds:6.2f} s, {failed} failed, {ghosts[-1]} left", flush=True
                 )
-        except RpcError as error:
+        except MinirospyError as error:
             raise SystemExit(f"the master: {error}") from error
     print(f"left: {min(ghosts)} to {max(ghosts)} of {options.nodes}, {options.rounds} rounds")
     return 1 if any(ghosts) else 0
