@@ -174,7 +174,11 @@ class RpcRefused(RpcError):
 
 
 class RpcProtocolError(RpcError):
-    """The bytes of a peer are not HTTP, or not XML-RPC."""
+    """The bytes of a peer are not HTTP, or not XML-RPC; ``status`` is the HTTP status that a server answers with."""
+
+    def __init__(self, text: str, *, status: int = 400) -> None:
+        super().__init__(text)
+        self.status = status
 
 
 class RpcUnreachable(RpcError):

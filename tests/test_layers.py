@@ -19,7 +19,7 @@ LAYERS = [
     {"client", "aio"},
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
-    {"clock", "environment", "names", "private_files", "scanner", "times"},
+    {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

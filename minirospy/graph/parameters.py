@@ -6,26 +6,53 @@ http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster where that 
 
 from __future__ import annotations
 
+import sys
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from minirospy.errors import MinirospyError
 from minirospy.names import namespace_of
+from minirospy.steps import Steps, finish
 
-__all__ = ["ParameterTree", "ParameterUpdate", "check_value"]
+__all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
 _MAX_DEPTH = 56
 """Namespaces and dictionaries inside each other: XML-RPC's 64 levels hold it and the answer around it."""
 
 _MAX_INT = 2**31
 
+_STEP_ITEMS = 1000
+_ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
+"""What a number, a list without its items, and a dictionary and each entry of it take in memory, about."""
+
+MOST_BYTES = 96 * 1024 * 1024
+"""What all parameters together may take in memory."""
+
+
+MOST_SUBSCRIPTIONS = 20_000
+"""Subscriptions to parameters, of all nodes."""
+
+_FEW_BYTES = 200_000
+
+
+class ParametersFullError(MinirospyError):
+    """A parameter or a subscription would be beyond a limit, which ``limit`` names."""
+
+    def __init__(self, limit: str) -> None:
+        super().__init__(limit)
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"the parameter server is full: {self.limit}"
+
 
 class ParameterUpdate(NamedTuple):
-    """Tell the node at ``uri`` that ``key`` (which ends in a slash) is ``value``; {} where it was deleted."""
+    """Notify the node at ``uri`` of the value of ``key`` (which ends in a slash), {} where it is not set."""
 
     uri: str
     key: str
-    value: Any
 
 
 @dataclass(frozen=True)
@@ -35,60 +62,81 @@ class _Subscriber:
 
 
 class ParameterTree:
-    """Parameters in namespaces, as nested dictionaries."""
+    """Parameters in namespaces, as nested dictionaries.
 
-    def __init__(self) -> None:
+    What :meth:`get` returns is never changed afterwards: it may be written to a client in steps, while others set
+    parameters. So a dictionary that was returned is copied before it is changed.
+    """
+
+    def __init__(self, most: int = MOST_BYTES) -> None:
         self._root: dict[str, Any] = {}
+        # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
+        self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
+        # Their keys, sorted: those below a namespace are next to each other.
+        self._keys: list[str] = []
+        self._subscriptions = 0
+        # URI of a node -> its keys, and under how many names it subscribed to each.
+        self._keys_of: dict[str, dict[str, int]] = {}
+        self._most = most
+        # No less than what all values take in memory.
+        self._bytes = 0
 
     def get(self, key: str) -> Any:
-        """The value, or the dictionary of a namespace. Raises KeyError."""
-        value: Any = self._root
-        for name in _split(key):
-            if not isinstance(value, dict):
-                raise KeyError(key)
-            value = value[name]
+        """Return the value, or the dictionary of a namespace. Raises KeyError."""
+        value = self._find(_split(key))
+        if value is _UNSET:
+            raise KeyError(key)
+        if type(value) is dict:
+            self._own.clear()
         return value
 
     def has(self, key: str) -> bool:
-        """Whether a parameter or namespace is set."""
-        try:
-            self.get(key)
-        except KeyError:
-            return False
-        return True
+        """Return whether a parameter or namespace is set."""
+        return self._find(_split(key)) is not _UNSET
 
-    def set(self, key: str, value: Any, caller_id: str) -> list[ParameterUpdate]:
-        """Set a value; a dictionary replaces the namespace.
+    @property
+    def is_small(self) -> bool:
+        """Return whether all parameters together are few."""
+        return self._bytes < _FEW_BYTES
+
+    def has_room(self, weight: int) -> bool:
+        """Return whether there surely is room for a value of ``weight`` bytes."""
+        return self._bytes + weight <= self._most
+
+    def make_room(self, weight: int) -> Steps[None]:
+        """Count again, since values that were replaced are still counted. Raises ParametersFullError."""
+        if not self.has_room(weight):
+            before = self._bytes
+            counted = yield from weigh_in_steps("/", self.get("/"))
+            self._bytes = counted + self._bytes - before
+            if not self.has_room(weight):
+                raise ParametersFullError(f"no more than {self._most // 1024**2} MiB in memory")
+
+    def set(self, key: str, value: Any, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
+        """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
 
         A value in the way of a namespace is replaced by it. Raises ValueError where the root would become
         something else than a dictionary.
         """
         path = _split(key)
-        if not path:
-            if not isinstance(value, dict):
-                raise ValueError("cannot set root of parameter tree to non-dictionary")
+        if path:
+            table = self._enter(path[:-1])
+            table[path[-1]] = value
+        elif isinstance(value, dict):
             self._root = value
         else:
-            table = self._root
-            for name in path[:-1]:
-                inner = table.get(name)
-                if not isinstance(inner, dict):
-                    inner = table[name] = {}
-                table = inner
-            table[path[-1]] = value
-        return self._updates(path, value, caller_id)
+            raise ValueError("cannot set root of parameter tree to non-dictionary")
+        self._bytes += weight + len(key) + _ENTRY_BYTES
+        return self._updates(path, caller_id)
 
-    def delete(self, key: str) -> list[ParameterUpdate]:
+    def delete(self, key: str) -> Iterator[ParameterUpdate]:
         """Delete a parameter or namespace. Raises KeyError, also for the root."""
         path = _split(key)
-        if not path:
+        if not path or self._find(path) is _UNSET:
             raise KeyError(key)
-        table = self.get("/" + "/".join(path[:-1]))
-        if not isinstance(table, dict):
-            raise KeyError(key)
-        del table[path[-1]]
-        return self._updates(path, {})
+        del self._enter(path[:-1])[path[-1]]
+        return self._updates(path)
 
     def search(self, namespace: str, key: str) -> str | None:
         """The name of the nearest parameter ``key``, upwards from ``namespace``.
@@ -108,41 +156,69 @@ class ParameterTree:
             namespace = namespace_of(base)
 
     def names(self) -> list[str]:
-        """The names of all parameters, namespaces left out."""
-        found: list[str] = []
+        """Return the names of all parameters, namespaces left out."""
+        return finish(self.names_in_steps())
 
-        def walk(table: dict[str, Any], prefix: str) -> None:
+    def names_in_steps(self) -> Steps[list[str]]:
+        """Return the same, of a tree that may be large."""
+        found: list[str] = []
+        left = [_STEP_ITEMS]
+
+        def walk(table: dict[str, Any], prefix: str) -> Steps[None]:
             for name, value in table.items():
                 if isinstance(value, dict):
-                    walk(value, f"{prefix}{name}/")
+                    yield from walk(value, f"{prefix}{name}/")
                 else:
                     found.append(prefix + name)
+                left[0] -= 1
+                if not left[0]:
+                    left[0] = _STEP_ITEMS
+                    yield None
 
-        walk(self._root, "/")
+        yield from walk(self.get("/"), "/")
         return found
 
     def subscribe(self, key: str, caller_id: str, uri: str) -> Any:
-        """Tell the node at ``uri`` of changes at, below or above ``key``; its value now, {} where it is not set."""
-        self._subscribers.setdefault(_with_slash(_split(key)), {})[_Subscriber(caller_id, uri)] = None
+        """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
+
+        Raises ParametersFullError.
+        """
+        if self._subscriptions >= MOST_SUBSCRIPTIONS:
+            raise ParametersFullError(f"no more than {MOST_SUBSCRIPTIONS} subscriptions")
+        full = _with_slash(_split(key))
+        if full not in self._subscribers:
+            self._subscribers[full] = {}
+            insort(self._keys, full)
+        subscriber = _Subscriber(caller_id, uri)
+        if subscriber not in self._subscribers[full]:
+            self._subscribers[full][subscriber] = None
+            self._subscriptions += 1
+            keys = self._keys_of.setdefault(uri, {})
+            keys[full] = keys.get(full, 0) + 1
         return self.get(key) if self.has(key) else {}
 
     def unsubscribe(self, key: str, caller_id: str, uri: str) -> bool:
-        """Tell it no more; whether it was subscribed."""
-        subscribers = self._subscribers.get(_with_slash(_split(key)), {})
-        if _Subscriber(caller_id, uri) not in subscribers:
+        """Notify it no more; return whether it was subscribed."""
+        full = _with_slash(_split(key))
+        if _Subscriber(caller_id, uri) not in self._subscribers.get(full, {}):
             return False
-        del subscribers[_Subscriber(caller_id, uri)]
-        if not subscribers:
-            del self._subscribers[_with_slash(_split(key))]
+        self._drop(full, _Subscriber(caller_id, uri))
         return True
 
     def unsubscribe_node(self, caller_id: str, uri: str) -> None:
-        """Forget a node that has gone."""
+        """Forget a node that is gone."""
         gone = _Subscriber(caller_id, uri)
-        for key in [key for key, subscribers in self._subscribers.items() if gone in subscribers]:
-            del self._subscribers[key][gone]
-            if not self._subscribers[key]:
-                del self._subscribers[key]
+        for key in self.subscribed_keys(uri):
+            if gone in self._subscribers[key]:
+                self._drop(key, gone)
+
+    def count_subscriptions(self) -> int:
+        """Return how many subscriptions there are."""
+        return self._subscriptions
+
+    def subscribed_keys(self, uri: str) -> list[str]:
+        """Return the keys that the node at ``uri`` has subscribed to; they end in a slash."""
+        return list(self._keys_of.get(uri, ()))
 
     def subscriptions(self) -> Iterator[tuple[str, str, str]]:
         """(node, URI, key) of each subscription; keys end in a slash."""
@@ -150,39 +226,115 @@ class ParameterTree:
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
 
-    def _updates(self, path: list[str], value: Any, setter: str | None = None) -> list[ParameterUpdate]:
+    def _find(self, path: list[str]) -> Any:
+        value: Any = self._root
+        for name in path:
+            value = value.get(name, _UNSET) if isinstance(value, dict) else _UNSET
+            if value is _UNSET:
+                break
+        return value
+
+    def _enter(self, path: list[str]) -> dict[str, Any]:
+        """Return the dictionary at ``path``, which is made where it is not there, to be changed."""
+        table = self._root = self._owned(self._root)
+        for name in path:
+            inner = table.get(name)
+            table[name] = self._owned(inner if isinstance(inner, dict) else {})
+            table = table[name]
+        return table
+
+    def _owned(self, table: dict[str, Any]) -> dict[str, Any]:
+        if id(table) not in self._own:
+            table = dict(table)
+            self._own.add(id(table))
+        return table
+
+    def _drop(self, key: str, subscriber: _Subscriber) -> None:
+        del self._subscribers[key][subscriber]
+        self._subscriptions -= 1
+        keys = self._keys_of[subscriber.uri]
+        keys[key] -= 1
+        if not keys[key]:
+            del keys[key]
+        if not keys:
+            del self._keys_of[subscriber.uri]
+        if not self._subscribers[key]:
+            del self._subscribers[key]
+            del self._keys[bisect_left(self._keys, key)]
+
+    def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
+        """Yield the updates that a change requires, one by one: there may be many."""
         changed = _with_slash(path)
-        updates = []
-        for key, subscribers in self._subscribers.items():
-            if changed.startswith(key):
-                # Who set it knows it.
-                updates += [
-                    ParameterUpdate(s.uri, changed, value) for s in subscribers if s.caller_id != setter
-                ]
-            elif key.startswith(changed):
-                # Who set the namespace is told too: what it keeps of a parameter inside is out of date.
-                inside = self.get(key) if self.has(key) else {}
-                updates += [ParameterUpdate(s.uri, key, inside) for s in subscribers]
-        return updates
+        for length in range(len(path) + 1):
+            # Who set it knows it.
+            for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
+                if each.caller_id != setter:
+                    yield ParameterUpdate(each.uri, changed)
+
+        # Who set the namespace is notified too: what it keeps of a parameter inside is out of date.
+        at = bisect_right(self._keys, changed)
+        while at < len(self._keys) and self._keys[at].startswith(changed):
+            key = self._keys[at]
+            for each in list(self._subscribers[key]):
+                yield ParameterUpdate(each.uri, key)
+            # Others may have subscribed meanwhile.
+            at = bisect_right(self._keys, key)
 
 
-def check_value(key: str, value: Any) -> None:
-    """Raise ValueError on a value that no answer could hold: it would make the namespaces above unreadable."""
-    _check(value, len(_split(key)))
+_UNSET: Any = object()
 
 
-def _check(value: Any, depth: int) -> None:
-    if depth > _MAX_DEPTH:
-        raise ValueError(f"a parameter is nested deeper than {_MAX_DEPTH} levels")
-    if type(value) is int:
-        if not -_MAX_INT <= value < _MAX_INT:
-            raise ValueError(f"the integer {value} does not fit XML-RPC's 32 bits")
-    elif type(value) is dict:
-        for item in value.values():
-            _check(item, depth + 1)
-    elif type(value) is list:
-        for item in value:
-            _check(item, depth + 1)
+def weigh_in_steps(key: str, value: Any) -> Steps[int]:
+    """Return about how many bytes of memory a value takes.
+
+    Raises ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.
+    """
+    if not _split(key) and not isinstance(value, dict):
+        raise ValueError("cannot set root of parameter tree to non-dictionary")
+    weight, left = 0, _STEP_ITEMS
+    # The containers around the present item: how deep their items are, and those that are still to come.
+    around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
+    while around:
+        depth, items = around[-1]
+        for item in items:
+            left -= 1
+            if not left:
+                left = _STEP_ITEMS
+                yield None
+
+            kind = type(item)
+            if depth > _MAX_DEPTH:
+                raise ValueError(f"a parameter is nested deeper than {_MAX_DEPTH} levels")
+            if kind is list:
+                weight += _LIST_BYTES + 8 * len(item)
+                around.append((depth + 1, iter(item)))
+                break
+            if kind is dict:
+                weight += _ENTRY_BYTES * (len(item) + 1)
+                around.append((depth + 1, iter(item.values())))
+                if len(item) < _STEP_ITEMS:
+                    weight += sum(map(sys.getsizeof, item))
+                else:
+                    weight += yield from _weigh_names(item)
+                break
+            if kind is int:
+                if not -_MAX_INT <= item < _MAX_INT:
+                    raise ValueError(f"the integer {item} does not fit XML-RPC's 32 bits")
+                weight += _ITEM_BYTES
+            else:
+                weight += sys.getsizeof(item)
+        else:
+            around.pop()
+    return weight
+
+
+def _weigh_names(table: dict[str, Any]) -> Steps[int]:
+    weight = 0
+    for number, name in enumerate(table):
+        weight += sys.getsizeof(name)
+        if number % _STEP_ITEMS == _STEP_ITEMS - 1:
+            yield None
+    return weight
 
 
 def _split(key: str) -> list[str]:

@@ -6,14 +6,41 @@ rosmaster where that is silent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from sys import intern
+from collections.abc import Iterable, Iterator
+from itertools import chain, islice
+from sys import getsizeof, intern
 from typing import NamedTuple
 
-__all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry"]
+from minirospy.errors import MinirospyError
+
+__all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry", "RegistryFullError"]
 
 _ANY = "*"
 _PUBLISHES, _SUBSCRIBES, _SERVES, _PARAMETER = 1, 2, 4, 8
+
+MOST_BYTES = 96 * 1024 * 1024
+"""What all registrations together may take in memory."""
+
+MOST_ENTRIES = 10_000
+"""Topics, services and parameters that one node may register."""
+
+_MOST_OLD_TYPES = 10_000
+"""Topics whose types are remembered although nobody registers them any more."""
+
+_FEW_BYTES = 200_000
+_ENTRY_BYTES = 500
+"""What a registration takes beside its texts."""
+
+
+class RegistryFullError(MinirospyError):
+    """A registration would be beyond a limit, which ``limit`` names."""
+
+    def __init__(self, limit: str) -> None:
+        super().__init__(limit)
+        self.limit = limit
+
+    def __str__(self) -> str:
+        return f"the registration is beyond the limit of {self.limit}"
 
 
 class PublisherUpdate(NamedTuple):
@@ -38,17 +65,18 @@ class Registered(NamedTuple):
     """The URIs of the other side (a publisher's subscribers, a subscriber's publishers), and what to do."""
 
     peers: list[str]
-    actions: list[Action]
+    actions: Iterable[Action]
 
 
 class _Node:
     """A node's name and URI, and what it has registered: name -> what it is there, as bits."""
 
-    __slots__ = ("entries", "name", "uri")
+    __slots__ = ("entries", "name", "size", "uri")
 
     def __init__(self, name: str, uri: str) -> None:
         self.name = name
         self.uri = uri
+        self.size = getsizeof(name) + getsizeof(uri) + _ENTRY_BYTES
         self.entries: dict[str, int] = {}
 
     def add(self, name: str, kind: int) -> None:
@@ -71,11 +99,16 @@ class _Service(NamedTuple):
 
 
 class Registry:
-    """Who publishes, subscribes and serves what. Tables keep the order of registration."""
+    """The publishers, subscribers and services of a graph. Tables keep the order of registration.
 
-    def __init__(self) -> None:
+    Actions come one by one, as they are needed: there may be many of them.
+    """
+
+    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self.changes = 0
         """Grows whenever publishers, subscribers or services may have changed."""
+        self._most_bytes = most_bytes
+        self._bytes = 0
         self._nodes: dict[str, _Node] = {}
         self._publishers: dict[str, dict[str, str]] = {}
         self._subscribers: dict[str, dict[str, str]] = {}
@@ -86,31 +119,30 @@ class Registry:
 
     def register_publisher(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node``, whose Slave API is at ``uri``, publishes ``topic``."""
-        actions = self._claim(node, uri)
+        actions = self._claim(node, uri, topic)
         entry = self._enter(node, topic, _PUBLISHES)
         _row(self._publishers, topic)[entry.name] = entry.uri
         if type_ != _ANY or topic not in self._types:
-            self._types[topic] = intern(type_)
+            self.set_type(topic, type_)
         subscribers = self._subscribers.get(topic)
         if subscribers is None:
             return Registered([], actions)
-        actions += self._tell_subscribers(topic)
-        return Registered(list(subscribers.values()), actions)
+        return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
-    def unregister_publisher(self, node: str, topic: str, uri: str) -> list[Action] | None:
+    def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
         """``node`` publishes ``topic`` no more; None where that was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, _PUBLISHES)
-        return self._tell_subscribers(topic)
+        return self._updates(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node`` subscribes to ``topic``; type "*" takes any and does not become the topic's."""
-        actions = self._claim(node, uri)
+        actions = self._claim(node, uri, topic)
         entry = self._enter(node, topic, _SUBSCRIBES)
         _row(self._subscribers, topic)[entry.name] = entry.uri
-        if type_ != _ANY:
-            self._types.setdefault(topic, intern(type_))
+        if type_ != _ANY and topic not in self._types:
+            self.set_type(topic, type_)
         publishers = self._publishers.get(topic)
         return Registered(list(publishers.values()) if publishers else [], actions)
 
@@ -121,9 +153,9 @@ class Registry:
         self._drop(self._subscribers, topic, node, _SUBSCRIBES)
         return True
 
-    def register_service(self, node: str, service: str, service_uri: str, uri: str) -> list[Action]:
+    def register_service(self, node: str, service: str, service_uri: str, uri: str) -> Iterable[Action]:
         """``node`` offers ``service`` at ``service_uri``; the last one to register has it."""
-        actions = self._claim(node, uri)
+        actions = self._claim(node, uri, service)
         before = self._services.get(service)
         if before and before.node != node:
             self._leave(before.node, service, _SERVES)
@@ -139,9 +171,9 @@ class Registry:
         self._leave(node, service, _SERVES)
         return True
 
-    def register_parameter(self, node: str, key: str, uri: str) -> list[Action]:
-        """``node`` is to be told of a parameter: who that is stands in the tree, here that the node is there."""
-        actions = self._claim(node, uri)
+    def register_parameter(self, node: str, key: str, uri: str) -> Iterable[Action]:
+        """``node`` is to be notified of a parameter: the tree holds the subscription, this table the node."""
+        actions = self._claim(node, uri, key)
         self._enter(node, key, _PARAMETER)
         return actions
 
@@ -151,20 +183,31 @@ class Registry:
         if entry and entry.uri == uri:
             self._leave(node, key, _PARAMETER)
 
-    def forget(self, node: str, uri: str) -> list[Action]:
-        """Drop all that ``node`` has registered from ``uri``: it is not there any more."""
+    def forget(self, node: str, uri: str) -> Iterable[Action]:
+        """Drop all that ``node`` has registered from ``uri``: it is gone."""
         entry = self._nodes.get(node)
         if entry is None or entry.uri != uri:
-            return []
+            return ()
         published = self._clear(entry)
-        del self._nodes[node]
-        return [action for topic in published for action in self._tell_subscribers(topic)]
+        self._remove_node(entry)
+        return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Remember the type of a topic that nobody has registered."""
+        """Remember the type of a topic, which need not be registered."""
         self._types[topic] = intern(type_)
+        if len(self._types) > len(self._publishers) + len(self._subscribers) + _MOST_OLD_TYPES:
+            # Some of the oldest: the others have their turn at the next registrations.
+            for old in list(islice(self._types, 20)):
+                type_ = self._types.pop(old)
+                if old == topic or old in self._publishers or old in self._subscribers:
+                    self._types[old] = type_
 
-    # --- asking
+    # --- queries
+
+    @property
+    def is_small(self) -> bool:
+        """Return whether all registrations together are few."""
+        return self._bytes < _FEW_BYTES
 
     def node_uri(self, node: str) -> str | None:
         """The URI of a node's Slave API."""
@@ -179,6 +222,10 @@ class Registry:
         """Where a service is called."""
         entry = self._services.get(service)
         return entry.uri if entry else None
+
+    def count_subscribers(self, topic: str) -> int:
+        """Return how many nodes subscribe to a topic."""
+        return len(self._subscribers.get(topic, ()))
 
     def publisher_uris(self, topic: str) -> list[str]:
         """The URIs of a topic's publishers."""
@@ -228,20 +275,36 @@ class Registry:
 
     # --- helpers
 
-    def _claim(self, node: str, uri: str) -> list[Action]:
-        """Make ``node`` known at ``uri``; what stood under its name at another address is dropped and stopped."""
+    def _claim(self, node: str, uri: str, name: str) -> Iterable[Action]:
+        """Make ``node`` known at ``uri``, where it registers ``name``.
+
+        What is registered under its name at another address is dropped and stopped. Raises RegistryFullError.
+        """
         entry = self._nodes.get(node)
+        if entry is not None and entry.uri == uri:
+            if len(entry.entries) >= MOST_ENTRIES and name not in entry.entries:
+                raise RegistryFullError(f"{MOST_ENTRIES} topics, services and parameters of one node")
+            self._check_room(getsizeof(name))
+            return ()
+        self._check_room(getsizeof(name) + getsizeof(node) + getsizeof(uri))
+        published: list[str] = []
+        if entry is not None:
+            published = self._clear(entry)
+            self._remove_node(entry)
+        added = self._nodes[node] = _Node(node, uri)
+        self._bytes += added.size
         if entry is None:
-            self._nodes[node] = _Node(node, uri)
-            return []
-        if entry.uri == uri:
-            return []
-        published = self._clear(entry)
-        self._nodes[node] = _Node(node, uri)
-        actions: list[Action] = [NodeShutdown(entry.uri, node, "new node registered with same name")]
-        for topic in published:
-            actions += self._tell_subscribers(topic)
-        return actions
+            return ()
+        shutdown = NodeShutdown(entry.uri, node, "new node registered with same name")
+        return chain((shutdown,), self._updates(*published))
+
+    def _check_room(self, size: int) -> None:
+        if self._bytes + size + 2 * _ENTRY_BYTES > self._most_bytes:
+            raise RegistryFullError(f"{self._most_bytes // 1024**2} MiB for all registrations")
+
+    def _remove_node(self, entry: _Node) -> None:
+        del self._nodes[entry.name]
+        self._bytes -= entry.size
 
     def _clear(self, entry: _Node) -> list[str]:
         """Take a node out of every table; the topics that it published."""
@@ -258,6 +321,10 @@ class Registry:
     def _enter(self, node: str, name: str, kind: int) -> _Node:
         self.changes += 1
         entry = self._nodes[node]
+        if name not in entry.entries:
+            size = getsizeof(name) + _ENTRY_BYTES
+            entry.size += size
+            self._bytes += size
         entry.add(intern(name), kind)
         return entry
 
@@ -265,15 +332,22 @@ class Registry:
         self.changes += 1
         entry = self._nodes[node]
         entry.discard(name, kind)
+        if name not in entry.entries:
+            size = getsizeof(name) + _ENTRY_BYTES
+            entry.size -= size
+            self._bytes -= size
         if not entry.entries:
-            del self._nodes[node]
+            self._remove_node(entry)
 
     def _drop(self, table: dict[str, dict[str, str]], topic: str, node: str, kind: int) -> None:
         _remove(table, topic, node)
         self._leave(node, topic, kind)
 
-    def _tell_subscribers(self, topic: str) -> list[Action]:
-        return [PublisherUpdate(uri, topic) for uri in self._subscribers.get(topic, {}).values()]
+    def _updates(self, *topics: str) -> Iterator[Action]:
+        """Yield an update for each subscriber of the topics, as they are when it is their turn."""
+        for topic in topics:
+            for uri in list(self._subscribers.get(topic, {}).values()):
+                yield PublisherUpdate(uri, topic)
 
 
 def _row(table: dict[str, dict[str, str]], topic: str) -> dict[str, str]:

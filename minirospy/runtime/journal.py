@@ -13,13 +13,15 @@ import errno
 import logging
 import os
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from minirospy import private_files
-from minirospy.wire.journal import HEAD, Recovered, parse_journal, serialize_record
+from minirospy.steps import PAUSE, Steps, finish, is_small
+from minirospy.wire.journal import HEAD, Recovered, pack_in_steps, parse_journal, serialize_record
 
 __all__ = ["RETRY_SECONDS", "Journal", "JournalBusyError", "Left", "boot_id"]
 
@@ -27,6 +29,7 @@ _log = logging.getLogger(__name__)
 
 _COMPACT_BYTES = 1024 * 1024
 _COMPACT_FACTOR = 4
+_STEP_RECORDS = 200
 
 RETRY_SECONDS = 30.0
 """After this the journal is tried again that could not be written."""
@@ -73,8 +76,11 @@ class Journal:
         path: Path,
         snapshot: Callable[[], Iterable[list[Any]]],
         clock: Callable[[], float] = time.monotonic,
+        start_steps: Callable[[Steps[None]], object] = finish,
     ) -> None:
+        """``start_steps`` runs what takes long, as a rewrite of a journal that has grown: here and now, or in steps."""
         self.path = path
+        self._start_steps = start_steps
         self._snapshot = snapshot
         self._clock = clock
         self._file = -1
@@ -84,6 +90,12 @@ class Journal:
         self._failed_at = 0.0
         self.trouble = ""
         """Why nothing is written at present."""
+        # The numbers of large values that are being stored, and the last number.
+        self._stored: set[int] = set()
+        self._number = 0
+        # While the journal is rewritten in steps: what was appended since, and then the new file.
+        self._since: list[bytes] | None = None
+        self._second = -1
 
     @property
     def size(self) -> int:
@@ -128,7 +140,8 @@ class Journal:
         """Write the present state and nothing else. Raises OSError; the old file then remains."""
         head = HEAD + serialize_record(["boot", boot_id()])
         data = head + b"".join(serialize_record(record) for record in self._snapshot())
-        new = self.path.with_name(self.path.name + ".new")
+        self._abandon()
+        new = self._new_path
         file = private_files.create_file(new)
         try:
             _write_all(file, data)
@@ -152,10 +165,7 @@ class Journal:
                 new.unlink(missing_ok=True)
             raise
 
-        self._file = file
-        self._size = len(data)
-        self._compact_at = max(_COMPACT_BYTES, _COMPACT_FACTOR * len(data))
-        self.trouble = ""
+        self._switch_to(file, len(data))
 
     def append(self, *record: Any) -> None:
         """Write one change. Never raises."""
@@ -163,16 +173,115 @@ class Journal:
             self.retry()
             return
         try:
-            data = serialize_record(list(record))
-            _write_all(self._file, data)
-            self._size += len(data)
-            if self._size > self._compact_at:
-                self.rewrite()
+            if record[0] == "put":
+                if record[2] not in self._stored:
+                    # The disk failed meanwhile, and the parts of the value went with the old file.
+                    self.rewrite()
+                    return
+                self._stored.discard(record[2])
+            self._write(serialize_record(list(record)))
+            if self._size > self._compact_at and not self._stored and not self._is_rewriting:
+                self._since = []
+                self._start_steps(self._rewrite_in_steps())
         except (OSError, ValueError, TypeError) as error:
             self._fail(error)
-            _log.error(
-                "the journal %s cannot be written, a crash would lose the graph: %s", self.path, self.trouble
-            )
+
+    def store(self, value: Any) -> Steps[int]:
+        """Write a large value in parts; return the number by which a record "put" refers to it. Never raises."""
+        while self._is_rewriting:
+            yield PAUSE
+        self._number += 1
+        number = self._number
+        self._stored.add(number)
+        is_whole = False
+        try:
+            for piece in pack_in_steps(value):
+                if self._file >= 0 and number in self._stored:
+                    self._write(serialize_record(["part", number, piece]))
+                yield None
+            is_whole = True
+        except (OSError, ValueError, TypeError) as error:
+            self._fail(error)
+        finally:
+            if not is_whole:
+                self._stored.discard(number)
+        return number
+
+    @property
+    def _is_rewriting(self) -> bool:
+        return self._since is not None or self._second >= 0
+
+    def _write(self, data: bytes) -> None:
+        _write_all(self._file, data)
+        self._size += len(data)
+        if self._since is not None:
+            self._since.append(data)
+        elif self._second >= 0:
+            try:
+                _write_all(self._second, data)
+            except OSError:
+                # The old file goes on growing for a while.
+                self._compact_at = 2 * self._size
+                self._abandon()
+
+    def _rewrite_in_steps(self) -> Steps[None]:
+        """Do the same as :meth:`rewrite`, while others append."""
+        new, size = self._new_path, 0
+        try:
+            records = self._snapshot()
+            self._second = private_files.create_file(new)
+            for piece in _pieces_of(records):
+                _write_all(self._second, piece)
+                size += len(piece)
+                yield None
+            since, self._since = self._since or [], None
+            for piece in since:
+                _write_all(self._second, piece)
+                size += len(piece)
+
+            # The disk may take long.
+            syncing = threading.Thread(target=_sync, args=(self._second,), daemon=True)
+            before = self._size
+            syncing.start()
+            while syncing.is_alive():
+                yield PAUSE
+            self._replace(size + self._size - before)
+        except (OSError, ValueError, TypeError) as error:
+            _log.warning("the journal %s could not be rewritten, it goes on growing: %s", self.path, error)
+            self._compact_at = 2 * self._size
+        finally:
+            self._abandon()
+
+    def _replace(self, size: int) -> None:
+        """Put the new file in the place of the old one. Raises OSError."""
+        if self._second < 0:
+            # It was given up meanwhile.
+            return
+        file, self._second = self._second, -1
+        self._close_file()
+        if sys.platform == "win32":
+            os.close(file)
+            os.replace(self._new_path, self.path)
+            file = private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
+        else:
+            os.replace(self._new_path, self.path)
+        self._switch_to(file, size)
+
+    def _switch_to(self, file: int, size: int) -> None:
+        self._file = file
+        self._size = size
+        self._compact_at = max(_COMPACT_BYTES, _COMPACT_FACTOR * size)
+        self._stored.clear()
+        self.trouble = ""
+
+    def _abandon(self) -> None:
+        """Give up a rewrite in steps. Idempotent."""
+        self._since = None
+        if self._second >= 0:
+            os.close(self._second)
+            self._second = -1
+            with contextlib.suppress(OSError):
+                self._new_path.unlink(missing_ok=True)
 
     def retry(self) -> None:
         """Write the present state where nothing could be written half a minute ago. Never raises."""
@@ -195,6 +304,7 @@ class Journal:
 
     def close(self) -> None:
         """Release the file and leave it as it is. Idempotent."""
+        self._abandon()
         self._close_file()
         self.trouble = ""
         if self._lock >= 0:
@@ -205,6 +315,10 @@ class Journal:
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
+
+    @property
+    def _new_path(self) -> Path:
+        return self.path.with_name(self.path.name + ".new")
 
     @property
     def _copy_path(self) -> Path:
@@ -239,7 +353,31 @@ class Journal:
             )
         self.trouble = trouble
         self._failed_at = self._clock()
+        self._abandon()
         self._close_file()
+
+
+def _pieces_of(records: Iterable[list[Any]]) -> Iterator[bytes]:
+    """Yield the bytes of a whole journal, large values in parts."""
+    yield HEAD + serialize_record(["boot", boot_id()])
+    written: list[bytes] = []
+    for number, record in enumerate(records):
+        if record[0] == "set" and not is_small(record[2]):
+            # Numbers below zero: those of values that are stored later are above.
+            for piece in pack_in_steps(record[2]):
+                yield serialize_record(["part", -number - 1, piece])
+            written.append(serialize_record(["put", record[1], -number - 1]))
+        else:
+            written.append(serialize_record(record))
+        if len(written) == _STEP_RECORDS:
+            yield b"".join(written)
+            written.clear()
+    yield b"".join(written)
+
+
+def _sync(file: int) -> None:
+    with contextlib.suppress(OSError):
+        os.fsync(file)
 
 
 def _write_all(file: int, data: bytes) -> None:

@@ -12,18 +12,22 @@ import re
 import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sized
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import minirospy
-from minirospy.errors import RpcError, RpcUnreachable
-from minirospy.graph.parameters import ParameterTree, ParameterUpdate
+from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
 from minirospy.runtime.access import Access
+from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.master_api import Answer, MasterApi, key_of_node, nothing
 from minirospy.runtime.notifier import Notice, Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
+from minirospy.steps import Steps, finish
+from minirospy.wire.journal import unpack
 
 if TYPE_CHECKING:
     from minirospy.runtime.journal import Journal
@@ -77,6 +81,8 @@ class Master(MasterApi):
         self._journal_path = journal
         self._fresh = fresh
         self._journal: Any = None
+        # Large values whose parts were found in the journal.
+        self._parts: dict[int, list[bytes]] = {}
         self._nearby = nearby
         self._server = RpcServer(
             self.serve,
@@ -86,7 +92,8 @@ class Master(MasterApi):
             access=access,
             known_as=_names_of(host, bind_host) if nearby else (),
         )
-        self._notifier = Notifier(self._publishers_of, timeout, nearby=nearby)
+        self._notifier = Notifier(self, self._server.turns, timeout, nearby=nearby)
+        self._replaced = Complaints(_log, 10)
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
         self.stopped = asyncio.Event()
@@ -142,6 +149,7 @@ class Master(MasterApi):
             self._touching.cancel()
         await self._server.close()
         await self._notifier.close()
+        self._replaced.close()
         self.note = nothing
         if self._journal:
             if keep_journal:
@@ -153,13 +161,24 @@ class Master(MasterApi):
         """``node``, which has started, is on this loop: it is told of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
-    def act(self, actions: Iterable[Notice]) -> None:
-        """Call the nodes that are to be told."""
-        for action in actions:
-            if isinstance(action, NodeShutdown):
-                self.parameters.unsubscribe_node(action.name, action.uri)
-                _log.warning("another node took the name %s: %s is told to stop", action.name, action.uri)
-            self._notifier.send(action)
+    def act(self, action: Notice) -> None:
+        """Call the node that is to be notified."""
+        if isinstance(action, NodeShutdown):
+            self.parameters.unsubscribe_node(action.name, action.uri)
+            self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
+        self._notifier.send(action)
+
+    def publisher_uris(self, topic: str) -> list[str]:
+        """Return the URIs of a topic's publishers."""
+        return self.registry.publisher_uris(topic)
+
+    def parameter(self, key: str) -> Any:
+        """Return a parameter's value, {} where it is not set."""
+        return self.parameters.get(key) if self.parameters.has(key) else {}
+
+    def subscribed_parameters(self, uri: str) -> list[str]:
+        """Return the keys of parameters that the node at ``uri`` has subscribed to."""
+        return self.parameters.subscribed_keys(uri)
 
     def hold(self, uri: str, topic: str) -> None:
         """See :meth:`Notifier.hold`."""
@@ -169,8 +188,15 @@ class Master(MasterApi):
         """Somebody asked the master to stop."""
         self.stopped.set()
 
-    def get_status(self, caller_id: str) -> Answer:
+    def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
         """How this master is: minirospy's own, for `minirospy master --status`."""
+
+        def collect() -> Steps[Answer]:
+            return self._status((yield from self.parameters.names_in_steps()))
+
+        return finish(collect()) if self.parameters.is_small else collect()
+
+    def _status(self, parameters: Sized) -> Answer:
         types = self.registry.topic_types()
         return [
             1,
@@ -184,16 +210,13 @@ class Master(MasterApi):
                 "topics": len(self.registry.publishers().keys() | self.registry.subscribers().keys()),
                 "types": len(types),
                 "services": len(self.registry.services()),
-                "parameters": len(self.parameters.names()),
+                "parameters": len(parameters),
                 "calls": min(self.calls, 2**31 - 1),
                 "clients": self._server.clients,
                 "refused": self._server.refused,
                 "journal": self._journal_line(),
             },
         ]
-
-    def _publishers_of(self, topic: str) -> list[str]:
-        return self.registry.publisher_uris(topic)
 
     # --- the journal
 
@@ -209,7 +232,9 @@ class Master(MasterApi):
         from minirospy.runtime.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
-        journal = self._journal = Journal(self._journal_path, self._snapshot)
+        journal = self._journal = Journal(
+            self._journal_path, self._snapshot, start_steps=self._server.turns.start
+        )
         try:
             await _lock(journal)
         except JournalBusyError as error:
@@ -231,7 +256,7 @@ class Master(MasterApi):
                 f"no journal, a crash of the master would lose the graph: {self._journal_path} cannot be written: "
                 f"{journal.trouble}; set ROS_HOME (it is tried again every {RETRY_SECONDS:.0f} s)"
             )
-        self.note = journal.append
+        self.note, self.store = journal.append, journal.store
         self._touch()
         return self.registry.nodes()
 
@@ -240,8 +265,9 @@ class Master(MasterApi):
         for record in recovered.records:
             try:
                 self._replay(*record)
-            except (TypeError, ValueError, KeyError) as error:
+            except (TypeError, ValueError, KeyError, MinirospyError) as error:
                 self.news.append(f"journal: a record was left out: {error}")
+        self._parts.clear()
         uri = self.registry.node_uri(_OWN_NODE)
         if uri:
             # The /rosout node went with its master; this one brings its own.
@@ -293,7 +319,12 @@ class Master(MasterApi):
             case "type", (topic, type_):
                 registry.set_type(topic, type_)
             case "set", (key, value):
-                parameters.set(key, value, "")
+                parameters.set(key, value, "", finish(weigh_in_steps(key, value)))
+            case "part", (int(number), bytes(data)):
+                self._parts.setdefault(number, []).append(data)
+            case "put", (key, number):
+                value = unpack(b"".join(self._parts.pop(number)))
+                parameters.set(key, value, "", finish(weigh_in_steps(key, value)))
             case "del", (key,):
                 parameters.delete(key)
             case _:
@@ -303,17 +334,23 @@ class Master(MasterApi):
                 parameters.unsubscribe_node(action.name, action.uri)
 
     def _snapshot(self) -> Iterator[list[Any]]:
-        """The changes that lead from nothing to the present state, with the order of every table."""
+        """Return the changes that lead from nothing to the present state, with the order of every table.
+
+        The state is copied here and now: the changes may be read while it goes on changing.
+        """
         registry = self.registry
         uris, types = registry.nodes(), registry.topic_types()
-        yield from (["type", topic, type_] for topic, type_ in types.items())
-        yield from (
-            ["+pub", node, topic, types[topic], uris[node]] for node, topic in registry.publications()
+        publications, subscriptions = list(registry.publications()), list(registry.all_subscriptions())
+        offers, parameters = list(registry.offers()), list(self.parameters.subscriptions())
+        tree = self.parameters.get("/")
+        return chain(
+            (["type", topic, type_] for topic, type_ in types.items()),
+            (["+pub", node, topic, types[topic], uris[node]] for node, topic in publications),
+            (["+sub", node, topic, "*", uris[node]] for node, topic in subscriptions),
+            (["+srv", node, name, uri, uris[node]] for node, name, uri in offers),
+            (["+par", node, key, uri] for node, uri, key in parameters),
+            (["set", "/", tree],),
         )
-        yield from (["+sub", node, topic, "*", uris[node]] for node, topic in registry.all_subscriptions())
-        yield from (["+srv", node, name, uri, uris[node]] for node, name, uri in registry.offers())
-        yield from (["+par", node, key, uri] for node, uri, key in self.parameters.subscriptions())
-        yield ["set", "/", self.parameters.get("/")]
 
     def _touch(self) -> None:
         self._journal.touch()
@@ -339,19 +376,16 @@ class Master(MasterApi):
             async with slots:
                 lives = await _lives(rpc, name, uri, _CHECK_SECONDS, _CHECK_TRIES)
             if not lives:
-                self.act(self._forget(name, uri))
+                self._act(self._forget(name, uri))
                 self.note("gone", name, uri)
                 return False
             if self.registry.node_uri(name) == uri:
-                self.act(PublisherUpdate(uri, topic) for topic in self.registry.subscriptions(name))
+                self._act(PublisherUpdate(uri, topic) for topic in self.registry.subscriptions(name))
             return True
 
         try:
             found = await asyncio.gather(*(check(name, uri) for name, uri in nodes.items()))
-            self.act(
-                ParameterUpdate(uri, key, self.parameters.get(key) if self.parameters.has(key) else {})
-                for _, uri, key in list(self.parameters.subscriptions())
-            )
+            self._act(ParameterUpdate(uri, key) for _, uri, key in list(self.parameters.subscriptions()))
         finally:
             await rpc.close()
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))

@@ -10,16 +10,19 @@ from __future__ import annotations
 import logging
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 from minirospy import names
 from minirospy.errors import RpcFault
 from minirospy.escape import escaped, has_controls
-from minirospy.graph.parameters import ParameterTree, check_value
-from minirospy.graph.registry import Registry
+from minirospy.graph.parameters import ParametersFullError, ParameterTree, weigh_in_steps
+from minirospy.graph.registry import Registry, RegistryFullError
 from minirospy.runtime.notifier import PARAMETERS, Notice
-from minirospy.wire.xmlrpc import Serialized, serialize_response
+from minirospy.steps import ALONE, Steps, finish, is_small
+from minirospy.wire.http import MAX_BODY
+from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 __all__ = ["Answer", "MasterApi", "key_of_node"]
 
@@ -27,11 +30,20 @@ _log = logging.getLogger(__name__)
 
 _SUCCESS, _FAILURE, _ERROR = 1, 0, -1
 
+_MAX_NAME = 4096
+"""Characters of a name, a type or a URI."""
+
+_FEW = 200
+"""Nodes that may be notified in one step."""
+
 Answer = list[Any]
 
 
+_Function = Callable[..., "Answer | Steps[Answer]"]
+
+
 class _Method(NamedTuple):
-    function: Callable[..., Answer]
+    function: _Function
     fewest: int
     most: int
     refused: Any
@@ -51,7 +63,9 @@ class MasterApi(ABC):
         self.say: Callable[[str], object] = nothing
         """Gets a line for each registration."""
         self.note: Callable[..., object] = nothing
-        """Gets each change, as it is written to the journal."""
+        """Receives each change, as it is written to the journal."""
+        self.store: Callable[[Any], Steps[int]] = _store_nothing
+        """Writes a large value to the journal, and returns the number that a change refers to it by."""
         # The answer to getSystemState, and after which change of the registry it was written.
         self._state = (-1, Serialized())
         # Name on the wire -> method, and the value of an answer that refuses.
@@ -90,8 +104,15 @@ class MasterApi(ABC):
         """What ROS_MASTER_URI has to say."""
 
     @abstractmethod
-    def act(self, actions: Iterable[Notice]) -> None:
-        """Do what a change of the tables asks for."""
+    def act(self, action: Notice) -> None:
+        """Do what a change of the tables requires."""
+
+    def act_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
+        """Do what a change of the tables requires, which may be much."""
+        for number, action in enumerate(actions):
+            self.act(action)
+            if number % _FEW == _FEW - 1:
+                yield None
 
     @abstractmethod
     def hold(self, uri: str, topic: str) -> None:
@@ -102,18 +123,21 @@ class MasterApi(ABC):
         """Somebody asked the master to stop."""
 
     @abstractmethod
-    def get_status(self, caller_id: str) -> Answer:
+    def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
         """How this master is: minirospy's own, for `minirospy master --status`."""
 
     def serve(self, method: str, args: Sequence[Any]) -> Any:
-        """The answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
+        """Return the answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
-            return self._written_state(args[0])
+            if self._state[0] == self.registry.changes:
+                return self._state[1]
+            steps = self._write_state(args[0])
+            return finish(steps) if self.registry.is_small else steps
         return self.dispatch(method, args)
 
     def dispatch(self, method: str, args: Sequence[Any]) -> Any:
-        """The answer to one call. Raises RpcFault on a method that is not there."""
+        """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
         entry = self._methods.get(method)
         if entry is None:
             return self._system(method, args)
@@ -123,12 +147,21 @@ class MasterApi(ABC):
             return [_ERROR, "Error: bad call arity", entry.refused]
         if not isinstance(args[0], str):
             return [_ERROR, "caller_id must be a string", entry.refused]
-        if has_controls(args[0]):
-            return [_ERROR, "caller_id contains illegal chars", entry.refused]
         try:
-            return entry.function(*args)
-        except _Refusal as refusal:
+            if len(args[0]) > _MAX_NAME:
+                raise _Refusal(f"ERROR: the caller_id has more than {_MAX_NAME} characters")
+            if has_controls(args[0]):
+                raise _Refusal("caller_id contains illegal chars")
+            answer = entry.function(*args)
+        except _REFUSALS as refusal:
             return [_ERROR, str(refusal), entry.refused]
+        return answer if isinstance(answer, list) else self._answer_in_steps(answer, entry.refused)
+
+    def _answer_in_steps(self, steps: Steps[Answer], refused: Any) -> Steps[Answer]:
+        try:
+            return (yield from steps)
+        except _REFUSALS as refusal:
+            return [_ERROR, str(refusal), refused]
 
     # --- about the master
 
@@ -164,12 +197,14 @@ class MasterApi(ABC):
         tables = (self.registry.publishers(), self.registry.subscribers(), self.registry.services())
         return [_SUCCESS, "current system state", [_rows(table) for table in tables]]
 
-    def _written_state(self, caller_id: str) -> Serialized:
-        """The same as it is sent: of a large graph it takes long to write, and tools ask for it all the time."""
-        if self._state[0] != self.registry.changes:
-            state = Serialized(serialize_response(self.get_system_state(caller_id)))
-            self._state = (self.registry.changes, state)
-        return self._state[1]
+    def _write_state(self, caller_id: str) -> Steps[Serialized]:
+        """Return the same as it is sent: of a large graph it takes long to write, and tools request it all the time."""
+        changes = self.registry.changes
+        pieces = yield from serialize_response_in_steps(self.get_system_state(caller_id), MAX_BODY)
+        state = Serialized(b"".join(pieces))
+        if changes == self.registry.changes:
+            self._state = (changes, state)
+        return state
 
     def get_topic_types(self, caller_id: str) -> Answer:
         """[topic, type] of each topic."""
@@ -182,32 +217,43 @@ class MasterApi(ABC):
         prefix = names.resolve(subgraph, caller_id) if subgraph else ""
         return [_SUCCESS, "current topics", [list(row) for row in self.registry.published_topics(prefix)]]
 
-    def register_publisher(self, caller_id: str, topic: Any, topic_type: Any, caller_api: Any) -> Answer:
+    def register_publisher(
+        self, caller_id: str, topic: Any, topic_type: Any, caller_api: Any
+    ) -> Answer | Steps[Answer]:
         """A node publishes a topic; the URIs of its subscribers."""
         topic = _name(topic, "topic", caller_id)
         type_, uri = _type(topic_type, "topic_type"), _uri(caller_api, "caller_api")
-        peers, actions = self.registry.register_publisher(caller_id, topic, type_, uri)
-        self.act(actions)
-        self.note("+pub", caller_id, topic, type_, uri)
-        self.say(f"+PUB [{topic}] {caller_id} {uri}")
-        return [_SUCCESS, f"Registered [{caller_id}] as publisher of [{topic}]", peers]
 
-    def unregister_publisher(self, caller_id: str, topic: Any, caller_api: Any) -> Answer:
+        def register() -> Steps[Answer]:
+            peers, actions = self.registry.register_publisher(caller_id, topic, type_, uri)
+            others = self._act_first(actions)
+            self.note("+pub", caller_id, topic, type_, uri)
+            self.say(f"+PUB [{topic}] {caller_id} {uri}")
+            yield from self.act_in_steps(others)
+            return [_SUCCESS, f"Registered [{caller_id}] as publisher of [{topic}]", peers]
+
+        return self._run(register(), self.registry.count_subscribers(topic))
+
+    def unregister_publisher(self, caller_id: str, topic: Any, caller_api: Any) -> Answer | Steps[Answer]:
         """A node publishes a topic no more."""
         topic, uri = _name(topic, "topic", caller_id), _uri(caller_api, "caller_api")
-        actions = self.registry.unregister_publisher(caller_id, topic, uri)
-        if actions is not None:
-            self.act(actions)
-            self.note("-pub", caller_id, topic, uri)
-            self.say(f"-PUB [{topic}] {caller_id} {uri}")
-        return self._unregistered(caller_id, topic, actions is not None)
+
+        def unregister() -> Steps[Answer]:
+            actions = self.registry.unregister_publisher(caller_id, topic, uri)
+            if actions is not None:
+                self.note("-pub", caller_id, topic, uri)
+                self.say(f"-PUB [{topic}] {caller_id} {uri}")
+                yield from self.act_in_steps(actions)
+            return self._unregistered(caller_id, topic, actions is not None)
+
+        return self._run(unregister(), self.registry.count_subscribers(topic))
 
     def register_subscriber(self, caller_id: str, topic: Any, topic_type: Any, caller_api: Any) -> Answer:
         """A node subscribes to a topic; the URIs of its publishers."""
         topic = _name(topic, "topic", caller_id)
         type_, uri = _type(topic_type, "topic_type"), _uri(caller_api, "caller_api")
         peers, actions = self.registry.register_subscriber(caller_id, topic, type_, uri)
-        self.act(actions)
+        self._act(actions)
         self.hold(uri, topic)
         self.note("+sub", caller_id, topic, type_, uri)
         self.say(f"+SUB [{topic}] {caller_id} {uri}")
@@ -227,7 +273,7 @@ class MasterApi(ABC):
         service = _name(service, "service", caller_id)
         service_uri, uri = _uri(service_api, "service_api"), _uri(caller_api, "caller_api")
         actions = self.registry.register_service(caller_id, service, service_uri, uri)
-        self.act(actions)
+        self._act(actions)
         self.note("+srv", caller_id, service, service_uri, uri)
         self.say(f"+SERVICE [{service}] {caller_id} {uri}")
         return [_SUCCESS, f"Registered [{caller_id}] as provider of [{service}]", 1]
@@ -253,17 +299,38 @@ class MasterApi(ABC):
         except KeyError:
             return [_ERROR, f"Parameter [{name}] is not set", 0]
 
-    def set_param(self, caller_id: str, key: Any, value: Any) -> Answer:
+    def set_param(self, caller_id: str, key: Any, value: Any) -> Answer | Steps[Answer]:
         """Set a parameter."""
         name = _key(key, caller_id)
+        if not is_small(value):
+            return self._set_large(caller_id, name, value)
+        weight = finish(_weigh(name, value))
+        if not self.parameters.has_room(weight):
+            return self._set_large(caller_id, name, value)
+        steps = self._set(caller_id, name, value, weight)
+        return self._run(steps, self.parameters.count_subscriptions())
+
+    def _set_large(self, caller_id: str, name: str, value: Any) -> Steps[Answer]:
+        # One at a time: the value is in the tree, or it is freed, before the next one comes.
+        yield ALONE
+        weight = yield from _weigh(name, value)
+        yield from self.parameters.make_room(weight)
+        number = None if is_small(value) else (yield from self.store(value))
+        return (yield from self._set(caller_id, name, value, weight, number))
+
+    def _set(
+        self, caller_id: str, name: str, value: Any, weight: int, number: int | None = None
+    ) -> Steps[Answer]:
         try:
-            check_value(name, value)
-            updates = self.parameters.set(name, value, caller_id)
+            updates = self.parameters.set(name, value, caller_id, weight)
         except ValueError as error:
             raise _Refusal(f"Error: invalid arguments: {error}") from error
-        self.act(updates)
-        self.note("set", name, value)
+        if number is None:
+            self.note("set", name, value)
+        else:
+            self.note("put", name, number)
         self.say(f"+PARAM [{name}] by {caller_id}")
+        yield from self.act_in_steps(updates)
         return [_SUCCESS, f"parameter {name} set", 0]
 
     def has_param(self, caller_id: str, key: Any) -> Answer:
@@ -271,17 +338,21 @@ class MasterApi(ABC):
         name = _key(key, caller_id)
         return [_SUCCESS, name, self.parameters.has(name)]
 
-    def delete_param(self, caller_id: str, key: Any) -> Answer:
+    def delete_param(self, caller_id: str, key: Any) -> Answer | Steps[Answer]:
         """Delete a parameter."""
         name = _key(key, caller_id)
         try:
             updates = self.parameters.delete(name)
         except KeyError:
             return [_ERROR, f"parameter [{name}] is not set", 0]
-        self.act(updates)
-        self.note("del", name)
-        self.say(f"-PARAM [{name}] by {caller_id}")
-        return [_SUCCESS, f"parameter {name} deleted", 0]
+
+        def delete() -> Steps[Answer]:
+            self.note("del", name)
+            self.say(f"-PARAM [{name}] by {caller_id}")
+            yield from self.act_in_steps(updates)
+            return [_SUCCESS, f"parameter {name} deleted", 0]
+
+        return self._run(delete(), self.parameters.count_subscriptions())
 
     def search_param(self, caller_id: str, key: Any) -> Answer:
         """The nearest parameter of a name, upwards from the caller's namespace."""
@@ -295,16 +366,20 @@ class MasterApi(ABC):
             return [_ERROR, f"Cannot find parameter [{key}] in an upwards search", ""]
         return [_SUCCESS, f"Found [{found}]", found]
 
-    def get_param_names(self, caller_id: str) -> Answer:
+    def get_param_names(self, caller_id: str) -> Answer | Steps[Answer]:
         """The names of all parameters."""
-        return [_SUCCESS, "Parameter names", self.parameters.names()]
+
+        def collect() -> Steps[Answer]:
+            return [_SUCCESS, "Parameter names", (yield from self.parameters.names_in_steps())]
+
+        return finish(collect()) if self.parameters.is_small else collect()
 
     def subscribe_param(self, caller_id: str, caller_api: Any, key: Any) -> Answer:
         """Tell a node of changes of a parameter; its value now."""
         uri, name = _uri(caller_api, "caller_api"), _key(key, caller_id)
         actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
         value = self.parameters.subscribe(name, caller_id, uri)
-        self.act(actions)
+        self._act(actions)
         self.hold(uri, PARAMETERS)
         self.note("+par", caller_id, name, uri)
         self.say(f"+CACHEDPARAM [{name}] by {caller_id}")
@@ -321,6 +396,24 @@ class MasterApi(ABC):
 
     # --- helpers
 
+    def _run(self, steps: Steps[Answer], actions: int) -> Answer | Steps[Answer]:
+        """Return the answer immediately where it takes few actions, else the steps to it."""
+        return finish(steps) if actions <= _FEW else steps
+
+    def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
+        """Do the first action, and return the others.
+
+        It may stop a node whose name another one took: its parameters are dropped before the change is noted.
+        """
+        others = iter(actions)
+        for action in islice(others, 1):
+            self.act(action)
+        return others
+
+    def _act(self, actions: Iterable[Notice]) -> None:
+        for action in actions:
+            self.act(action)
+
     def _unregistered(self, caller_id: str, topic: str, gone: bool) -> Answer:
         if gone:
             return [_SUCCESS, f"Unregistered [{caller_id}] as provider of [{topic}]", 1]
@@ -335,27 +428,50 @@ class MasterApi(ABC):
         if method == "system.multicall":
             if len(args) != 1 or not isinstance(args[0], list):
                 raise RpcFault(1, "system.multicall takes a list of structs of methodName and params")
-            return [self._one_of_many(call) for call in args[0]]
-        raise RpcFault(1, f"<class 'Exception'>:method \"{method}\" is not supported")
+            return self._call_many(args[0])
+        raise RpcFault(1, f"<class 'Exception'>:method \"{method[:_MAX_NAME]}\" is not supported")
 
-    def _one_of_many(self, call: Any) -> Any:
+    def _call_many(self, calls: list[Any]) -> Steps[list[Any]]:
+        answers = []
+        for call in calls:
+            answers.append((yield from self._one_of_many(call)))
+            yield None
+        return answers
+
+    def _one_of_many(self, call: Any) -> Steps[Any]:
         match call:
             case {"methodName": "system.multicall"}:
                 return {"faultCode": 1, "faultString": "system.multicall inside itself"}
             case {"methodName": str(method), "params": list(params)}:
                 try:
-                    return [self.dispatch(method, params)]
+                    answer = self.dispatch(method, params)
+                    return [answer if type(answer) is list else (yield from answer)]
                 except RpcFault as fault:
                     return {"faultCode": fault.code, "faultString": fault.text}
             case _:
                 return {"faultCode": 1, "faultString": "a call is a struct of methodName and params"}
 
 
+_REFUSALS = (_Refusal, RegistryFullError, ParametersFullError)
+
+
+def _weigh(name: str, value: Any) -> Steps[int]:
+    try:
+        return (yield from weigh_in_steps(name, value))
+    except ValueError as error:
+        raise _Refusal(f"Error: invalid arguments: {error}") from error
+
+
+def _store_nothing(_: Any) -> Steps[int]:
+    yield None
+    return 0
+
+
 def nothing(*_: object) -> None:
     """What stands where a journal or a log would."""
 
 
-def _arity(function: Callable[..., Answer]) -> tuple[int, int]:
+def _arity(function: _Function) -> tuple[int, int]:
     most = function.__code__.co_argcount - 1
     return most - len(getattr(function, "__defaults__", None) or ()), most
 
@@ -368,6 +484,7 @@ def _name(value: Any, what: str, caller_id: str) -> str:
     """A graph resource name, resolved as the caller sees it."""
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
+    _check_length(value, what)
     # rosmaster lets in much that is no legal name: many a robot's topics have a dash.
     if ":" in value or " " in value or has_controls(value):
         raise _Refusal(f"ERROR: parameter [{what}] contains illegal chars")
@@ -388,6 +505,7 @@ def _check_key(value: Any) -> None:
         raise _Refusal("ERROR: parameter [key] must be specified and non-empty")
     if not isinstance(value, str):
         raise _Refusal("ERROR: parameter [key] must be a string")
+    _check_length(value, "key")
 
 
 def _key(value: Any, caller_id: str) -> str:
@@ -400,6 +518,7 @@ def _type(value: Any, what: str) -> str:
     """A type ``pkg/Name``, or ``*``."""
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] must be a non-empty string")
+    _check_length(value, what)
     if value != "*" and (value.count("/") != 1 or has_controls(value)):
         raise _Refusal(f"ERROR: parameter [{what}] is not a valid package resource name")
     return value
@@ -408,12 +527,18 @@ def _type(value: Any, what: str) -> str:
 def _uri(value: Any, what: str) -> str:
     if not isinstance(value, str) or not value:
         raise _Refusal(f"ERROR: parameter [{what}] is not an XMLRPC URI")
+    _check_length(value, what)
     if not value.startswith(("http://", "rosrpc://")):
         raise _Refusal(f"ERROR: parameter [{what}] is not an RPC URI")
     if " " in value or has_controls(value):
         # It becomes part of the requests to the node, and of lines of logs.
         raise _Refusal(f"ERROR: parameter [{what}] contains illegal chars")
     return value
+
+
+def _check_length(value: str, what: str) -> None:
+    if len(value) > _MAX_NAME:
+        raise _Refusal(f"ERROR: parameter [{what}] has more than {_MAX_NAME} characters")
 
 
 def key_of_node(key: str) -> str:

@@ -8,14 +8,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, Protocol
 
-from minirospy.errors import RpcError, RpcUnreachable
+from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.parameters import ParameterUpdate
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate
 from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.wire.xmlrpc import serialize_call
+from minirospy.runtime.turns import Turns
+from minirospy.steps import ALONE, Steps, is_small
+from minirospy.wire.http import MAX_BODY, Body
+from minirospy.wire.xmlrpc import serialize_call, serialize_call_in_steps
 
-__all__ = ["PARAMETERS", "Notice", "Notifier"]
+__all__ = ["PARAMETERS", "Notice", "Notifier", "State"]
 
 _log = logging.getLogger(__name__)
 
@@ -29,10 +33,33 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
+_CALLS_IN_ONE_TURN = 50
+_MOST_PARAMETERS = 32
+"""Parameters of which a node is still to be notified; beyond that, those that it has subscribed to are one each."""
+
+_LARGE_BYTES = 32 * 1024 * 1024
+"""Bytes of large calls that are under way, before the next one waits."""
+
+_MAX_ANSWER = 65536
+"""Nobody reads what a node answers to a notice."""
+
 PARAMETERS = ""
 """For :meth:`Notifier.hold`: no topic has this name."""
 
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
+
+
+class State(Protocol):
+    """The graph and the parameters, as they are when a node is called."""
+
+    def publisher_uris(self, topic: str) -> list[str]:
+        """Return the URIs of a topic's publishers."""
+
+    def parameter(self, key: str) -> Any:
+        """Return a parameter's value, {} where it is not set; it is not changed afterwards."""
+
+    def subscribed_parameters(self, uri: str) -> list[str]:
+        """Return the keys that the node at ``uri`` has subscribed to."""
 
 
 @dataclass(eq=False, slots=True)
@@ -41,6 +68,8 @@ class _Node:
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
+    parameters: int = 0
+    """How many of them are of parameters."""
     pauses: dict[object, float] = field(default_factory=dict)
     """Until when no more is said of a topic."""
     timer: asyncio.TimerHandle | None = None
@@ -63,13 +92,12 @@ class Notifier:
     follows after a pause.
     """
 
-    def __init__(
-        self, publishers: Callable[[str], list[str]], timeout: float, *, nearby: bool = True
-    ) -> None:
-        """``publishers(topic)``: the list as it is now. ``timeout``: seconds that a call may take."""
-        self._publishers = publishers
+    def __init__(self, state: State, turns: Turns, timeout: float, *, nearby: bool = True) -> None:
+        """``turns`` runs what takes long. ``timeout``: seconds that a call may take."""
+        self._state = state
+        self._turns = turns
         self._timeout = timeout
-        self._rpc = AsyncRpcClient(nearby=nearby)
+        self._rpc = AsyncRpcClient(nearby=nearby, max_answer=_MAX_ANSWER)
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
         self._nodes: dict[str, _Node] = {}
@@ -82,6 +110,12 @@ class Notifier:
         self._closed = False
         # The last update that was written: the subscribers of one topic all get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
+        # The same for a large one, of a topic or a parameter.
+        self._last_large: tuple[str, Any, bytes] = ("", None, b"")
+        # Large calls that wait; bytes of those that are under way; whether one is being written.
+        self._large: deque[Callable[[], None]] = deque()
+        self._large_bytes = 0
+        self._is_writing = False
 
     def hold(self, uri: str, topic: str) -> None:
         """The node gets an answer that tells how a topic, or PARAMETERS, is now: a change is told a moment later.
@@ -111,10 +145,12 @@ class Notifier:
             node = self._nodes[notice.uri] = _Node(notice.uri)
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
-        if isinstance(notice, ParameterUpdate):
-            # Behind what was said of its parents and children meanwhile.
-            node.notices.pop(key, None)
+        # A parameter comes after what was sent of its parents and children meanwhile.
+        if isinstance(notice, ParameterUpdate) and node.notices.pop(key, None) is None:
+            node.parameters += 1
         node.notices[key] = notice
+        if node.parameters > _MOST_PARAMETERS:
+            self._summarize(node)
         if is_idle:
             self._go_on(node)
 
@@ -125,6 +161,14 @@ class Notifier:
             if node.timer:
                 node.timer.cancel()
         await self._rpc.close()
+
+    def _summarize(self, node: _Node) -> None:
+        """Replace the notices of many parameters by one for each subscription of the node."""
+        for key in [key for key, notice in node.notices.items() if isinstance(notice, ParameterUpdate)]:
+            del node.notices[key]
+        for name in self._state.subscribed_parameters(node.uri):
+            node.notices[name,] = ParameterUpdate(node.uri, name)
+        node.parameters = 0
 
     def _line_up(self, node: _Node) -> None:
         (self._suspect_line if node.uri in self._suspects else self._line).waiting.append(node)
@@ -139,11 +183,14 @@ class Notifier:
     def _start(self) -> None:
         self._starts_soon = False
         for line in (self._line, self._suspect_line):
-            while line.waiting and line.under_way < line.most and not self._closed:
-                self._call(line.waiting.popleft(), line)
+            for _ in range(_CALLS_IN_ONE_TURN):
+                if line.waiting and line.under_way < line.most and not self._closed:
+                    self._call(line.waiting.popleft(), line)
+            if line.waiting and line.under_way < line.most and not self._closed:
+                self._start_soon()
 
     def _call(self, node: _Node, line: _Line) -> None:
-        """Tell a node the first thing that need not wait."""
+        """Send a node the first notice that need not wait."""
         key = next((key for key in node.notices if key not in node.pauses), None)
         if key is None:
             self._go_on(node)
@@ -151,22 +198,82 @@ class Notifier:
         notice, count = node.notices.pop(key), 0
         line.under_way += 1
         if isinstance(notice, PublisherUpdate):
-            publishers = self._publishers(notice.topic)
+            publishers = self._state.publisher_uris(notice.topic)
             count = len(publishers)
             if node.uri in self.here:
                 self.here[node.uri](notice.topic, publishers)
-                self._called(node, line, notice, count, b"")
+                self._called(node, line, notice, count, 0, b"")
+                return
+            if not is_small(publishers):
+                self._call_later(node, line, notice, count)
                 return
             body = self._update(notice.topic, publishers)
         elif isinstance(notice, ParameterUpdate):
-            body = serialize_call("paramUpdate", [_MASTER, notice.key, notice.value])
+            node.parameters = max(0, node.parameters - 1)
+            value = self._state.parameter(notice.key)
+            if not is_small(value):
+                self._call_later(node, line, notice, count)
+                return
+            body = serialize_call("paramUpdate", [_MASTER, notice.key, value])
         else:
             body = serialize_call("shutdown", [_MASTER, f"[{notice.name}] Reason: {notice.reason}"])
-        self._rpc.begin(node.uri, body, self._timeout, partial(self._called, node, line, notice, count))
+        self._rpc.begin(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
 
-    def _called(self, node: _Node, line: _Line, notice: Notice, count: int, answer: bytes | RpcError) -> None:
-        """A call is done, which told of ``count`` publishers; nobody asks what was answered."""
+    def _call_later(
+        self, node: _Node, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
+    ) -> None:
+        """Send a large notice as soon as there is memory for it."""
+
+        def start() -> None:
+            self._turns.start(self._call_in_steps(node, line, notice, count))
+
+        # Nodes that answered last time come first.
+        (self._large.append if line is self._suspect_line else self._large.appendleft)(start)
+        self._start_large()
+
+    def _start_large(self) -> None:
+        if self._large and not self._is_writing and self._large_bytes < _LARGE_BYTES and not self._closed:
+            self._is_writing = True
+            self._large.popleft()()
+
+    def _call_in_steps(
+        self, node: _Node, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
+    ) -> Steps[None]:
+        if isinstance(notice, PublisherUpdate):
+            method, name = "publisherUpdate", notice.topic
+            value: Any = self._state.publisher_uris(name)
+        else:
+            method, name = "paramUpdate", notice.key
+            value = self._state.parameter(name)
+        is_known = self._last_large[0] == name and (
+            value == self._last_large[1] if method == "publisherUpdate" else value is self._last_large[1]
+        )
+        if not is_known:
+            self._last_large = ("", None, b"")
+            yield ALONE
+            try:
+                pieces = yield from serialize_call_in_steps(method, [_MASTER, name, value], MAX_BODY)
+            except RpcProtocolError as error:
+                self._is_writing = False
+                self._called(node, line, notice, count, 0, error)
+                return
+            self._last_large = (name, value, b"".join(pieces))
+        self._is_writing = False
+        body = self._last_large[2]
+        self._large_bytes += len(body)
+        done = partial(self._called, node, line, notice, count, len(body))
+        self._rpc.begin(node.uri, body, self._timeout, done)
+        self._start_large()
+
+    def _called(
+        self, node: _Node, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
+    ) -> None:
+        """Go on after a call that listed ``count`` publishers, ``size`` bytes if it was large."""
         line.under_way -= 1
+        self._large_bytes -= size
+        self._start_large()
+        if not self._large and not self._large_bytes:
+            self._last_large = ("", None, b"")
         if isinstance(answer, RpcUnreachable):
             if len(self._suspects) > _MOST_SUSPECTS:
                 self._suspects.clear()

@@ -15,12 +15,20 @@ from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.runtime import local, tcp
 from minirospy.runtime.deadlines import Deadlines
 from minirospy.runtime.rpc_client import parse_http_uri
-from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
+from minirospy.wire.http import (
+    MAX_BODY,
+    Body,
+    HttpMessage,
+    HttpReader,
+    serialize_request,
+    serialize_request_head,
+)
 from minirospy.wire.xmlrpc import parse_response, serialize_call
 
 __all__ = ["AsyncRpcClient", "Call"]
 
 _RECEIVE = 65536
+_LARGE = 65536
 _KEEP_PER_SERVER = 8
 _KEEP_AT_MOST = 100
 _KEEP_SECONDS = 10.0
@@ -37,9 +45,10 @@ _Address = tuple[str, int]
 class AsyncRpcClient:
     """Calls methods of any server; a few connections to each are kept for a while and reused."""
 
-    def __init__(self, *, nearby: bool = True) -> None:
-        """``nearby``: a Unix socket is tried first."""
+    def __init__(self, *, nearby: bool = True, max_answer: int = MAX_BODY) -> None:
+        """``nearby``: a Unix socket is tried first. ``max_answer``: bytes that an answer may have."""
         self.nearby = nearby
+        self.max_answer = max_answer
         # Of each server, in the order of their last use.
         self._idle: dict[_Address, list[_Connection]] = {}
         self._sweep: asyncio.TimerHandle | None = None
@@ -51,14 +60,14 @@ class AsyncRpcClient:
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError.
         """
-        answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        answer: asyncio.Future[Body] = asyncio.get_running_loop().create_future()
         call = self.begin(uri, serialize_call(method, args), timeout, partial(_settle, answer))
         try:
             return parse_response(await answer)
         finally:
             call.cancel()
 
-    def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[bytes | RpcError], None]) -> Call:
+    def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[Body | RpcError], None]) -> Call:
         """The same without a coroutine, which costs a master as much as all the rest of a call.
 
         ``body`` is the call as XML. ``done`` is called on the loop, perhaps at once, with the answer as XML, or with
@@ -142,7 +151,7 @@ class _Connection:
         # A number, since the loop makes a text of what it does not know yet.
         self._fd = sock.fileno()
         self.call: Call | None = None
-        self.reader = HttpReader()
+        self.reader = HttpReader(client.max_answer)
         self.used = 0.0
         self._is_watched = False
 
@@ -201,6 +210,7 @@ class Call:
         "_is_kept",
         "_left",
         "_loop",
+        "_next",
         "_request",
         "_timeout",
         "_uri",
@@ -213,15 +223,17 @@ class Call:
         uri: str,
         body: bytes,
         timeout: float,
-        done: Callable[[bytes | RpcError], None],
+        done: Callable[[Body | RpcError], None],
     ) -> None:
         self._client = client
         self._uri = uri
         self._timeout = timeout
-        self._done: Callable[[bytes | RpcError], None] | None = done
+        self._done: Callable[[Body | RpcError], None] | None = done
         self._loop = asyncio.get_running_loop()
         self._address: _Address = ("", 0)
-        self._request = body
+        self._request = [body]
+        # Of these parts, the first that has not been started.
+        self._next = 0
         self._left: bytes | memoryview = b""
         self._connection: _Connection | None = None
         self._is_kept = self._writing = False
@@ -235,7 +247,12 @@ class Call:
             self._finish(error)
             return
         self._address = (host, port)
-        self._request = serialize_request(f"{host}:{port}", path, self._request)
+        body = self._request[0]
+        if len(body) < _LARGE:
+            self._request = [serialize_request(f"{host}:{port}", path, body)]
+        else:
+            # Not copied: several calls may send the same one.
+            self._request = [serialize_request_head(f"{host}:{port}", path, len(body)), body]
         client = self._client
         client.under_way.set(self, self._timeout)
         kept = client.take(self._address)
@@ -348,7 +365,8 @@ class Call:
     def _use(self, connection: _Connection) -> None:
         self._connection = connection
         connection.call = self
-        self._left = self._request
+        self._left = self._request[0]
+        self._next = 1
 
     def _send_early(self) -> None:
         """A connection to this machine is made by now, although nobody has said so yet."""
@@ -388,6 +406,10 @@ class Call:
             # A view: a Unix socket takes a large request in many pieces.
             self._left = memoryview(self._left)[count:]
             self._write_on(self._send)
+        elif self._next < len(self._request):
+            self._left = self._request[self._next]
+            self._next += 1
+            self._write_on(self._send)
         else:
             self._left = b""
             self._stop_writing()
@@ -404,7 +426,7 @@ class Call:
         else:
             self._finish(RpcProtocolError(f"{self._uri} answered {message.start}"))
 
-    def _finish(self, found: bytes | RpcError) -> None:
+    def _finish(self, found: Body | RpcError) -> None:
         done, self._done = self._done, None
         if done:
             self._end()
@@ -435,13 +457,13 @@ class Call:
             self._connection.stop_writing()
 
 
-def _settle(answer: asyncio.Future[bytes], found: bytes | RpcError) -> None:
+def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
     if answer.done():
         return
-    if isinstance(found, bytes):
-        answer.set_result(found)
-    else:
+    if isinstance(found, RpcError):
         answer.set_exception(found)
+    else:
+        answer.set_result(found)
 
 
 def _parts(uri: str) -> tuple[str, int, str]:

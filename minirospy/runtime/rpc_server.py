@@ -2,6 +2,10 @@
 
 Its connections are plain sockets that the loop watches: a master serves thousands of short ones, and an asyncio
 transport for each would cost more than all that is done with it.
+
+No client delays the others: a short request is answered immediately, a long one (a large body, a large answer, many
+calls in one) in steps, for a few milliseconds in each turn of the loop (``runtime/turns.py``). What clients have the
+server hold in memory is limited for all of them together: requests that are incomplete, and answers that are not read.
 """
 
 from __future__ import annotations
@@ -11,8 +15,8 @@ import contextlib
 import errno
 import logging
 import socket
-from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections import OrderedDict, deque
+from collections.abc import Awaitable, Callable, Generator, Iterable, Sequence
 from enum import Enum
 from itertools import islice
 from typing import Any
@@ -22,9 +26,19 @@ from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.deadlines import Deadlines
-from minirospy.wire.http import HttpMessage, HttpReader, serialize_error, serialize_response
-from minirospy.wire.xmlrpc import parse_call, serialize_fault
+from minirospy.runtime.turns import Turns
+from minirospy.steps import ALONE, Steps, is_small
+from minirospy.wire.http import (
+    MAX_BODY,
+    HttpMessage,
+    HttpReader,
+    serialize_error,
+    serialize_response,
+    serialize_response_head,
+)
+from minirospy.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
 from minirospy.wire.xmlrpc import serialize_response as serialize_value
+from minirospy.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
 
 __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
@@ -36,9 +50,18 @@ _REQUEST_SECONDS = 30.0
 _LINGER_SECONDS = 2.0
 """Who is refused may still be sending: so long it is heard out, or the answer would be lost with the connection."""
 
-_MOST_HELD = 256 * 1024 * 1024
-_LARGE = 1024 * 1024
-"""Of requests that are not whole yet, a server holds so much; beyond that the large ones are refused."""
+_MOST_HELD = 72 * 1024 * 1024
+_LARGE = 32 * 1024
+"""Bytes of requests that are incomplete or being read, of all clients; beyond that the largest are refused."""
+
+_MOST_UNREAD_OF_ALL = 72 * 1024 * 1024
+"""Bytes of answers that wait for all clients; beyond that those that read nothing for longest are hung up on."""
+
+_SHORT_BODY = 4096
+"""A longer request is read in steps."""
+
+_ALONE_BODY = 1024 * 1024
+"""Of requests beyond this one is read at a time: its values may take some times as much memory."""
 
 _PROGRESS = 65536
 """Bytes that have moved set the time limit anew: a large value may be long under way by a poor radio."""
@@ -57,12 +80,12 @@ _ANSWERS_AT_ONCE = 4
 
 
 Dispatch = Callable[[str, Sequence[Any]], Any]
-"""Method name and arguments in, value out, or an awaitable of it; raises RpcFault."""
+"""Method name and arguments in, value out, or an awaitable of it, or steps that return it; raises RpcFault."""
 
 
 class _State(Enum):
     OPEN = "it is served"
-    BUSY = "it asked much at once: nothing more is read from it before that is answered"
+    BUSY = "it requested much at once: nothing more is read from it before that is answered"
     FULL = "it does not read its answers: nothing is read from it"
     CLOSING = "it ends once it has read its answers"
     REFUSED = "it is heard out, without an answer"
@@ -98,7 +121,14 @@ class RpcServer:
         self.refused = 0
         """How many connections were not allowed."""
         self.held = 0
-        """Bytes of requests that are not whole yet."""
+        """Bytes of requests that are incomplete or being read."""
+        self.holders: dict[_Connection, int] = {}
+        """The connections that they are of, and how many."""
+        self.unread = 0
+        """Bytes of answers that wait for their clients."""
+        self.slow: OrderedDict[_Connection, None] = OrderedDict()
+        """The connections that they are for; those that read last are at the end."""
+        self.turns = Turns()
         self.connections: OrderedDict[_Connection, None] = OrderedDict()
         """Those that spoke last stand at the end."""
         self._bind_host = bind_host
@@ -158,6 +188,7 @@ class RpcServer:
             self._sock.close()
         for connection in list(self.connections):
             connection.end()
+        self.turns.close()
         self.deadlines.close()
         self._complaints.close()
         self._strangers.close()
@@ -203,7 +234,7 @@ class RpcServer:
         # Who connects has something to say: mostly its first request is there by now.
         connection.readable()
 
-    def tell_refusal(self, sock: socket.socket, why: str) -> None:
+    def log_refusal(self, sock: socket.socket, why: str) -> None:
         """Log that a request was refused; a flood of them is summed up."""
         try:
             # Who comes by a Unix socket has no address.
@@ -211,6 +242,22 @@ class RpcServer:
         except OSError:
             name = "a client"
         self._complaints.warning("a request from %s was refused: %s", name, why)
+
+    def limit_held(self, connection: _Connection) -> bool:
+        """Refuse the largest requests where all together hold too much; return whether ``connection`` remains."""
+        while self.held > _MOST_HELD:
+            largest = max(self.holders, key=self.holders.__getitem__)
+            if self.holders[largest] <= _LARGE:
+                break
+            largest.refuse(503, "too much is being sent at once: try again later")
+        return not connection.is_refused
+
+    def limit_unread(self) -> None:
+        """Hang up on the slowest clients where too many answers wait."""
+        while self.unread > _MOST_UNREAD_OF_ALL and len(self.slow) > 1:
+            slowest = next(iter(self.slow))
+            slowest.log_refusal("its answers were not read")
+            slowest.end()
 
     def _end_longest_silent(self) -> None:
         """One goes that asks nothing, or else the one that was silent longest."""
@@ -240,13 +287,17 @@ class _Connection:
         "_held",
         "_loop",
         "_moved",
+        "_must_finish",
         "_out",
         "_reader",
         "_server",
         "_sock",
         "_state",
         "_task",
+        "_unread",
         "_waiting",
+        "_work",
+        "_work_bytes",
     )
 
     def __init__(self, server: RpcServer, sock: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
@@ -256,19 +307,35 @@ class _Connection:
         self._loop = loop
         self._reader = HttpReader()
         self._state: _State = _OPEN
-        self._out = bytearray()
+        self._out: deque[memoryview] = deque()
+        # Bytes in there.
+        self._unread = 0
         self._waiting: list[HttpMessage] = []
         self._has_deadline = False
         # Bytes since the time limit was set.
         self._moved = 0
         self._task: asyncio.Task[None] | None = None
+        # A long request that is being answered in steps, and the bytes of its body.
+        self._work: Steps[None] | None = None
+        self._work_bytes = 0
+        # It changes something: it is brought to its end, whether or not the client waits for it.
+        self._must_finish = False
         self._held = 0
         loop.add_reader(self._fd, self.readable)
 
     @property
     def is_idle(self) -> bool:
-        """Whether no request is under way."""
-        return self._state is _OPEN and self._reader.is_idle and self._task is None and not self._out
+        """Return whether no request is under way."""
+        return self._state is _OPEN and self._reader.is_idle and not self._is_answering and not self._out
+
+    @property
+    def is_refused(self) -> bool:
+        """Return whether nothing more is answered."""
+        return self._state is _REFUSED or self._state is _ENDED
+
+    @property
+    def _is_answering(self) -> bool:
+        return self._task is not None or self._work is not None
 
     def end(self) -> None:
         """Hang up. Idempotent."""
@@ -280,23 +347,21 @@ class _Connection:
             self._loop.remove_writer(self._fd)
         self._sock.close()
         self._server.connections.pop(self, None)
-        self._hold(0)
-        self._waiting.clear()
+        self._drop_request()
+        self._out.clear()
+        self._count_unread(-self._unread)
         self._server.deadlines.drop(self)
-        if self._task:
-            self._task.cancel()
 
     def received(self, data: bytes) -> None:
         """Bytes of requests have come."""
         try:
             messages = self._reader.feed(data)
         except RpcProtocolError as error:
-            self._refuse(413 if "over the limit" in str(error) else 400, str(error))
+            self.refuse(error.status, str(error))
             return
         if self._held or not messages:
-            self._hold(self._reader.held)
-            if self._server.held > _MOST_HELD and self._held > _LARGE:
-                self._refuse(503, "too much is being sent at once: try again later")
+            self._hold()
+            if not self._server.limit_held(self):
                 return
             if self._reader.wants_continue:
                 self._write(self._reader.continue_line())
@@ -343,10 +408,9 @@ class _Connection:
     def _answer_waiting(self) -> None:
         left = _ANSWERS_AT_ONCE
         while self._waiting and self._state is _OPEN:
-            if self._task or not left:
-                self._state = _BUSY
-                self._loop.remove_reader(self._fd)
-                if not self._task:
+            if self._is_answering or not left:
+                self._pause()
+                if not self._is_answering:
                     self._loop.call_soon(self._go_on)
                 return
             left -= 1
@@ -359,55 +423,148 @@ class _Connection:
             self._answer_waiting()
             self._set_deadline()
 
+    def _pause(self) -> None:
+        """Read nothing until the present requests are answered."""
+        if self._state is _OPEN:
+            self._state = _BUSY
+            self._loop.remove_reader(self._fd)
+
     def _answer(self, message: HttpMessage) -> None:
-        """Answer at once, or start a task for a method that has to wait."""
+        """Answer immediately, or start a task or work in steps for what takes longer."""
         if message.method != "POST":
-            self._refuse(405, "this is an XML-RPC server: send POST")
+            self.refuse(405, "this is an XML-RPC server: send POST")
+            return
+        keep_alive = message.keep_alive
+        if len(message.body) > _SHORT_BODY:
+            self._answer_in_steps(message.body, keep_alive)
             return
         try:
             call = parse_call(message.body)
         except RpcProtocolError as error:
-            self._refuse(400, str(error))
+            self.refuse(error.status, str(error))
             return
         try:
             value = self._server.dispatch(call.method, call.args)
             if type(value) is not list and isinstance(value, Awaitable):
-                self._task = asyncio.ensure_future(self._answer_later(value, message.keep_alive))
+                self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
+                return
+            if type(value) is not Serialized and (isinstance(value, Generator) or not is_small(value)):
+                self._start(self._serialize_in_steps(call.method, value, keep_alive))
                 return
             body = serialize_value(value)
-        except RpcFault as fault:
-            body = serialize_fault(fault.code, fault.text)
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
-            _log.exception("fault in %s", call.method)
-            body = serialize_fault(1, f"{type(error).__name__}: {error}")
-        self._send(body, message.keep_alive)
+            body = _fault(call.method, error)
+        self._send(body, keep_alive)
+
+    def _answer_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> None:
+        self._work_bytes = len(body)
+        self._hold()
+        if self._server.limit_held(self):
+            self._start(self._read_in_steps(body, keep_alive))
+
+    def _start(self, work: Steps[None]) -> None:
+        self._work = work
+        self._server.turns.start(work)
+
+    def _read_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> Steps[None]:
+        """Read a long request, and answer it."""
+        if len(body) > _ALONE_BODY:
+            yield ALONE
+        try:
+            call = yield from parse_call_in_steps(body)
+        except RpcProtocolError as error:
+            self._work = None
+            self.refuse(error.status, str(error))
+            return
+        del body
+        self._work_bytes = 0
+        self._hold()
+        try:
+            value = self._server.dispatch(call.method, call.args)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            self._finish(_fault(call.method, error), keep_alive)
+            return
+        if isinstance(value, Awaitable):
+            self._work = None
+            self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
+            return
+        method = call.method
+        del call
+        yield from self._serialize_in_steps(method, value, keep_alive)
+
+    def _serialize_in_steps(self, method: str, value: Any, keep_alive: bool) -> Steps[None]:
+        """Answer with a value that may be long, or that steps return."""
+        try:
+            if isinstance(value, Generator):
+                self._must_finish = True
+                try:
+                    value = yield from value
+                finally:
+                    self._must_finish = False
+            if self.is_refused:
+                return
+            if isinstance(value, Serialized):
+                pieces: list[bytes] = [value]
+            else:
+                pieces = yield from serialize_value_in_steps(value, MAX_BODY)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            pieces = [_fault(method, error)]
+        del value
+        self._work = None
+        if not self.is_refused:
+            self._write(serialize_response_head(sum(map(len, pieces)), keep_alive=keep_alive), *pieces)
+            self._sent(keep_alive)
+            self._go_on()
 
     async def _answer_later(self, value: Awaitable[Any], keep_alive: bool) -> None:
         try:
             body = serialize_value(await value)
-        except RpcFault as fault:
-            body = serialize_fault(fault.code, fault.text)
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
-            _log.exception("fault in a method")
-            body = serialize_fault(1, f"{type(error).__name__}: {error}")
+            body = _fault("a method", error)
         self._task = None
-        self._send(body, keep_alive)
-        self._go_on()
+        self._finish(body, keep_alive)
+
+    def _finish(self, body: bytes, keep_alive: bool) -> None:
+        """Send the answer to what took longer, and go on with the next request."""
+        self._work = None
+        if not self.is_refused:
+            self._send(body, keep_alive)
+            self._go_on()
 
     def _send(self, body: bytes, keep_alive: bool) -> None:
         self._write(serialize_response(body, keep_alive=keep_alive))
+        self._sent(keep_alive)
+
+    def _sent(self, keep_alive: bool) -> None:
         if not keep_alive:
             self._close()
 
-    def _refuse(self, status: int, text: str) -> None:
-        """Answer with an error, and take nothing more."""
+    def log_refusal(self, why: str) -> None:
+        """Log that the client was refused something."""
+        self._server.log_refusal(self._sock, why)
+
+    def _drop_request(self) -> None:
+        """Forget what was requested."""
         self._waiting.clear()
-        self._hold(0)
-        self._server.tell_refusal(self._sock, text)
+        self._reader.close()
+        self._work_bytes = 0
+        self._hold()
+        work, self._work = self._work, None
+        if work and not self._must_finish:
+            self._server.turns.cancel(work)
+        if self._task:
+            self._task.cancel()
+
+    def refuse(self, status: int, text: str) -> None:
+        """Answer with an error, and read no more requests."""
+        if self.is_refused:
+            return
+        self._drop_request()
+        self.log_refusal(text)
         self._write(serialize_error(status, text))
-        if self._state is _FULL:
+        if self._state in (_FULL, _BUSY):
             self._loop.add_reader(self._fd, self.readable)
-        if self._state in (_OPEN, _FULL):
+        if self._state in (_OPEN, _BUSY, _FULL):
             self._state = _REFUSED
             if not self._out:
                 self._say_end()
@@ -423,37 +580,66 @@ class _Connection:
                 self._loop.remove_reader(self._fd)
             self._state = _CLOSING
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, *pieces: bytes) -> None:
+        """Send what the socket takes, and keep the rest."""
         if self._state is _ENDED:
             return
         sent = 0
         if not self._out:
             try:
-                sent = self._sock.send(data)
+                sent = self._sock.send(pieces[0])
             except (BlockingIOError, InterruptedError):
                 pass
             except OSError:
                 self.end()
                 return
-            if sent == len(data):
+            if len(pieces) == 1 and sent == len(pieces[0]):
                 return
             self._loop.add_writer(self._fd, self._writable)
-        self._out += memoryview(data)[sent:]
+        left = sent
+        for piece in pieces:
+            if left < len(piece):
+                self._out.append(memoryview(piece)[left:])
+            left = max(0, left - len(piece))
+        self._count_unread(sum(map(len, pieces)) - sent)
         self._set_deadline()
-        if self._state is _OPEN and len(self._out) > _MOST_UNREAD:
+        if self._state is _OPEN and self._unread > _MOST_UNREAD:
             # The client does not read its answers: it gets no more of them, and is not read from.
             self._state = _FULL
             self._loop.remove_reader(self._fd)
+        self._server.limit_unread()
+
+    def _count_unread(self, more: int) -> None:
+        """Count bytes that were added to the answers that wait, or taken from them."""
+        self._unread += more
+        self._server.unread += more
+        if not self._unread:
+            self._server.slow.pop(self, None)
+        elif more < 0:
+            self._server.slow.move_to_end(self)
+        else:
+            self._server.slow.setdefault(self, None)
 
     def _writable(self) -> None:
+        sent = 0
         try:
-            sent = self._sock.send(memoryview(self._out)[:_MOST_UNREAD])
+            while self._out and sent < _MOST_UNREAD:
+                piece = self._out[0][:_MOST_UNREAD]
+                count = self._sock.send(piece)
+                sent += count
+                if count < len(self._out[0]):
+                    self._out[0] = self._out[0][count:]
+                else:
+                    self._out.popleft()
+                if count < len(piece):
+                    break
         except (BlockingIOError, InterruptedError):
-            return
+            pass
         except OSError:
             self.end()
             return
-        del self._out[:sent]
+        if sent:
+            self._count_unread(-sent)
         if self._out:
             self._moved += sent
             self._set_deadline()
@@ -474,9 +660,17 @@ class _Connection:
         with contextlib.suppress(OSError):
             self._sock.shutdown(socket.SHUT_WR)
 
-    def _hold(self, count: int) -> None:
+    def _hold(self) -> None:
+        """Count the bytes of the present request."""
+        count = self._reader.held + self._work_bytes
+        if count == self._held:
+            return
         self._server.held += count - self._held
         self._held = count
+        if count:
+            self._server.holders[self] = count
+        else:
+            self._server.holders.pop(self, None)
 
     def _set_deadline(self) -> None:
         """A request that has begun, or an answer that waits, has a time limit; an idle connection has none."""
@@ -492,6 +686,18 @@ class _Connection:
         self._has_deadline = True
         self._moved = 0
         self._server.deadlines.set(self, seconds)
+
+
+def _fault(method: str, error: Exception) -> bytes:
+    """Return the answer to a call that failed."""
+    match error:
+        case RpcFault():
+            return serialize_fault(error.code, error.text)
+        case RpcProtocolError():
+            _log.warning("%s cannot be answered: %s", method, error)
+        case _:
+            _log.error("fault in %s", method, exc_info=error)
+    return serialize_fault(1, f"{type(error).__name__}: {error}")
 
 
 def is_address_in_use(error: OSError) -> bool:

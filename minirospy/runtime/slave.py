@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import RpcFault
 from minirospy.runtime.local import PROTOCOL
+from minirospy.steps import Steps
 
 if TYPE_CHECKING:
     from minirospy.runtime.links import OutLink
@@ -56,7 +57,7 @@ class SlaveApi:
             return sorted(self._methods)
         if method == "system.multicall":
             # A list of structs in, a list of one-element lists (or fault structs) out.
-            return [self._one_of_many(call) for call in (args[0] if args else [])]
+            return self._call_many(args[0] if args and isinstance(args[0], list) else [])
         entry = self._methods.get(method)
         if entry is None:
             raise RpcFault(1, f'method "{method}" is not supported')
@@ -166,6 +167,13 @@ class SlaveApi:
         """Stop the node."""
         self._node.request_shutdown(f"external shutdown request from [{caller_id}]: [{reason}]")
         return [_SUCCESS, "shutdown", 0]
+
+    def _call_many(self, calls: list[Any]) -> Steps[list[Any]]:
+        answers = []
+        for call in calls:
+            answers.append(self._one_of_many(call))
+            yield None
+        return answers
 
     def _one_of_many(self, call: Any) -> Any:
         try:

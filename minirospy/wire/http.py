@@ -14,12 +14,15 @@ from minirospy.errors import RpcProtocolError
 
 __all__ = [
     "MAX_BODY",
+    "Body",
     "HttpHead",
     "HttpMessage",
     "HttpReader",
     "serialize_error",
     "serialize_request",
+    "serialize_request_head",
     "serialize_response",
+    "serialize_response_head",
 ]
 
 MAX_BODY = 64 * 1024 * 1024
@@ -40,6 +43,10 @@ _REASONS = {
 }
 
 
+Body = bytes | bytearray
+"""Of a message: a long one is not copied out of the buffer that it was collected in."""
+
+
 class HttpHead(NamedTuple):
     """What stands in front of a body. ``start`` is the first line, ``headers`` have lower-case names."""
 
@@ -57,7 +64,7 @@ class HttpMessage(NamedTuple):
     """A request or an answer."""
 
     head: HttpHead
-    body: bytes
+    body: Body
 
     @property
     def start(self) -> str:
@@ -87,7 +94,16 @@ class HttpReader:
     Nearly always a message comes in one piece, or as its head and then its body, and alone: that costs little.
     """
 
-    __slots__ = ("_buffer", "_ended", "_head", "_in_body", "_max_body", "_parser", "wants_continue")
+    __slots__ = (
+        "_buffer",
+        "_chunked",
+        "_ended",
+        "_head",
+        "_in_body",
+        "_max_body",
+        "_parser",
+        "wants_continue",
+    )
 
     def __init__(self, max_body: int = MAX_BODY) -> None:
         self._max_body = max_body
@@ -97,6 +113,8 @@ class HttpReader:
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
+        # The bytes of a chunked body that are taken out of the buffer already.
+        self._chunked = 0
         self.wants_continue = False
         """Whether the peer waits for :meth:`continue_line` before it sends its body."""
 
@@ -108,7 +126,7 @@ class HttpReader:
     @property
     def held(self) -> int:
         """Bytes of a message that is not whole yet."""
-        return len(self._buffer)
+        return len(self._buffer) + self._chunked
 
     def feed(self, data: bytes) -> list[HttpMessage]:
         """The messages that are complete with ``data``; b"" means that the peer has ended.
@@ -145,6 +163,13 @@ class HttpReader:
                 return messages
             messages.append(message)
 
+    def close(self) -> None:
+        """Release what was read of an incomplete message. Idempotent."""
+        self._head = self._parser = None
+        self._buffer = bytearray()
+        self._chunked = 0
+        self._in_body = False
+
     def continue_line(self) -> bytes:
         """What a peer that sent ``Expect: 100-continue`` waits for."""
         self.wants_continue = False
@@ -156,13 +181,17 @@ class HttpReader:
             if head is None:
                 head = _parse_head((yield from self._until(_END_OF_HEAD)))
             self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
-            self._in_body = True
-            body = yield from self._body(head)
-            self._in_body = self.wants_continue = False
-            yield HttpMessage(head, body)
+            # No variable keeps the body until the next one.
+            yield HttpMessage(head, (yield from self._whole_body(head)))
             head = None
 
-    def _body(self, head: HttpHead) -> Generator[None, None, bytes]:
+    def _whole_body(self, head: HttpHead) -> Generator[None, None, Body]:
+        self._in_body = True
+        body = yield from self._body(head)
+        self._in_body = self.wants_continue = False
+        return body
+
+    def _body(self, head: HttpHead) -> Generator[None, None, Body]:
         if "chunked" in head.headers.get("transfer-encoding", "").lower():
             return (yield from self._chunks())
         length = head.headers.get("content-length")
@@ -178,7 +207,7 @@ class HttpReader:
         self._check(count)
         return (yield from self._exactly(count))
 
-    def _chunks(self) -> Generator[None, None, bytes]:
+    def _chunks(self) -> Generator[None, None, bytearray]:
         body = bytearray()
         while True:
             line = (yield from self._until(_END_OF_LINE)).partition(b";")[0].strip()
@@ -186,10 +215,12 @@ class HttpReader:
                 raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}")
             size = int(line, 16)
             self._check(len(body) + size)
+            self._chunked = len(body)
             if not size:
+                self._chunked = 0
                 while (yield from self._until(_END_OF_LINE)):
                     pass
-                return bytes(body)
+                return body
             body += yield from self._exactly(size)
             if (yield from self._until(_END_OF_LINE)):
                 raise RpcProtocolError("a chunk is longer than its size")
@@ -208,12 +239,16 @@ class HttpReader:
         del self._buffer[: end - at]
         return data
 
-    def _exactly(self, count: int) -> Generator[None, None, bytes]:
+    def _exactly(self, count: int) -> Generator[None, None, Body]:
         while len(self._buffer) < count:
             if self._ended:
                 raise RpcProtocolError("the peer ended inside a message")
             yield None
-        return self._take(count)
+        if len(self._buffer) > count:
+            return self._take(count)
+        # Not copied: it may be long.
+        whole, self._buffer = self._buffer, bytearray()
+        return whole
 
     def _take(self, count: int) -> bytes:
         data = bytes(self._buffer[:count])
@@ -222,23 +257,36 @@ class HttpReader:
 
     def _check(self, size: int) -> None:
         if size > self._max_body:
-            raise RpcProtocolError(f"an HTTP body of {size} bytes is over the limit of {self._max_body}")
+            raise RpcProtocolError(
+                f"an HTTP body of {size} bytes is over the limit of {self._max_body}", status=413
+            )
 
 
 def serialize_request(host: str, path: str, body: bytes) -> bytes:
-    """A POST of ``body``."""
+    """Return a POST of ``body``."""
+    return serialize_request_head(host, path, len(body)) + body
+
+
+def serialize_request_head(host: str, path: str, length: int) -> bytes:
+    """Return what is sent in front of the body of a POST."""
     head = (
         f"POST {path or '/'} HTTP/1.1\r\nHost: {host}\r\nUser-Agent: minirospy\r\n"
-        f"Content-Type: text/xml\r\nContent-Length: {len(body)}\r\n\r\n"
+        f"Content-Type: text/xml\r\nContent-Length: {length}\r\n\r\n"
     )
-    return head.encode("latin-1", "replace") + body
+    return head.encode("latin-1", "replace")
 
 
 def serialize_response(body: bytes, *, keep_alive: bool = True) -> bytes:
-    """A successful answer."""
+    """Return a successful answer."""
+    return serialize_response_head(len(body), keep_alive=keep_alive) + body
+
+
+def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
+    """Return what is sent in front of a successful answer of so many bytes."""
     connection = "" if keep_alive else "Connection: close\r\n"
-    head = f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {len(body)}\r\n\r\n"
-    return head.encode() + body
+    return (
+        f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {length}\r\n\r\n".encode()
+    )
 
 
 def serialize_error(status: int, text: str) -> bytes:

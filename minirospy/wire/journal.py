@@ -10,16 +10,22 @@ from __future__ import annotations
 import datetime
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from typing import Any, NamedTuple
 
 import msgpack  # type: ignore[import-untyped]
 
 from minirospy.wire.xmlrpc import DateTime
 
-__all__ = ["HEAD", "Recovered", "parse_journal", "serialize_record"]
+__all__ = ["HEAD", "Recovered", "pack_in_steps", "parse_journal", "serialize_record", "unpack"]
 
 HEAD = b"minirospy journal 1\n"
+
+_STEP_ITEMS = 500
+_STEP_BYTES = 65536
+_TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
+"""What msgpack has in front of the length, in four bytes, of a long text or of bytes."""
 
 _FRAME = struct.Struct("<II")
 _MAX_RECORD = 256 * 1024 * 1024
@@ -38,6 +44,57 @@ def serialize_record(record: list[Any]) -> bytes:
     """A record as it stands in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
+
+
+def pack_in_steps(value: Any) -> Iterator[bytes]:
+    """Yield a large value in pieces, which :func:`unpack` takes all together. Raises as :func:`serialize_record`."""
+    packer = msgpack.Packer(default=_encode_other, strict_types=True, autoreset=False)
+    yield from _pack_in_steps(value, packer)
+    yield packer.bytes()
+
+
+def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
+    if type(value) is list:
+        packer.pack_array_header(len(value))
+        items: Iterable[Any] = value
+    elif type(value) is dict:
+        packer.pack_map_header(len(value))
+        items = chain.from_iterable(value.items())
+    elif type(value) in (str, bytes) and len(value) > _STEP_BYTES:
+        yield from _pack_long(value, packer)
+        return
+    else:
+        packer.pack(value)
+        return
+    for number, item in enumerate(items):
+        if type(item) in (list, dict, str, bytes):
+            yield from _pack_in_steps(item, packer)
+        else:
+            packer.pack(item)
+        if number % _STEP_ITEMS == _STEP_ITEMS - 1 or len(packer.getbuffer()) > _STEP_BYTES:
+            yield _taken(packer)
+
+
+def _pack_long(value: str | bytes, packer: Any) -> Iterator[bytes]:
+    data = value.encode() if isinstance(value, str) else value
+    yield _taken(packer)
+    yield (_TEXT_32 if isinstance(value, str) else _BINARY_32) + struct.pack(">I", len(data))
+    for at in range(0, len(data), _STEP_BYTES):
+        yield data[at : at + _STEP_BYTES]
+
+
+def _taken(packer: Any) -> bytes:
+    data: bytes = packer.bytes()
+    packer.reset()
+    return data
+
+
+def unpack(data: bytes) -> Any:
+    """Return the value that :func:`pack_in_steps` has packed. Raises ValueError."""
+    try:
+        return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
+    except (msgpack.UnpackException, TypeError) as error:
+        raise ValueError(f"not a packed value: {error}") from error
 
 
 def parse_journal(data: bytes) -> Recovered:

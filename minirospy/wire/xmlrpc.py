@@ -1,32 +1,62 @@
 """XML-RPC: calls and answers as bytes, and back.
 
-Pure; parses with expat, and what is plain without it (``wire/xmlrpc_plain.py``). Refuses what a caller could hurt
-with: document types (and so entities), nesting beyond 64 levels, a million elements. Source:
+Pure; parses with expat, and what is plain without it (``wire/xmlrpc_plain.py``). A server, which serves others
+meanwhile, does both in short steps where a document is long. Refuses what a caller could hurt with: document types
+(and so entities), nesting beyond 64 levels, a million elements, tags of 64 KiB, values of 96 MiB in memory. Source:
 http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.steps import ALONE, Need, Steps
 from minirospy.wire.xmlrpc_plain import read_plain
 
 __all__ = [
     "Call",
     "DateTime",
+    "Reader",
     "Serialized",
     "parse_call",
+    "parse_call_in_steps",
     "parse_response",
     "serialize_call",
+    "serialize_call_in_steps",
     "serialize_fault",
     "serialize_response",
+    "serialize_response_in_steps",
 ]
 
 _MAX_DEPTH = 64
 _MAX_ELEMENTS = 1_000_000
 """In one document: some seconds of work."""
+
+_MIB = 1024 * 1024
+_MAX_MEMORY = 96 * _MIB
+"""Of the long texts of one document: a character beyond U+FFFF makes each one of its text take four bytes."""
+
+_MAX_TOKEN = 65536
+"""Bytes of a tag, a comment or the like."""
+
+_MAX_SCALAR = 2048
+"""Characters of a number, a boolean or a date."""
+
+_LONG_TEXT = 16
+"""Pieces of a text, 8 KiB each, after which it is a long one."""
+
+_PLAIN_BYTES = 32768
+"""A document up to this length is read in one step where it is plain."""
+
+_STEP_BYTES = 8192
+_STEP_ITEMS = 300
+_STEP_LETTERS = 65536
+_ALONE_BYTES = _MIB
+"""Of an answer, before it demands to be the only one that is being written."""
 
 _HEAD = "<?xml version='1.0'?>\n"
 
@@ -77,23 +107,57 @@ def serialize_fault(code: int, text: str) -> bytes:
     return "".join(parts).encode()
 
 
-def parse_call(body: bytes) -> Call:
+def serialize_call_in_steps(method: str, args: Sequence[Any], most: int) -> Steps[list[bytes]]:
+    """Return a call as pieces of XML, as :func:`serialize_response_in_steps` does an answer."""
+    out = _Output(most)
+    out.parts += [_HEAD, "<methodCall><methodName>", _escape(method), "</methodName><params>"]
+    for value in args:
+        out.parts.append("<param>")
+        yield from _write_in_steps(value, out, 0)
+        out.parts.append("</param>")
+    out.parts.append("</params></methodCall>\n")
+    return out.finish()
+
+
+def serialize_response_in_steps(value: Any, most: int) -> Steps[list[bytes]]:
+    """Return a successful answer as pieces of XML. Raises RpcProtocolError where it has more than ``most`` bytes."""
+    out = _Output(most)
+    out.parts += [_HEAD, "<methodResponse><params><param>"]
+    yield from _write_in_steps(value, out, 0)
+    out.parts.append("</param></params></methodResponse>\n")
+    return out.finish()
+
+
+def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
+    """Return the call in a long ``body``. Raises RpcProtocolError."""
+    plain = read_plain(body) if len(body) <= _PLAIN_BYTES else None
+    if plain and plain[0] is not None:
+        return Call(plain[0], plain[1])
+    reader, view = Reader(), memoryview(body)
+    try:
+        for at in range(0, len(view), _STEP_BYTES):
+            reader.feed(view[at : at + _STEP_BYTES])
+            yield None
+        reader.feed(b"", is_last=True)
+    finally:
+        reader.close()
+    return _call(reader)
+
+
+def parse_call(body: bytes | bytearray) -> Call:
     """The call in ``body``. Raises RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
-    reader = _Reader(body)
-    if reader.root != "methodCall" or reader.method is None:
-        raise RpcProtocolError("not an XML-RPC method call")
-    return Call(reader.method, reader.params)
+    return _call(_read(body))
 
 
-def parse_response(body: bytes) -> Any:
+def parse_response(body: bytes | bytearray) -> Any:
     """The value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]
-    reader = _Reader(body)
+    reader = _read(body)
     if reader.root != "methodResponse":
         raise RpcProtocolError("not an XML-RPC answer")
     if reader.is_fault:
@@ -105,6 +169,12 @@ def parse_response(body: bytes) -> Any:
     if len(reader.params) != 1:
         raise RpcProtocolError("an XML-RPC answer without a value")
     return reader.params[0]
+
+
+def _call(reader: Reader) -> Call:
+    if reader.root != "methodCall" or reader.method is None:
+        raise RpcProtocolError("not an XML-RPC method call")
+    return Call(reader.method, reader.params)
 
 
 # --- values to XML
@@ -195,6 +265,100 @@ def _write(value: Any, parts: list[str], depth: int) -> None:
     writer(value, parts, depth + 1)
 
 
+class _Output:
+    """XML that is written in steps: what is being written, and the pieces that are done."""
+
+    def __init__(self, most: int) -> None:
+        self.parts: list[str] = []
+        self._pieces: list[bytes] = []
+        self._size = 0
+        self._most = most
+        self._is_alone = False
+
+    def step(self) -> Need | None:
+        """Put away what was written; return what to yield. Raises RpcProtocolError where it is too much."""
+        piece = "".join(self.parts).encode()
+        self.parts.clear()
+        self._pieces.append(piece)
+        self._size += len(piece)
+        if self._size > self._most:
+            raise RpcProtocolError(f"more than {self._most} bytes of XML")
+        if self._is_alone or self._size < _ALONE_BYTES:
+            return None
+        self._is_alone = True
+        return ALONE
+
+    def finish(self) -> list[bytes]:
+        """Return the pieces."""
+        self.step()
+        return self._pieces
+
+
+def _write_in_steps(value: Any, out: _Output, depth: int) -> Steps[None]:
+    if depth > _MAX_DEPTH:
+        raise RpcProtocolError(f"a value is nested deeper than {_MAX_DEPTH} levels")
+    writer = _WRITERS.get(type(value)) or _writer_of_kin(value)
+    if writer is _write_list:
+        yield from _write_list_in_steps(value, out, depth + 1)
+    elif writer is _write_dict:
+        yield from _write_dict_in_steps(value, out, depth + 1)
+    elif writer is _write_str and len(value) > _STEP_LETTERS:
+        out.parts.append("<value><string>")
+        yield from _write_text_in_steps(value, out)
+        out.parts.append("</string></value>")
+    elif writer is _write_bytes and len(value) > _STEP_LETTERS:
+        yield from _write_bytes_in_steps(value, out)
+    else:
+        writer(value, out.parts, depth + 1)
+
+
+def _write_list_in_steps(value: Sequence[Any], out: _Output, depth: int) -> Steps[None]:
+    out.parts.append("<value><array><data>")
+    for number, item in enumerate(value):
+        kind = type(item)
+        if kind is int or kind is float or (kind is str and len(item) < _STEP_ITEMS):
+            _write(item, out.parts, depth)
+        else:
+            yield from _write_in_steps(item, out, depth)
+        if number % _STEP_ITEMS == _STEP_ITEMS - 1 or len(out.parts) > 4 * _STEP_ITEMS:
+            yield out.step()
+    out.parts.append("</data></array></value>")
+
+
+def _write_dict_in_steps(value: Mapping[str, Any], out: _Output, depth: int) -> Steps[None]:
+    out.parts.append("<value><struct>\n")
+    for key, item in value.items():
+        if not isinstance(key, str):
+            raise RpcProtocolError(f"the key {key!r:.60} of a dictionary is not a string")
+        out.parts.append("<member><name>")
+        yield from _write_text_in_steps(key, out)
+        out.parts.append("</name>")
+        yield from _write_in_steps(item, out, depth)
+        out.parts.append("</member>\n")
+        if len(out.parts) > 4 * _STEP_ITEMS:
+            yield out.step()
+    out.parts.append("</struct></value>")
+
+
+def _write_text_in_steps(text: str, out: _Output) -> Steps[None]:
+    for at in range(0, len(text), _STEP_LETTERS):
+        out.parts.append(_escape(text[at : at + _STEP_LETTERS]))
+        if at:
+            yield out.step()
+
+
+def _write_bytes_in_steps(value: bytes, out: _Output) -> Steps[None]:
+    import base64
+
+    out.parts.append("<value><base64>")
+    # Three bytes make four characters.
+    size = 3 * _STEP_BYTES
+    for at in range(0, len(value), size):
+        out.parts.append(base64.b64encode(value[at : at + size]).decode())
+        yield out.step()
+    out.parts.append("</base64></value>")
+
+
 def _writer_of_kin(value: Any) -> Callable[[Any, list[str], int], None]:
     """The writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
@@ -251,36 +415,62 @@ _SCALARS: dict[str, Callable[[str], Any]] = {
 }
 
 
-class _Reader:
-    """Reads a document into ``root``, ``method``, ``params`` and ``is_fault``.
+class Reader:
+    """Reads a document, as its bytes arrive, into ``root``, ``method``, ``params`` and ``is_fault``.
 
-    ``_open`` holds the lists and dictionaries that are not complete yet; ``_values`` one entry for each
+    ``_containers`` holds the lists and dictionaries that are not complete yet; ``_values`` one entry for each
     ``<value>`` that is: a one-element list once it has something in it.
     """
 
-    def __init__(self, body: bytes) -> None:
+    def __init__(self) -> None:
         from xml.parsers import expat
 
         self.root = ""
         self.method: str | None = None
         self.params: list[Any] = []
         self.is_fault = False
+        self._errors = (expat.ExpatError, ValueError, LookupError)
         self._text: list[str] = []
         self._containers: list[list[Any] | dict[str, Any]] = []
         self._names: list[str] = []
         self._values: list[list[Any]] = []
         self._depth = 0
         self._left = _MAX_ELEMENTS
-        parser = expat.ParserCreate()
+        self._tag = ""
+        # The bytes that were fed, and those that the values take in memory.
+        self._fed = 0
+        self._memory = 0
+        # How many pieces of the present text are counted in that, and the widest of their characters, in bytes.
+        self._weighed = 0
+        self._width = 1
+        # A long base64 as far as it is decoded.
+        self._binary = bytearray()
+
+        parser = self._parser = expat.ParserCreate()
         parser.buffer_text = True
         parser.StartElementHandler = self._start
         parser.EndElementHandler = self._end
         parser.CharacterDataHandler = self._text.append
         parser.StartDoctypeDeclHandler = self._refuse_doctype
+
+    def feed(self, data: bytes | bytearray | memoryview, *, is_last: bool = False) -> None:
+        """Read some more. Raises RpcProtocolError."""
         try:
-            parser.Parse(body, True)
-        except (expat.ExpatError, ValueError, LookupError) as error:
+            self._parser.Parse(data, is_last)
+        except self._errors as error:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
+        self._fed += len(data)
+        # The parser looks at an incomplete tag or comment again whenever more of it comes.
+        if not is_last and self._fed - self._parser.CurrentByteIndex > _MAX_TOKEN:
+            raise RpcProtocolError(f"a tag or comment of more than {_MAX_TOKEN} bytes")
+        if len(self._text) - self._weighed > _LONG_TEXT:
+            self._weigh_text()
+
+    def close(self) -> None:
+        """Release the parser, whose handlers refer to this object and to all that was read. Idempotent."""
+        parser = self._parser
+        parser.StartElementHandler = parser.EndElementHandler = None
+        parser.CharacterDataHandler = parser.StartDoctypeDeclHandler = None
 
     def _refuse_doctype(self, *_: object) -> None:
         raise RpcProtocolError("a document type has no place in XML-RPC")
@@ -295,7 +485,8 @@ class _Reader:
             raise RpcProtocolError(f"more than {_MAX_ELEMENTS} elements")
         if not self.root:
             self.root = tag
-        self._text.clear()
+        self._tag = tag
+        self._clear_text()
         if tag == "value":
             self._values.append([])
         elif tag == "array":
@@ -309,7 +500,7 @@ class _Reader:
         self._depth -= 1
         scalar = _SCALARS.get(tag)
         if scalar is not None:
-            self._values[-1].append(scalar("".join(self._text)))
+            self._values[-1].append(self._scalar(tag, scalar))
         elif tag == "value":
             self._end_value()
         elif tag in ("array", "struct"):
@@ -322,7 +513,18 @@ class _Reader:
             self.method = "".join(self._text)
         elif tag == "nil":
             raise RpcProtocolError("ROS has no nil")
-        self._text.clear()
+        self._clear_text()
+
+    def _scalar(self, tag: str, read: Callable[[str], Any]) -> Any:
+        text = "".join(self._text)
+        if tag == "base64":
+            if not self._binary:
+                return read(text)
+            self._binary += read(text)
+            return bytes(self._binary)
+        if tag != "string" and len(text) > _MAX_SCALAR:
+            raise RpcProtocolError(f"a value of type {tag} has more than {_MAX_SCALAR} characters")
+        return read(text)
 
     def _end_value(self) -> None:
         entry = self._values.pop()
@@ -338,3 +540,48 @@ class _Reader:
             container.append(value)
         else:
             container[self._names[-1]] = value
+
+    def _clear_text(self) -> None:
+        if len(self._text) > 1:
+            self._weigh_text()
+            self._weighed = 0
+            self._width = 1
+        self._text.clear()
+        if self._binary:
+            self._binary.clear()
+
+    def _weigh_text(self) -> None:
+        """Count the memory of a long text, whose characters all take as much as the widest one once it is whole."""
+        if self._tag == "base64":
+            self._decode_base64()
+            return
+        for piece in self._text[self._weighed :]:
+            self._memory += sys.getsizeof(piece)
+            width = _width(piece)
+            if width > self._width:
+                self._memory += (width - self._width) * sum(map(len, self._text[: self._weighed]))
+                self._width = width
+        self._weighed = len(self._text)
+        if self._memory > _MAX_MEMORY:
+            raise RpcProtocolError(f"a value of more than {_MAX_MEMORY // _MIB} MiB in memory", status=413)
+
+    def _decode_base64(self) -> None:
+        text = re.sub("[^A-Za-z0-9+/=]", "", "".join(self._text))
+        whole = len(text) - len(text) % 4
+        self._binary += _read_base64(text[:whole])
+        self._text[:] = [text[whole:]]
+
+
+def _width(text: str) -> int:
+    """Return the bytes that each character takes in memory."""
+    widest = "" if text.isascii() else max(text)
+    return 4 if widest > "\uffff" else 2 if widest > "\xff" else 1
+
+
+def _read(body: bytes | bytearray) -> Reader:
+    reader = Reader()
+    try:
+        reader.feed(body, is_last=True)
+    finally:
+        reader.close()
+    return reader

@@ -30,7 +30,7 @@ class _Patterns(NamedTuple):
     token: re.Pattern[str]
 
 
-def read_plain(body: bytes) -> tuple[str | None, list[Any]] | None:
+def read_plain(body: bytes | bytearray) -> tuple[str | None, list[Any]] | None:
     """The method of the call in ``body`` (None: it is an answer), and the parameters; None where it is not plain."""
     try:
         text = body.decode("ascii")

@@ -17,9 +17,23 @@ from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.turns import Turns
 from minirospy.wire.xmlrpc import serialize_call
 
 CALL = serialize_call("getPid", ["/x"])
+
+
+class Publishers:
+    """A graph in which topics have publishers, and which has no parameters."""
+
+    def __init__(self, uris_of: Callable[[str], list[str]]) -> None:
+        self.publisher_uris = uris_of
+
+    def parameter(self, key: str) -> Any:
+        raise AssertionError(key)
+
+    def subscribed_parameters(self, uri: str) -> list[str]:
+        raise AssertionError(uri)
 
 
 def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
@@ -165,7 +179,7 @@ def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -
         await server.start()
         uri = f"http://127.0.0.1:{server.port}/"
         lists = {"/many": ["http://x:1/"] * 1000, "/few": ["http://x:1/"]}
-        notifier = Notifier(lambda topic: lists[topic], 5.0)
+        notifier = Notifier(Publishers(lambda topic: lists[topic]), Turns(), 5.0)
         notifier.send(PublisherUpdate(uri, "/many"))
         await until(lambda: len(told) == 1)
         for _ in range(5):
@@ -194,7 +208,7 @@ def test_an_update_that_waited_tells_of_the_publishers_that_came_unsaid() -> Non
         await server.start()
         uri = f"http://127.0.0.1:{server.port}/"
         publishers = ["http://x:1/"] * 300
-        notifier = Notifier(lambda _: list(publishers), 5.0)
+        notifier = Notifier(Publishers(lambda _: list(publishers)), Turns(), 5.0)
         notifier.send(PublisherUpdate(uri, "/many"))
         await until(lambda: told)
         # This one pauses, while a publisher comes at a time when nobody subscribes.
@@ -218,7 +232,7 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
         server = RpcServer(lambda _, args: told.append(args[1]) or [1, "", 0])  # type: ignore[func-returns-value]
         await server.start()
         uri = f"http://127.0.0.1:{server.port}/"
-        notifier = Notifier(lambda _: [], 60.0)
+        notifier = Notifier(Publishers(lambda _: []), Turns(), 60.0)
 
         def none_left(*_: object) -> None:
             raise OSError(errno.EMFILE, "Too many open files")
@@ -285,7 +299,9 @@ def test_a_node_on_the_loop_is_told_without_a_call() -> None:
     async def test() -> None:
         told: list[tuple[float, str, int]] = []
         loop = asyncio.get_running_loop()
-        notifier = Notifier(lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1), 5.0)
+        notifier = Notifier(
+            Publishers(lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1)), Turns(), 5.0
+        )
         # Nobody listens there.
         notifier.here["http://127.0.0.1:9/"] = lambda topic, uris: told.append(
             (loop.time(), topic, len(uris))

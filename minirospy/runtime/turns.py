@@ -1,0 +1,125 @@
+"""Long work on the event loop, a few milliseconds in each of its turns, so that nobody else waits for it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Callable
+
+from minirospy.steps import ALONE, PAUSE, Steps
+
+__all__ = ["Turns"]
+
+_log = logging.getLogger(__name__)
+
+_SECONDS = 0.003
+"""Of each turn of the loop, for all the work together."""
+
+_PAUSE = 0.005
+"""Seconds, while all that is left is waiting for something."""
+
+_AT_ONCE = 16
+"""Pieces of work that are under way: those that have not started take hardly any memory."""
+
+
+class Turns:
+    """Runs work side by side, in equal shares, some at a time. All of it on one event loop."""
+
+    def __init__(self, seconds: float = _SECONDS, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._seconds = seconds
+        self._clock = clock
+        self._queue: deque[Steps[None]] = deque()
+        self._backlog: deque[Steps[None]] = deque()
+        # What takes much memory: the one that runs, and those that wait for it.
+        self._alone: Steps[None] | None = None
+        self._waiting: deque[Steps[None]] = deque()
+        self._running: Steps[None] | None = None
+        self._is_scheduled = False
+
+    def __len__(self) -> int:
+        return len(self._queue) + len(self._waiting) + len(self._backlog)
+
+    def start(self, steps: Steps[None]) -> None:
+        """Run ``steps`` from the next turn of the loop on."""
+        (self._queue if len(self._queue) < _AT_ONCE else self._backlog).append(steps)
+        self._schedule()
+
+    def cancel(self, steps: Steps[None]) -> None:
+        """Stop some work where it is. Idempotent."""
+        for queue in (self._queue, self._waiting, self._backlog):
+            if steps in queue:
+                queue.remove(steps)
+        self._release(steps)
+        # What ends its own connection is in its last step.
+        if steps is not self._running:
+            steps.close()
+
+    def close(self) -> None:
+        """Stop all of it. Idempotent."""
+        for steps in [*self._queue, *self._waiting, *self._backlog]:
+            self.cancel(steps)
+
+    def _schedule(self) -> None:
+        while self._backlog and len(self._queue) < _AT_ONCE:
+            self._queue.append(self._backlog.popleft())
+        if self._queue and not self._is_scheduled:
+            self._is_scheduled = True
+            asyncio.get_running_loop().call_soon(self._turn)
+
+    def _turn(self) -> None:
+        self._is_scheduled = False
+        end = self._clock() + self._seconds
+        pausing: list[Steps[None]] = []
+        while self._queue:
+            steps = self._queue.popleft()
+            if self._run(steps, end):
+                (self._queue if self._is_over(end) else pausing).append(steps)
+            if self._is_over(end):
+                break
+        is_idle = not self._queue
+        self._queue.extend(pausing)
+        if pausing and is_idle:
+            self._is_scheduled = True
+            asyncio.get_running_loop().call_later(_PAUSE, self._turn)
+        else:
+            self._schedule()
+
+    def _is_over(self, end: float) -> bool:
+        return self._clock() >= end
+
+    def _run(self, steps: Steps[None], end: float) -> bool:
+        """Run some work up to ``end``; return whether it is to go on."""
+        self._running = steps
+        try:
+            while True:
+                need = next(steps)
+                if need is ALONE and not self._claim(steps):
+                    return False
+                if need is PAUSE or self._is_over(end):
+                    return True
+        except StopIteration:
+            pass
+        except Exception:  # noqa: BLE001 - a fault of one piece of work must not end the others
+            _log.exception("fault in a long piece of work")
+        finally:
+            self._running = None
+        self._release(steps)
+        return False
+
+    def _claim(self, steps: Steps[None]) -> bool:
+        """Return whether it may go on alone; else it waits."""
+        if self._alone is None:
+            self._alone = steps
+        if self._alone is steps:
+            return True
+        self._waiting.append(steps)
+        return False
+
+    def _release(self, steps: Steps[None]) -> None:
+        if self._alone is steps:
+            self._alone = self._waiting.popleft() if self._waiting else None
+            if self._alone:
+                self._queue.append(self._alone)
+                self._schedule()

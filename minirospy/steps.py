@@ -1,0 +1,66 @@
+"""Long work in short steps: generators that yield about once a millisecond, so that others have their turn between.
+
+What runs on an event loop is run by ``runtime/turns.py``; :func:`finish` runs it in one go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from enum import Enum
+from typing import Any, TypeVar
+
+__all__ = ["ALONE", "PAUSE", "Need", "Steps", "finish", "is_small"]
+
+_T = TypeVar("_T")
+
+
+class Need(Enum):
+    """What a step may yield in place of None."""
+
+    ALONE = "no other work that takes much memory may run beside this"
+    PAUSE = "there is nothing to do at present"
+
+
+ALONE, PAUSE = Need
+
+Steps = Generator[Need | None, None, _T]
+"""Work that yields between its steps and returns its result."""
+
+_SMALL = 2000
+_LETTERS_PER_ITEM = 16
+
+
+def finish(steps: Steps[_T]) -> _T:
+    """Return the result of work that runs here and now."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            result: _T = end.value
+            return result
+
+
+def is_small(value: Any, most: int = _SMALL) -> bool:
+    """Return whether a value of XML-RPC's types takes no more than a few milliseconds to walk through."""
+    return _left(value, most) >= 0
+
+
+def _left(value: Any, left: int) -> int:
+    """Return what is left of a number of items; it is negative if they do not do."""
+    if isinstance(value, (str, bytes)):
+        return left - 1 - len(value) // _LETTERS_PER_ITEM
+    if not isinstance(value, (list, tuple, dict)):
+        return left - 1
+    left -= 1 + len(value)
+    if left < 0:
+        return left
+    if isinstance(value, dict):
+        for key in value:
+            left -= len(key) // _LETTERS_PER_ITEM if isinstance(key, str) else 0
+        value = value.values()
+    for item in value:
+        if isinstance(item, (str, bytes, list, tuple, dict)):
+            left = _left(item, left)
+            if left < 0:
+                break
+    return left
