@@ -570,7 +570,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         master, port = stack.enter_context(
-            started_master(folder, [sys.executable, "-m", "minirospy.cli.master"])
+            started_master(folder, [sys.executable, "-m", "minirospy", "master"])
         )
         control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
         stack.callback(control.wait)

@@ -18,6 +18,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
+from minirospy.escape import has_controls
 from minirospy.runtime import notifier
 from minirospy.runtime.master import Master
 from minirospy.steps import finish
@@ -98,12 +99,26 @@ def counted(expected: list[list[Any]] | None, at: int, node: int) -> int:
     return sum(each[0] == node for each in expected[at]) if expected else 0
 
 
+def without_controls(value: Any) -> Any:
+    """Return an answer of rosmaster without the rows of names that ours has refused."""
+    if not isinstance(value, list):
+        return value
+    return [
+        without_controls(item)
+        for item in value
+        if not (isinstance(item, list) and item and isinstance(item[0], str) and has_controls(item[0]))
+    ]
+
+
 def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
     golden = json.loads((HERE / "master_answers.json").read_text())["answers"]
     calls = referee().CALLS
     assert len(golden) == len(calls) > 400
     for call, ours, real in zip(calls, answers(master), golden, strict=True):
-        assert ours == real, call
+        if ours != without_controls(real):
+            # rosmaster takes a name with a tab or a line feed; ours refuses it.
+            assert ours[0] == -1, call
+            assert any(isinstance(arg, str) and has_controls(arg) for arg in call[1:]), call
 
 
 def test_nodes_are_told_what_real_rosmaster_tells_them(master: str) -> None:
