@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["NodeProcess", "process"]
 
 _T = TypeVar("_T")
+_MASTER_SECONDS = 30.0
+"""How long the master may take to answer: one of many nodes that start at once on a small computer waits for its turn."""
 _HOOKS_SECONDS = 3.0
 """How long the hooks of a shutdown may take whose program has ended meanwhile."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
@@ -81,7 +83,9 @@ class NodeProcess(Identity, Life):
         """The master, called from the caller's own thread."""
         if self._master is None or self._master.caller_id != self.name:
             environment = self.environment
-            self._master = MasterProxy(environment.master_uri, self.name, nearby=environment.nearby)
+            self._master = MasterProxy(
+                environment.master_uri, self.name, _MASTER_SECONDS, nearby=environment.nearby
+            )
         return self._master
 
     @property

@@ -40,7 +40,12 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_CALL_SECONDS = 5.0
+_CALL_SECONDS = 30.0
+"""How long a call of the master may take: one of many nodes that start at once on a small computer waits for its turn."""
+
+_LOOK_SECONDS = 5.0
+"""How long the master may take to answer whether it knows this node: it is asked again soon."""
+
 _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up on a master that answers nothing for this long; the shorter limit is for one that was already
 silent before. There is no limit on the whole: a busy master that answers call after call is waited for."""
@@ -209,10 +214,10 @@ class Node:
         """
         return unwrap(method, await self._call_master(method, self.name, *args))
 
-    async def _call_master(self, method: str, *args: Any) -> Any:
+    async def _call_master(self, method: str, *args: Any, timeout: float = _CALL_SECONDS) -> Any:
         """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self.environment.master_uri
-        seconds = self._patience() if self._closed else _CALL_SECONDS
+        seconds = self._patience() if self._closed else timeout
         try:
             answer = await self._rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
@@ -474,10 +479,12 @@ class Node:
             asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
             has_forgotten = False
             try:
-                if asked and asked[0] == "Service":
-                    await self.master("lookupService", asked[1])
-                else:
-                    await self.master("lookupNode", self.name)
+                method, name = (
+                    ("lookupService", asked[1])
+                    if asked and asked[0] == "Service"
+                    else ("lookupNode", self.name)
+                )
+                unwrap(method, await self._call_master(method, self.name, name, timeout=_LOOK_SECONDS))
             except MasterUnreachableError as error:
                 failures += 1
                 if failures == 2:

@@ -17,6 +17,9 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
+_CONNECT_SECONDS = 5.0
+"""The system answers for a program that is busy: what does not connect within this is not there."""
+
 
 class RpcClient:
     """Calls methods of one server. Any number of threads may call; connections are kept and reused.
@@ -26,7 +29,9 @@ class RpcClient:
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, nearby: bool = True) -> None:
-        """``timeout`` in seconds bounds connecting, and each wait for bytes. ``nearby``: a Unix socket is tried first.
+        """``timeout`` in seconds bounds each wait for bytes, and connecting, which takes 5 s at most.
+
+        ``nearby``: a Unix socket is tried first.
 
         Raises RpcUnreachable on a bad URI.
         """
@@ -64,7 +69,7 @@ class RpcClient:
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)
         except TimeoutError as error:
-            raise RpcUnreachable(self.uri, f"timed out after {self._timeout:g} s") from error
+            raise self._late(self._timeout) from error
         except (OSError, EOFError) as error:
             why = getattr(error, "strerror", None) or str(error) or "the connection was closed"
             raise RpcUnreachable(self.uri, why) from error
@@ -74,16 +79,23 @@ class RpcClient:
         if near:
             near.settimeout(self._timeout)
             return near
+        seconds = min(self._timeout, _CONNECT_SECONDS)
         try:
             # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
             host: Any = sockets.resolvable("127.0.0.1" if self._host == "localhost" else self._host)
-            sock = socket.create_connection((host, self._port), self._timeout)
+            sock = socket.create_connection((host, self._port), seconds)
         except ConnectionRefusedError:
             if self._host != "localhost" or not socket.has_ipv6:
                 raise
-            sock = socket.create_connection(("::1", self._port), self._timeout)
+            sock = socket.create_connection(("::1", self._port), seconds)
+        except TimeoutError as error:
+            raise self._late(seconds) from error
+        sock.settimeout(self._timeout)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return sock
+
+    def _late(self, seconds: float) -> RpcUnreachable:
+        return RpcUnreachable(self.uri, f"timed out after {seconds:g} s")
 
     def _ask(self, sock: socket.socket, request: bytes) -> HttpMessage:
         reader = HttpReader()

@@ -1,4 +1,4 @@
-"""runtime/node: a node that closes unregisters everything, however slow its master is, and waits for no dead one."""
+"""runtime/node: a node registers and unregisters everything, however slow its master is, and waits for no dead one."""
 
 from __future__ import annotations
 
@@ -133,6 +133,35 @@ def test_close_waits_for_a_master_that_answers_slowly() -> None:
             node = await publishing_node(master.uri)
             await node.close()
             assert master.unregistered == ALL
+
+    run(scene)
+
+
+def test_registration_waits_for_a_master_that_is_busy_for_20_seconds() -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            loop = asyncio.get_running_loop()
+            arrived, passed = asyncio.Event(), 0.0
+            clock = loop.time
+            loop.time = lambda: clock() + passed  # type: ignore[method-assign]
+            dispatch = master._dispatch
+
+            async def answer_late(method: str, args: Sequence[Any]) -> Any:
+                arrived.set()
+                await master.release.wait()
+                return await dispatch(method, args)
+
+            master._server.dispatch = answer_late
+            master.release.clear()
+            registering = asyncio.ensure_future(node.advertise(Publication("/late", STRING)))
+            await arrived.wait()
+            passed = 20.0
+            # What is due by now runs in this turn.
+            await asyncio.sleep(0.01)
+            master.release.set()
+            await registering
+            await node.close()
 
     run(scene)
 
