@@ -8,6 +8,7 @@ found at the end, and a count of elements that take no bytes is checked before t
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -18,6 +19,8 @@ from minirospy.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
+_SPARE = 10_000
+"""Elements without bytes that a message may have beyond one for each of its bytes."""
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
@@ -170,6 +173,18 @@ def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
     return size
 
 
+def _has_elements_without_bytes(spec: MessageSpec, lookup: Lookup) -> bool:
+    """Return whether an array somewhere in a message has elements that may take no bytes."""
+    return any(
+        not field.type.is_primitive
+        and (
+            (field.type.is_array and not _least_size(lookup(field.type.base), lookup))
+            or _has_elements_without_bytes(lookup(field.type.base), lookup)
+        )
+        for field in spec.fields
+    )
+
+
 # --- writing
 
 
@@ -200,10 +215,11 @@ class _Writer:
     def _pack(self, letters: str, values: list[str]) -> str:
         """The call that packs values; an inner message that several of them come from is fetched once."""
         owners = [value.rpartition(".")[0] for value in values]
+        uses = Counter(owners)
         names: dict[str, str] = {}
         arguments = []
         for value, owner in zip(values, owners, strict=True):
-            if "." not in owner or owners.count(owner) == 1:
+            if "." not in owner or uses[owner] == 1:
                 arguments.append(value)
                 continue
             source = names.get(owner)
@@ -321,6 +337,8 @@ class _Reader:
             with self._source.block("if not isinstance(data, bytes):"):
                 self._line("data = bytes(data)")
         self._line("end = 0")
+        if _has_elements_without_bytes(spec, self._lookup):
+            self._line(f"spare = len(data) + {_SPARE}")
         raw = self._fields(chunks, names, lazy)
         if self._slices:
             with self._source.block("if end > len(data):"):
@@ -436,9 +454,10 @@ class _Reader:
 
     def _elements(self, type_: FieldType, target: str, count: str) -> None:
         spec = None if type_.is_primitive else self._lookup(type_.base)
-        if spec and type_.length is None and not _least_size(spec, self._lookup):
-            with self._source.block(f"if {count} > len(data):"):
-                # Elements without bytes: a count beyond the message's size is nonsense all the same.
+        if spec and not _least_size(spec, self._lookup):
+            # Elements without bytes: a short message could ask for any number of them.
+            self._line(f"spare -= {count}")
+            with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
         values = self._source.local(target.rpartition(".")[2])
         self._line(f"{target} = {values} = []")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 
 from minirospy.errors import DefinitionError
 from minirospy.idl.spec import MessageSpec, ServiceSpec
+from minirospy.idl.validate import MOST_LEVELS
 
 __all__ = [
     "Lookup",
@@ -47,16 +48,16 @@ def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
     """All types that a message needs, each once, a type before those that it needs itself."""
-    found: list[str] = []
+    found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:
         for field in current.fields:
             if not field.type.is_primitive and field.type.base not in found:
-                found.append(field.type.base)
+                found[field.type.base] = None
                 visit(lookup(field.type.base))
 
     visit(spec)
-    return found
+    return list(found)
 
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
@@ -73,15 +74,23 @@ def _md5(text: str) -> str:
     return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
-def _md5_text(spec: MessageSpec, lookup: Lookup, around: tuple[str, ...]) -> str:
-    """``around``: the messages that this one is a part of."""
+def _md5_text(
+    spec: MessageSpec, lookup: Lookup, around: tuple[str, ...], known: dict[str, str] | None = None
+) -> str:
+    """``around``: the messages that this one is a part of; ``known``: the md5sums computed so far."""
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
+    if len(around) > MOST_LEVELS:
+        raise DefinitionError(around[0], 1, f"its types are nested deeper than {MOST_LEVELS} levels")
     around += (spec.full_name,)
+    known = {} if known is None else known
     lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]
     for field in spec.fields:
         type_ = str(field.type)
         if not field.type.is_primitive:
-            type_ = _md5(_md5_text(lookup(field.type.base), lookup, around))
+            base = field.type.base
+            if base not in known:
+                known[base] = _md5(_md5_text(lookup(base), lookup, around, known))
+            type_ = known[base]
         lines.append(f"{type_} {field.name}")
     return "\n".join(lines)

@@ -21,7 +21,7 @@ from minirospy.idl.digest import (
 )
 from minirospy.idl.source import Source, python_name
 from minirospy.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
-from minirospy.idl.validate import check_spec, check_type_name
+from minirospy.idl.validate import check_spec, check_type_name, check_types
 
 __all__ = ["ClassSource", "emit_class", "emit_message", "emit_package", "emit_service", "python_name"]
 
@@ -100,7 +100,7 @@ _HELPERS = {
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
     """Return the module of a message. Raise DefinitionError where a name cannot be one in Python."""
-    check_spec(spec)
+    check_types(spec, lookup)
     return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
 
 
@@ -109,7 +109,7 @@ def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
 
     Raise DefinitionError where a name cannot be one in Python.
     """
-    check_spec(spec)
+    check_types(spec, lookup)
     module = _Module(_checked(lookup), imports=False)
     source = module.source([spec], None, f"{spec.full_name}.msg")
     return ClassSource(source, module.classes)
@@ -122,7 +122,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
     """
     check_type_name(spec.full_name)
     for message in (spec.request, spec.response):
-        check_spec(message)
+        check_types(message, lookup)
     return _Module(_checked(lookup)).source([spec.request, spec.response], spec, f"{spec.full_name}.srv")
 
 

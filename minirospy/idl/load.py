@@ -12,6 +12,7 @@ import importlib.machinery
 import importlib.util
 import linecache
 import os
+import struct
 import sys
 import types
 from collections.abc import Iterable, Mapping
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.idl.spec import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
-from minirospy.idl.validate import check_type_name, is_type_name
+from minirospy.idl.validate import MOST_TEXT, check_type_name, check_types, is_type_name
 
 if TYPE_CHECKING:
     from minirospy.idl.emit import ClassSource
@@ -213,6 +214,8 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     """The specs in a full text: the message's own, and those of all types that it needs. Raises DefinitionError."""
     from minirospy.idl.parse import parse_message
 
+    if len(text) > MOST_TEXT:
+        raise DefinitionError(full_name, 1, f"its definition has more than {MOST_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
     # The newline before a line of "=" belongs to it: a text that ends without one stays so.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
@@ -247,20 +250,10 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
         return specs[name]
 
     made: dict[str, Any] = {}
-
-    def make(name: str, around: tuple[str, ...] = ()) -> Any:
-        """Make the class of a type, after those of its fields."""
-        if name in around:
-            raise DefinitionError(full_name, 1, f"[{name}] contains itself")
-        if name not in made:
-            for field in lookup(name).fields:
-                if not field.type.is_primitive:
-                    make(field.type.base, (*around, name))
-            made[name] = _run(emit_class(lookup(name), lookup), name, made)
-        return made[name]
-
+    for name in check_types(specs[full_name], lookup):
+        made[name] = _run(emit_class(specs[name], lookup), name, made)
     # Sent on as it came, even where ours would be written otherwise.
-    make(full_name)._full_text = text
+    made[full_name]._full_text = text
     return types.MappingProxyType(made)
 
 
@@ -273,7 +266,11 @@ def _run(emitted: ClassSource, name: str, made: dict[str, Any]) -> Any:
     source = emitted.source
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     # Its names have passed `validate`, all other text is in it by `repr`: nothing of a peer's is code.
-    exec(compile(source, file, "exec"), module.__dict__)
+    try:
+        exec(compile(source, file, "exec"), module.__dict__)
+    except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
+        # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
+        raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     return module.__dict__[name.partition("/")[2]]
 
 

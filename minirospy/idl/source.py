@@ -31,6 +31,7 @@ class Source:
         """Names of the helpers of ``emit`` that the module needs."""
         self._indent = ""
         self._taken: set[str] = set()
+        self._last: dict[str, int] = {}
 
     def line(self, text: str = "") -> None:
         """Add a line to the current block."""
@@ -47,7 +48,7 @@ class Source:
     @contextmanager
     def function(self, head: str) -> Iterator[None]:
         """A block with local names of its own."""
-        self._taken = set()
+        self._taken, self._last = set(), {}
         with self.block(head):
             yield
 
@@ -73,8 +74,9 @@ class Source:
 
     def local(self, stem: str) -> str:
         """A local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
-        number = 1
+        number = self._last.get(stem, 0) + 1
         while f"{stem}{number}" in self._taken:
             number += 1
+        self._last[stem] = number
         self._taken.add(f"{stem}{number}")
         return f"{stem}{number}"
