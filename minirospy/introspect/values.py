@@ -8,6 +8,7 @@ Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
@@ -17,6 +18,7 @@ from minirospy.errors import ValueTextError
 __all__ = [
     "add_angles",
     "check_parameter",
+    "check_yaml",
     "format_pretty",
     "format_value",
     "message_values",
@@ -30,6 +32,10 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
+_MOST_YAML_LEVELS = 200
+_YAML_INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
+_MOST_YAML_VALUES = 1_000_000
+_LONGEST_ANGLE = 200
 
 
 def parse_value(text: str) -> Any:
@@ -47,8 +53,9 @@ def parse_value(text: str) -> Any:
     import yaml
 
     try:
+        check_yaml(text)
         return yaml.load(text, Loader=_loader())
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise ValueTextError(text, _complaint(error)) from error
 
 
@@ -57,9 +64,56 @@ def parse_documents(text: str, where: str) -> Iterator[Any]:
     import yaml
 
     try:
+        check_yaml(text)
         yield from yaml.load_all(text, Loader=_loader())
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise ValueTextError(where, _complaint(error)) from error
+
+
+def check_yaml(text: str) -> None:
+    """Raise ValueError where a YAML text is nested too deeply, or unfolds to too much by its aliases.
+
+    Libraries of YAML read both: the first one may crash Python, what the second one gives is small only as long as
+    nobody sends or prints it. Raise yaml.YAMLError where it is not YAML.
+    """
+    # How deep it can be at most: by its brackets, and by what its lines start with. Nearly every text ends here.
+    indent = max(map(len, _YAML_INDENT.findall(text)), default=0)
+    has_aliases = "*" in text and "&" in text
+    if text.count("[") + text.count("{") + 2 * indent < _MOST_YAML_LEVELS and not has_aliases:
+        return
+    import yaml
+
+    counts = [0]
+    """How many values each open collection has so far; the document's own first."""
+    anchors: list[str | None] = []
+    sizes: dict[str, int | None] = {}
+    """Anchor -> the values in what it names; None while that is open."""
+    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    for event in yaml.parse(text, Loader=loader):
+        match event:
+            case yaml.AliasEvent(anchor=name):
+                size = sizes.get(str(name), 1)
+                if size is None:
+                    raise ValueError(f"the alias *{name} stands inside of what it names")
+                counts[-1] += size
+            case yaml.ScalarEvent(anchor=name):
+                counts[-1] += 1
+                if name:
+                    sizes[name] = 1
+            case yaml.CollectionStartEvent(anchor=name):
+                counts.append(1)
+                anchors.append(name)
+                if name:
+                    sizes[name] = None
+            case yaml.CollectionEndEvent():
+                size, name = counts.pop(), anchors.pop()
+                counts[-1] += size
+                if name:
+                    sizes[name] = size
+        if len(counts) > _MOST_YAML_LEVELS:
+            raise ValueError(f"it is nested deeper than {_MOST_YAML_LEVELS} levels")
+        if has_aliases and counts[-1] > _MOST_YAML_VALUES:
+            raise ValueError(f"its aliases unfold to more than {_MOST_YAML_VALUES} values")
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[Any]:
@@ -177,8 +231,6 @@ def _loader() -> type[Any]:
 
 def add_angles(loader_class: Any) -> None:
     """Teach a YAML loader angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
-    import re
-
     import yaml
 
     in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
@@ -206,6 +258,9 @@ def _arithmetic(text: str) -> float:
     import ast
     import operator
 
+    if len(text) > _LONGEST_ANGLE:
+        # Python's parser has limits of its own, and says so by errors of its own.
+        raise ValueError(f"more than {_LONGEST_ANGLE} characters")
     binary = {
         ast.Add: operator.add,
         ast.Sub: operator.sub,

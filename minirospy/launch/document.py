@@ -37,6 +37,7 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 }
 """Each tag, and the attributes that it may have."""
 
+_MOST_LEVELS = 100
 _TRUTH = {"true": True, "false": False}
 _CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
@@ -59,6 +60,10 @@ def parse_document(text: bytes, file: str) -> Element:
     roots: list[Element] = []
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        if len(stack) >= _MOST_LEVELS:
+            raise LaunchError(
+                file, parser.CurrentLineNumber, f"tags are nested deeper than {_MOST_LEVELS} levels"
+            )
         element = Element(tag, attributes, parser.CurrentLineNumber)
         (stack[-1].children if stack else roots).append(element)
         stack.append(element)

@@ -159,7 +159,10 @@ def convert(text: str, type_: str) -> Any:
     if kind == "yaml":
         import yaml
 
+        from minirospy.introspect.values import check_yaml
+
         try:
+            check_yaml(text)
             return yaml.safe_load(text)
         except yaml.YAMLError as error:
             raise ValueError(f"not YAML: {getattr(error, 'problem', None) or error}") from None

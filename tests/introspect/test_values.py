@@ -122,3 +122,54 @@ def test_documents_of_a_pipe_come_one_by_one() -> None:
 
 def test_an_empty_argument_is_the_empty_text() -> None:
     assert parse_arguments(["", "1", "a b", "{x: 1}"]) == ["", 1, "a b", {"x": 1}]
+
+
+BOMBS = {
+    "brackets": "[" * 100_000,
+    "braces": "{a: " * 100_000,
+    "dashes": "- " * 100_000 + "a",
+    "questions": "? " * 100_000 + "a",
+    "indents": "\n".join(" " * level + "a:" for level in range(1000)),
+    "laughs": "\n".join(
+        ["a0: &a0 [x]", *(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12))]
+    ),
+    "laughs of keys": "\n".join(
+        ["a0: &a0 {x: y}", *(f"a{n}: &a{n} {{b: *a{n - 1}, c: *a{n - 1}}}" for n in range(1, 40))]
+    ),
+    "merged laughs": "\n".join(
+        [
+            "a0: &a0 {x: y}",
+            *(f"a{n}: &a{n} {{b: {{<<: *a{n - 1}}}, c: {{<<: *a{n - 1}}}}}" for n in range(1, 40)),
+        ]
+    ),
+    "itself": "&a [*a]",
+    "itself as a key": "&a {b: {c: *a}}",
+}
+
+
+@pytest.mark.parametrize("text", BOMBS.values(), ids=list(BOMBS))
+def test_yaml_that_explodes_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(ValueTextError) as raised:
+        parse_value(text)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 200
+    with pytest.raises(ValueTextError):
+        list(parse_documents(text, "file.yaml"))
+
+
+@pytest.mark.parametrize(
+    "text", ["rad(" + "1+" * 500 + "1)", "deg(" + "-" * 5000 + "1)", "deg(" + "9" * 5000 + ")"]
+)
+def test_angle_that_explodes_is_refused(text: str) -> None:
+    with pytest.raises(ValueTextError):
+        parse_value(text)
+
+
+def test_aliases_and_many_brackets_are_read() -> None:
+    assert parse_value("a: &x [1, 2]\nb: [*x, *x]\n") == {"a": [1, 2], "b": [[1, 2], [1, 2]]}
+    assert parse_value("base: &x {p: 1}\nrobot: {<<: *x, q: 2}\n")["robot"] == {"p": 1, "q": 2}
+    assert len(parse_value("[" + "[1], " * 5000 + "]")) == 5000
+    deep = parse_value("[" * 150 + "]" * 150)
+    for _ in range(149):
+        (deep,) = deep
+    assert deep == []

@@ -251,3 +251,24 @@ def test_a_file_that_includes_itself_ends(packages: Packages, tmp_path: Path) ->
 def test_what_is_not_a_launch_file(packages: Packages, text: str, says: str) -> None:
     with pytest.raises(LaunchError, match=says):
         load_text(text, {}, packages)
+
+
+EXPLODING = {
+    "tags": "<group>" * 100_000 + "</group>" * 100_000,
+    "entities": '<param name="a" value="&j;"/>',
+    "a parameter of brackets": f"<rosparam>a: {'[' * 100_000}</rosparam>",
+    "a parameter of aliases": "<rosparam>a0: &amp;a0 [x]\n"
+    + "\n".join(f"a{n}: &amp;a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12))
+    + "</rosparam>",
+    "a value of brackets": f'<param name="a" type="yaml" value="{"[" * 100_000}"/>',
+}
+LAUGHS = "".join(f'<!ENTITY {b} "{f"&{a};" * 20}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True))
+
+
+@pytest.mark.parametrize("body", EXPLODING.values(), ids=list(EXPLODING))
+def test_file_that_explodes_is_refused_in_one_line(packages: Packages, body: str) -> None:
+    head = f'<!DOCTYPE launch [<!ENTITY a "x">{LAUGHS}]>' if "&j;" in body else ""
+    with pytest.raises(LaunchError) as raised:
+        load_text(f"{head}<launch>{body}</launch>", {}, packages, {"HOME": "/home/me"})
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 300
