@@ -9,7 +9,6 @@ import os
 import socket
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
 from minirospy.environment import Environment, is_local
@@ -99,6 +98,8 @@ def create_local_xmlrpc_uri(port: int) -> str:
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
     """(host, port) of a URL; port 80 where it has none. Raises ValueError."""
+    from urllib.parse import urlsplit
+
     if not url:
         raise ValueError("not a valid URL")
     parts = urlsplit(url)

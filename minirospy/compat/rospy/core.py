@@ -16,7 +16,6 @@ from minirospy.client.log import logerr
 from minirospy.client.process import process
 from minirospy.clock import SimulatedClock, WallClock
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
-from minirospy.compat.rospy.passing import passing_on
 from minirospy.environment import split_uri
 from minirospy.errors import ROSException
 from minirospy.times import Time
@@ -41,6 +40,7 @@ __all__ = [
     "rospyerr",
     "rospyinfo",
     "rospywarn",
+    "service_logger",
     "set_rostime",
     "set_rostime_initialized",
     "switch_to_wallclock",
@@ -49,8 +49,8 @@ __all__ = [
 
 MASTER_NAME = "master"
 ROSRPC = "rosrpc://"
-__getattr__, __dir__ = passing_on("rospy.core", "rospy.names")
 
+service_logger = logging.getLogger("rospy.service")
 _internal = logging.getLogger("rospy.internal")
 rospydebug = _internal.debug
 rospyinfo = _internal.info

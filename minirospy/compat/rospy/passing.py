@@ -10,10 +10,10 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-__all__ = ["passing_on"]
+__all__ = ["core_dir", "core_getattr", "service_dir", "service_getattr", "topics_dir", "topics_getattr"]
 
 
-def passing_on(name: str, source: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def _passing_on(name: str, source: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also has the public names of ``source``."""
 
     def get(attribute: str) -> Any:
@@ -28,3 +28,8 @@ def passing_on(name: str, source: str) -> tuple[Callable[[str], Any], Callable[[
         return sorted({*vars(sys.modules[name]), *public})
 
     return get, names
+
+
+core_getattr, core_dir = _passing_on("rospy.core", "rospy.names")
+service_getattr, service_dir = _passing_on("rospy.service", "rospy.core")
+topics_getattr, topics_dir = _passing_on("rospy.topics", "rospy.core")

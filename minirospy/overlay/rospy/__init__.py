@@ -74,7 +74,7 @@ from minirospy.client import wait_for_message as wait_for_message
 from minirospy.client import wait_for_service as wait_for_service
 from minirospy.client.life import ROSInterruptException as ROSInterruptException
 from minirospy.client.time import ROSTimeMovedBackwardsException as ROSTimeMovedBackwardsException
-from minirospy.compat.rospy import live as _live  # noqa: F401 - after the modules that it completes
+from minirospy.compat.rospy import live as _live  # after the modules that it completes
 from minirospy.compat.rospy.core import get_ros_root as get_ros_root
 from minirospy.compat.rospy.core import parse_rosrpc_uri as parse_rosrpc_uri
 from minirospy.compat.rospy.msproxy import MasterProxy as MasterProxy

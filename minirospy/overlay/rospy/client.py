@@ -30,8 +30,8 @@ from minirospy.client import (
     spin,
     wait_for_message,
 )
-from minirospy.client.params import UNSPECIFIED as _unspecified  # noqa: F401, N811 - as before
-from minirospy.client.params import Unspecified as _Unspecified  # noqa: F401 - programs hand it on as the default
+from minirospy.client.params import UNSPECIFIED as _unspecified
+from minirospy.client.params import Unspecified as _Unspecified  # programs hand it on as the default
 from minirospy.compat.rospy.msproxy import get_master
 
 __all__ = [

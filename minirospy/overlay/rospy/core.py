@@ -30,8 +30,6 @@ from minirospy.client.log import logwarn_throttle as logwarn_throttle
 from minirospy.client.log import logwarn_throttle_identical as logwarn_throttle_identical
 from minirospy.compat.rospy.core import MASTER_NAME as MASTER_NAME
 from minirospy.compat.rospy.core import ROSRPC as ROSRPC
-from minirospy.compat.rospy.core import __dir__ as __dir__
-from minirospy.compat.rospy.core import __getattr__ as __getattr__
 from minirospy.compat.rospy.core import add_client_shutdown_hook as add_client_shutdown_hook
 from minirospy.compat.rospy.core import add_preshutdown_hook as add_preshutdown_hook
 from minirospy.compat.rospy.core import add_shutdown_hook as add_shutdown_hook
@@ -47,3 +45,5 @@ from minirospy.compat.rospy.core import rospyerr as rospyerr
 from minirospy.compat.rospy.core import rospyinfo as rospyinfo
 from minirospy.compat.rospy.core import rospywarn as rospywarn
 from minirospy.compat.rospy.msproxy import xmlrpcapi as xmlrpcapi
+from minirospy.compat.rospy.passing import core_dir as __dir__
+from minirospy.compat.rospy.passing import core_getattr as __getattr__

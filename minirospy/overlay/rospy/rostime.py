@@ -9,7 +9,7 @@ from minirospy.compat.rospy.core import (
     switch_to_wallclock,
     wallsleep,
 )
-from minirospy.compat.rospy.core import set_rostime as _set_rostime  # noqa: F401 - programs without a node call it
+from minirospy.compat.rospy.core import set_rostime as _set_rostime  # programs without a node call it
 
 __all__ = [
     "Duration", "Time", "get_rostime", "get_rostime_cond", "get_time", "is_rostime_initialized", "is_wallclock",

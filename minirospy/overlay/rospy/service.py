@@ -2,10 +2,10 @@
 
 from minirospy.client.services import Service as Service
 from minirospy.client.services import ServiceProxy as ServiceProxy
+from minirospy.compat.rospy.core import service_logger as logger
 from minirospy.compat.rospy.impl.registration import ServiceManager as ServiceManager
-from minirospy.compat.rospy.service import __dir__ as __dir__
-from minirospy.compat.rospy.service import __getattr__ as __getattr__
-from minirospy.compat.rospy.service import logger as logger
+from minirospy.compat.rospy.passing import service_dir as __dir__
+from minirospy.compat.rospy.passing import service_getattr as __getattr__
 from minirospy.errors import ServiceException as ServiceException
 from rospy.impl.registration import Registration as Registration
 from rospy.impl.transport import BIDIRECTIONAL as BIDIRECTIONAL

@@ -5,8 +5,8 @@ from minirospy.client.topics import SubscribeListener as SubscribeListener
 from minirospy.client.topics import Subscriber as Subscriber
 from minirospy.client.topics import Topic as Topic
 from minirospy.compat.rospy.msg import serialize_message as serialize_message
-from minirospy.compat.rospy.topics import __dir__ as __dir__
-from minirospy.compat.rospy.topics import __getattr__ as __getattr__
+from minirospy.compat.rospy.passing import topics_dir as __dir__
+from minirospy.compat.rospy.passing import topics_getattr as __getattr__
 from minirospy.errors import ROSSerializationException as ROSSerializationException
 from minirospy.errors import TransportTerminated as TransportTerminated
 from minirospy.idl.message import Message as Message

@@ -1,16 +1,19 @@
-"""rospy.impl.transport, filled in by minirospy: the directions of a connection, as getBusInfo tells them."""
+"""rospy.impl.transport and tcpros_base: the directions of a connection in getBusInfo, and constants of TCPROS."""
 
 from typing import Any
 
-__all__ = ["BIDIRECTIONAL", "INBOUND", "OUTBOUND"]
+__all__ = ["BIDIRECTIONAL", "DEFAULT_BUFF_SIZE", "INBOUND", "OUTBOUND", "TCPROS"]
 
 INBOUND, OUTBOUND, BIDIRECTIONAL = "i", "o", "b"
+TCPROS = "TCPROS"
+DEFAULT_BUFF_SIZE = 65536
+"""The default of Subscriber's ``buff_size``."""
 
 
 def __getattr__(name: str) -> Any:
-    # For annotations, and for programs into which an editor has imported it. asyncio comes with it.
+    # Programs name them in annotations. Imported on use, as asyncio comes with them.
     if name in ("Transport", "DeadTransport"):
         from minirospy.runtime.links import OutLink
 
         return OutLink
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    raise AttributeError(f"module 'rospy.impl.transport' has no attribute {name!r}")

@@ -1,6 +1,6 @@
 """RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
 
-from minirospy.compat import rpi as _rpi  # noqa: F401 - warns where a Raspberry Pi lacks its library
+from minirospy.compat import rpi as _rpi  # warns where a Raspberry Pi lacks its library
 from minirospy.gpio.rpigpio import BCM as BCM
 from minirospy.gpio.rpigpio import BOARD as BOARD
 from minirospy.gpio.rpigpio import BOTH as BOTH

@@ -1,5 +1,5 @@
 """rospy.impl.tcpros_base, filled in by minirospy."""
 
-from minirospy.compat.rospy.impl.tcpros_base import DEFAULT_BUFF_SIZE, TCPROS
+from minirospy.compat.rospy.impl.transport import DEFAULT_BUFF_SIZE, TCPROS
 
 __all__ = ["DEFAULT_BUFF_SIZE", "TCPROS"]
