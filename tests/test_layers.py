@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,8 @@ LAYERS = [
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
+WITH_CYCLES = {"actionlib", "aio", "client", "idl", "introspect", "runtime"}
+"""Rooms whose modules still import each other in circles."""
 PURE = {"graph", "wire", "idl"}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
@@ -43,6 +46,23 @@ def imports(path: Path) -> set[str]:
             assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
     return found
+
+
+def graph_of_imports(room: str) -> dict[str, set[str]]:
+    """The modules of a room that each of its modules imports, imports inside functions included."""
+    files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
+    modules = {module_name(path): path for path in files}
+    found = {module: imports(path) for module, path in modules.items()}
+    # `from package.module import name` and `from package import module` look alike.
+    named = {module: names | {name.rpartition(".")[0] for name in names} for module, names in found.items()}
+    for module in modules:
+        named[module] -= {name.rpartition(".")[0] for name in found[module] if name in modules}
+    return {module: (names & modules.keys()) - {module} for module, names in named.items()}
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def room_of(module: str) -> str:
@@ -66,6 +86,11 @@ def test_imports_go_downwards(path: Path) -> None:
 )
 def test_pure_rooms_touch_no_outside(path: Path) -> None:
     assert not {module.split(".")[0] for module in imports(path)} & IMPURE_MODULES
+
+
+@pytest.mark.parametrize("room", sorted(DEPTH.keys() - WITH_CYCLES))
+def test_no_room_has_an_import_cycle(room: str) -> None:
+    list(graphlib.TopologicalSorter(graph_of_imports(room)).static_order())
 
 
 def test_every_room_has_its_place() -> None:

@@ -8,6 +8,16 @@ from pathlib import Path
 import pytest
 
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
+COMPAT = OVERLAY.with_name("compat")
+SHARED = {
+    "__init__.py",
+    "rpi.py",
+    "rospy/live.py",
+    "rospy/passing.py",
+    "rostopic/echo.py",
+    "rostopic/rates.py",
+}
+"""Modules of compat that are not the counterpart of one module."""
 HAND_WRITTEN = sorted(
     path for path in OVERLAY.rglob("*.py") if not {"msg", "srv"} & set(path.relative_to(OVERLAY).parts)
 )
@@ -38,3 +48,10 @@ def test_an_overlay_module_only_re_exports(path: Path) -> None:
 
 def test_there_are_hand_written_modules() -> None:
     assert len(HAND_WRITTEN) > 100
+
+
+def test_a_module_of_compat_has_the_name_of_the_module_that_it_emulates() -> None:
+    """So that what `import rosgraph.masterapi` offers is found in compat/rosgraph/masterapi.py."""
+    emulated = {path.relative_to(OVERLAY) for path in HAND_WRITTEN}
+    ours = {path.relative_to(COMPAT) for path in COMPAT.rglob("*.py")}
+    assert {path.as_posix() for path in ours - emulated} == SHARED

@@ -1,6 +1,18 @@
-"""genmsg.base: the signs and names of definition files."""
+"""genmsg.base: the signs and suffixes of definition files, and the error of one that does not parse."""
 
-__all__ = ["COMMENTCHAR", "CONSTCHAR", "EXT_MSG", "EXT_SRV", "IODELIM", "MSG_DIR", "SEP", "SRV_DIR"]
+from __future__ import annotations
+
+__all__ = [
+    "COMMENTCHAR",
+    "CONSTCHAR",
+    "EXT_MSG",
+    "EXT_SRV",
+    "IODELIM",
+    "MSG_DIR",
+    "SEP",
+    "SRV_DIR",
+    "InvalidMsgSpec",
+]
 
 SEP = "/"
 MSG_DIR = "msg"
@@ -10,3 +22,7 @@ EXT_SRV = ".srv"
 CONSTCHAR = "="
 COMMENTCHAR = "#"
 IODELIM = "---"
+
+
+class InvalidMsgSpec(Exception):
+    """A definition does not parse."""

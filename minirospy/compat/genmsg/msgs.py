@@ -1,9 +1,184 @@
-"""genmsg.msgs: the types that a definition may name without a package."""
+"""genmsg.msgs: types, fields and constants of messages."""
 
-__all__ = ["DURATION", "DURATION_MSG", "HEADER", "TIME", "TIME_MSG"]
+from __future__ import annotations
+
+import re
+from typing import Any, NamedTuple
+
+__all__ = [
+    "BUILTIN_TYPES",
+    "DURATION",
+    "DURATION_MSG",
+    "HEADER",
+    "HEADER_FULL_NAME",
+    "PRIMITIVE_TYPES",
+    "TIME",
+    "TIME_MSG",
+    "Constant",
+    "Field",
+    "MsgSpec",
+    "bare_msg_type",
+    "is_builtin",
+    "is_header_type",
+    "is_valid_constant_type",
+    "is_valid_msg_field_name",
+    "is_valid_msg_type",
+    "parse_type",
+    "resolve_type",
+]
 
 HEADER = "Header"
 TIME = "time"
 DURATION = "duration"
 TIME_MSG = "uint32 secs\nuint32 nsecs"
 DURATION_MSG = "int32 secs\nint32 nsecs"
+HEADER_FULL_NAME = "std_msgs/Header"
+
+PRIMITIVE_TYPES = [
+    "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "string", "bool",
+    "char", "byte",
+]  # fmt: skip
+
+BUILTIN_TYPES = [*PRIMITIVE_TYPES, "time", "duration"]
+_HEADERS = ("Header", HEADER_FULL_NAME, "roslib/Header")
+
+
+class Constant(NamedTuple):
+    """A constant: ``val`` is its value, ``val_text`` what the definition says."""
+
+    type: str
+    name: str
+    val: Any
+    val_text: str
+
+    def __repr__(self) -> str:
+        return f"{self.type} {self.name}={self.val}"
+
+
+class Field:
+    """A field, its type taken apart."""
+
+    def __init__(self, name: str, type: str) -> None:
+        self.name = name
+        self.type = type
+        self.base_type, self.is_array, self.array_len = parse_type(type)
+        self.is_header = is_header_type(type)
+        self.is_builtin = is_builtin(self.base_type)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Field) and (self.name, self.type) == (other.name, other.type)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.type))
+
+    def __repr__(self) -> str:
+        return f"[{self.name}, {self.type}, {self.base_type}, {self.is_array}, {self.array_len}]"
+
+
+class MsgSpec:
+    """A message: ``types`` and ``names`` of its fields, its constants, its text and name."""
+
+    def __init__(
+        self,
+        types: list[str],
+        names: list[str],
+        constants: list[Constant],
+        text: str,
+        full_name: str,
+        package: str = "",
+        short_name: str = "",
+    ) -> None:
+        if len(types) != len(names):
+            raise ValueError(f"len of args must match: {len(types)} types, {len(names)} names")
+        self.types = types
+        self.names = names
+        self.constants = constants
+        self.text = text
+        self.full_name = full_name
+        own_package, _, own_name = full_name.rpartition("/")
+        self.package = package or own_package
+        self.short_name = short_name or own_name
+        self.header_present = self.has_header()
+
+    def fields(self) -> list[tuple[str, str]]:
+        """(type, name) of each field."""
+        return list(zip(self.types, self.names, strict=True))
+
+    def parsed_fields(self) -> list[Field]:
+        """The fields, their types taken apart."""
+        return [Field(name, type_) for type_, name in self.fields()]
+
+    def has_header(self) -> bool:
+        """Whether it starts with a header that publishers fill in."""
+        return self.fields()[:1] == [(HEADER_FULL_NAME, "header")]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, MsgSpec) and (self.fields(), self.constants, self.text, self.full_name) == (
+            other.fields(),
+            other.constants,
+            other.text,
+            other.full_name,
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        constants = f"{self.constants}, " if self.constants else ""
+        return f"MsgSpec[{constants}{self.types}, {self.names}]"
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def is_builtin(msg_type_name: str) -> bool:
+    """Whether a type is no message."""
+    return msg_type_name in BUILTIN_TYPES
+
+
+def is_header_type(msg_type: str) -> bool:
+    """Whether a type is that of a header, by any of its names."""
+    return msg_type in _HEADERS
+
+
+def is_valid_msg_type(x: str) -> bool:
+    """Whether a text is a type's name, with or without brackets."""
+    return bool(x) and re.match(r"[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
+
+
+def is_valid_msg_field_name(x: str) -> bool:
+    """Whether a text is a field's name."""
+    return re.match(r"[A-Za-z]\w*\Z", x, re.ASCII) is not None
+
+
+def is_valid_constant_type(x: str) -> bool:
+    """Whether a constant can be of a type."""
+    return x in PRIMITIVE_TYPES
+
+
+def bare_msg_type(msg_type: str) -> str:
+    """A type without its brackets."""
+    return msg_type and msg_type.partition("[")[0]
+
+
+def resolve_type(msg_type: str, package_context: str) -> str:
+    """A type with its package, as definitions in ``package_context`` mean it."""
+    bare = bare_msg_type(msg_type)
+    if "/" in bare or is_builtin(bare):
+        return msg_type
+    # ROS's own forgets the brackets behind a Header.
+    return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
+
+
+def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
+    """(type without brackets, whether it is an array, its length where that is fixed). Raises ValueError."""
+    if not msg_type:
+        raise ValueError("Invalid empty type")
+    base, bracket, rest = msg_type.partition("[")
+    if not bracket:
+        return base, False, None
+    if "[" in rest:
+        raise ValueError(f"Currently only support 1-dimensional array types: {msg_type}")
+    length = rest.removesuffix("]")
+    if not rest.endswith("]") or (length and not length.isdecimal()):
+        raise ValueError(f"Invalid array dimension: [{length}]")
+    return base, True, int(length) if length else None

@@ -10,33 +10,16 @@ import codecs
 import struct
 from typing import Any
 
-from minirospy.errors import DefinitionError, MessageException
-
 __all__ = [
-    "SIMPLE_TYPES",
-    "SIMPLE_TYPES_DICT",
-    "MsgGenerationException",
     "RosMsgUnicodeErrors",
-    "generate_dynamic",
     "get_message_class",
     "get_service_class",
-    "is_simple",
     "isstring",
     "register_unicode_errors",
     "struct_I",
 ]
 
 struct_I = struct.Struct("<I")
-
-SIMPLE_TYPES_DICT = {
-    "int8": "b", "uint8": "B", "bool": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
-    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d", "char": "B", "byte": "b",
-}  # fmt: skip
-SIMPLE_TYPES = list(SIMPLE_TYPES_DICT)
-
-
-class MsgGenerationException(MessageException):
-    """A definition that no class can be made from."""
 
 
 class RosMsgUnicodeErrors:
@@ -67,17 +50,6 @@ def register_unicode_errors() -> None:
         codecs.register_error("rosmsg", RosMsgUnicodeErrors())
 
 
-def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, Any]:
-    """The class of a full text, and those of all types in it, by name. Raises InvalidMsgSpec on a text that is none."""
-    from minirospy.compat.genmsg import msg_loader
-    from minirospy.idl import load
-
-    try:
-        return dict(load.classes_from_text(core_type, msg_cat))
-    except DefinitionError as error:
-        raise msg_loader.InvalidMsgSpec(str(error)) from error
-
-
 def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:
     """The class of ``pkg/Name``, or None. Raises ValueError on what is no name of a type."""
     from minirospy.idl import load
@@ -90,11 +62,6 @@ def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
     from minirospy.idl import load
 
     return load.get_service_class(_checked(service_type))
-
-
-def is_simple(type_: str) -> bool:
-    """Whether ``struct`` packs a type."""
-    return type_ in SIMPLE_TYPES_DICT
 
 
 def isstring(s: object) -> bool:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.compat.roslaunch.config import LaunchFile, assignments
+from minirospy.compat.roslaunch.config import LaunchFile
+from minirospy.compat.roslaunch.xmlloader import assignments
 from minirospy.launch.load import resolved_arg_docs
 from minirospy.workspace.packages import Packages
 

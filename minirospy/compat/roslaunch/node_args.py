@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.compat.roslaunch.config import (
-    LaunchFile,
-    Machine,
-    Node,
-    NodeParamsException,
-    ROSLaunchConfig,
-    load_config_default,
-)
+from minirospy.compat.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
+from minirospy.compat.roslaunch.core import Machine, Node
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError
 from minirospy.launch.command import node_command, node_environment
@@ -19,6 +13,7 @@ from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import Packages
 
 __all__ = [
+    "NodeParamsException",
     "create_local_process_args",
     "get_node_args",
     "get_node_list",
@@ -75,3 +70,7 @@ def _find(name: str, files: Sequence[LaunchFile]) -> Node:
     if "/" + name.strip("/") not in names:
         raise NodeParamsException(f"Cannot find node named [{name}]: there are {', '.join(names) or 'none'}")
     return config.nodes[names.index("/" + name.strip("/"))]
+
+
+class NodeParamsException(Exception):
+    """The command of a node cannot be made."""

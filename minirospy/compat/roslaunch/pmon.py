@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import Any, ClassVar
 
-from minirospy.compat.roslaunch.config import Node, NodeParamsException, RLException
+from minirospy.compat.roslaunch.core import Node, RLException
+from minirospy.compat.roslaunch.node_args import NodeParamsException
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError
 from minirospy.launch import process as processes

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Sequence
 
 from minirospy.compat.roslaunch.config import LaunchFile, load_config_default
+from minirospy.compat.roslaunch.core import RLException
 from minirospy.environment import Environment
+from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
+from minirospy.launch.load import find_files
 from minirospy.launch.output import Output, warn_of_large_logs
+from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
 __all__ = [
     "change_terminal_name",
     "check_log_disk_usage",
     "check_roslaunch",
+    "get_or_generate_uuid",
     "print_file_list",
+    "resolve_launch_arguments",
     "update_terminal_name",
 ]
 
@@ -42,3 +49,24 @@ def change_terminal_name(args: Sequence[str], is_core: bool) -> None:
 def update_terminal_name(ros_master_uri: str) -> None:
     """Set the terminal's title to the master's URI."""
     Output().title(ros_master_uri)
+
+
+def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
+    """The run id: the given one, that of the master, or (where none answers) a new one."""
+    if options_runid:
+        return options_runid
+    master = MasterProxy(Environment.read().master_uri, "/roslaunch")
+    try:
+        return str(master.get_param("/run_id"))
+    except (MasterUnreachableError, RpcError):
+        return str(uuid.uuid1())
+    finally:
+        master.close()
+
+
+def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
+    """The paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
+    try:
+        return find_files([word for word in args if ":=" not in word], Packages())
+    except MinirospyError as error:
+        raise RLException(str(error)) from error

@@ -63,7 +63,7 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> li
     try:
         return _interfaces(_kind(mode)).in_package(package)
     except NotFoundError as error:
-        from minirospy.compat.rospkg.rospack import ResourceNotFound
+        from minirospy.compat.rospkg.common import ResourceNotFound
 
         raise ResourceNotFound(package) from error
 

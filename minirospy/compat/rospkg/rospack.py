@@ -7,10 +7,10 @@ are packages, ours asks the packages that it finds: the other names are rosdep k
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy.compat.rospkg.environment import get_ros_paths
 from minirospy.errors import ManifestError, nearest
@@ -19,114 +19,21 @@ from minirospy.workspace.packages import Packages, package_name
 
 if TYPE_CHECKING:
     from minirospy.workspace import manifest
+from minirospy.compat.rospkg.common import ResourceNotFound
+from minirospy.compat.rospkg.manifest import InvalidManifest, Manifest, parse_manifest_file
 
 __all__ = [
-    "MANIFEST_FILE",
-    "PACKAGE_FILE",
-    "ROS_STACK",
-    "STACK_FILE",
-    "Depend",
-    "Export",
-    "InvalidManifest",
-    "Manifest",
     "ManifestManager",
-    "ResourceNotFound",
-    "RosDep",
     "RosPack",
     "RosStack",
     "expand_to_packages",
     "get_package_name",
     "get_stack_version_by_dir",
     "list_by_path",
-    "parse_manifest_file",
 ]
-
-MANIFEST_FILE = "manifest.xml"
-PACKAGE_FILE = "package.xml"
-STACK_FILE = "stack.xml"
-ROS_STACK = "ros"
 
 Names = list[str]
 _Manager = TypeVar("_Manager", bound="ManifestManager")
-
-
-class ResourceNotFound(Exception):
-    """No package or stack of a name; ``ros_paths`` are the folders that were searched."""
-
-    def __init__(self, msg: str, ros_paths: Sequence[str] | None = None, nearest: Sequence[str] = ()) -> None:
-        super().__init__(msg)
-        self.ros_paths = ros_paths
-        self.nearest = nearest
-
-    def __str__(self) -> str:
-        hint = f" (did you mean {' or '.join(self.nearest)}?)" if self.nearest else ""
-        paths = [f"ROS path [{index}]={path}" for index, path in enumerate(self.ros_paths or ())]
-        return "\n".join([f"{self.args[0]}{hint}", *paths])
-
-
-class InvalidManifest(Exception):
-    """A package.xml does not read."""
-
-
-class Depend(NamedTuple):
-    """A dependency on a package."""
-
-    name: str
-    type: str = "package"
-
-    def __str__(self) -> str:
-        return self.name
-
-
-class RosDep(NamedTuple):
-    """A dependency on what is no ROS package."""
-
-    name: str
-
-    def __str__(self) -> str:
-        return self.name
-
-
-class Export:
-    """A tag in the exports of a package."""
-
-    def __init__(self, tag: str, attrs: Mapping[str, str], str: str) -> None:
-        self.tag = tag
-        self.attrs = attrs
-        self.str = str
-
-    def get(self, attr: str) -> str | None:
-        """The value of an attribute, or None."""
-        return self.attrs.get(attr)
-
-
-class Manifest:
-    """A package.xml as rospkg shows it. ``filename`` is its path."""
-
-    is_catkin = True
-    brief = license_url = status = notes = ""
-
-    def __init__(self, read: manifest.Manifest, depends: Sequence[str], rosdeps: Sequence[str]) -> None:
-        self.type = "package"
-        self.filename = str(read.path)
-        self.name = read.name
-        self.version = read.version
-        self.description = read.description
-        self.author = _people(read)
-        self.licenses = list(read.licenses)
-        self.license = ", ".join(read.licenses)
-        self.url = next((each.url for each in read.urls if each.type == "website"), "")
-        self.depends = [Depend(name) for name in depends]
-        self.rosdeps = [RosDep(name) for name in rosdeps]
-        self.exports = [Export(each.tag, each.attributes, each.text) for each in read.exports]
-        self.platforms: list[str] = []
-        self.unknown_tags: list[str] = []
-
-    def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """The values of an attribute in the exports of a tag; ``${prefix}`` becomes the folder if ``convert``."""
-        values = [export.attrs[attr] for export in self.exports if export.tag == tag and attr in export.attrs]
-        folder = os.path.dirname(self.filename)
-        return [value.replace("${prefix}", folder) if convert else value for value in values]
 
 
 class ManifestManager:
@@ -267,29 +174,6 @@ class RosStack(ManifestManager):
 @lru_cache(maxsize=64)
 def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> ManifestManager:
     return cls(ros_paths)
-
-
-def _people(read: manifest.Manifest) -> str:
-    def shown(person: manifest.Person) -> str:
-        return f"{person.name} <{person.email}>" if person.email else person.name
-
-    maintainers = [shown(person) for person in read.maintainers]
-    said = [f"Maintainer: {', '.join(maintainers)}"] if maintainers else []
-    return ", ".join([*said, *map(shown, read.authors)])
-
-
-# --- files
-
-
-def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: Any = None) -> Manifest:
-    """The package.xml in a folder; every dependency counts as a package. Raises InvalidManifest."""
-    from minirospy.workspace.manifest import read_manifest
-
-    try:
-        read = read_manifest(Path(dirpath), os.environ)
-    except ManifestError as error:
-        raise InvalidManifest(str(error)) from error
-    return Manifest(read, read.depends(), ())
 
 
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:

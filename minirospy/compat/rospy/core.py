@@ -7,18 +7,13 @@ from __future__ import annotations
 
 import logging
 import os
-import threading
-import time
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from minirospy.client.log import logerr
 from minirospy.client.process import process
-from minirospy.clock import SimulatedClock, WallClock
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
 from minirospy.environment import split_uri
 from minirospy.errors import ROSException
-from minirospy.times import Time
 
 __all__ = [
     "MASTER_NAME",
@@ -27,12 +22,9 @@ __all__ = [
     "add_preshutdown_hook",
     "add_shutdown_hook",
     "get_ros_root",
-    "get_rostime_cond",
     "is_initialized",
-    "is_rostime_initialized",
     "is_shutdown_requested",
     "is_topic",
-    "is_wallclock",
     "logerror",
     "parse_rosrpc_uri",
     "register_signals",
@@ -41,15 +33,10 @@ __all__ = [
     "rospyinfo",
     "rospywarn",
     "service_logger",
-    "set_rostime",
-    "set_rostime_initialized",
-    "switch_to_wallclock",
-    "wallsleep",
 ]
 
 MASTER_NAME = "master"
 ROSRPC = "rosrpc://"
-
 service_logger = logging.getLogger("rospy.service")
 _internal = logging.getLogger("rospy.internal")
 rospydebug = _internal.debug
@@ -111,47 +98,3 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 def is_topic(param_name: str) -> Validator:
     """A check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
     return valid_name(param_name)
-
-
-def wallsleep(duration: float) -> None:
-    """Sleep so many seconds of the wall clock, whatever the node's time is. Raises ValueError where negative."""
-    time.sleep(duration)
-
-
-def is_wallclock() -> bool:
-    """Whether the node's time is the machine's, not a simulated one."""
-    return not isinstance(process.clock, SimulatedClock)
-
-
-def get_rostime_cond() -> threading.Condition:
-    """What is notified of each simulated time."""
-    return process.time_changed
-
-
-def is_rostime_initialized() -> bool:
-    """Whether the time may be asked for."""
-    return process.has_time
-
-
-def set_rostime_initialized(val: bool) -> None:
-    """Say that the time may be asked for, so that a program without a node can use Time.now()."""
-    process.has_time = bool(val)
-
-
-def set_rostime(t: Any) -> None:
-    """Set the node's time, which is simulated from now on. Raises ValueError on what is no Time."""
-    if not isinstance(t, Time):
-        raise ValueError(f"must be Time instance: {t.__class__}")
-    clock = process.clock
-    if not isinstance(clock, SimulatedClock):
-        clock = process.clock = SimulatedClock(changed=process.time_changed)
-    clock.set(t.to_nsec())
-
-
-def switch_to_wallclock() -> None:
-    """Go by the machine's time from now on."""
-    before, process.clock = process.clock, WallClock()
-    if isinstance(before, SimulatedClock):
-        # Who sleeps by it wakes up.
-        before.set(process.clock.now())
-    process.has_time = True

@@ -15,7 +15,7 @@ import rospy.rostime
 
 from minirospy.client.process import process
 from minirospy.client.time import get_rostime
-from minirospy.compat.rospy.core import (
+from minirospy.compat.rospy.rostime import (
     is_rostime_initialized,
     is_wallclock,
     set_rostime,

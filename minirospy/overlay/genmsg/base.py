@@ -9,8 +9,9 @@ from minirospy.compat.genmsg.base import (
     MSG_DIR,
     SEP,
     SRV_DIR,
+    InvalidMsgSpec,
 )
-from minirospy.compat.genmsg.msg_loader import InvalidMsgSpec, MsgGenerationException
+from minirospy.compat.genmsg.msg_loader import MsgGenerationException
 
 __all__ = [
     "COMMENTCHAR", "CONSTCHAR", "EXT_MSG", "EXT_SRV", "IODELIM", "MSG_DIR", "SEP", "SRV_DIR", "InvalidMsgSpec",

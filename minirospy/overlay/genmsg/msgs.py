@@ -1,10 +1,15 @@
 """genmsg.msgs, filled in by minirospy: types and specs of messages."""
 
 from genmsg.base import EXT_MSG, MSG_DIR, SEP, InvalidMsgSpec
-from minirospy.compat.genmsg.msg_loader import (
+from minirospy.compat.genmsg.msgs import (
     BUILTIN_TYPES,
+    DURATION,
+    DURATION_MSG,
+    HEADER,
     HEADER_FULL_NAME,
     PRIMITIVE_TYPES,
+    TIME,
+    TIME_MSG,
     Constant,
     Field,
     MsgSpec,
@@ -17,7 +22,6 @@ from minirospy.compat.genmsg.msg_loader import (
     parse_type,
     resolve_type,
 )
-from minirospy.compat.genmsg.msgs import DURATION, DURATION_MSG, HEADER, TIME, TIME_MSG
 
 __all__ = [
     "BUILTIN_TYPES", "DURATION", "DURATION_MSG", "EXT_MSG", "HEADER", "HEADER_FULL_NAME", "MSG_DIR", "PRIMITIVE_TYPES",

@@ -1,5 +1,5 @@
 """genmsg.srvs, filled in by minirospy."""
 
-from minirospy.compat.genmsg.msg_loader import SrvSpec
+from minirospy.compat.genmsg.srvs import SrvSpec
 
 __all__ = ["SrvSpec"]

@@ -1,5 +1,5 @@
 """genpy.base, filled in by minirospy."""
 
-from minirospy.compat.genpy.message import SIMPLE_TYPES, SIMPLE_TYPES_DICT, MsgGenerationException, is_simple
+from minirospy.compat.genpy.base import SIMPLE_TYPES, SIMPLE_TYPES_DICT, MsgGenerationException, is_simple
 
 __all__ = ["SIMPLE_TYPES", "SIMPLE_TYPES_DICT", "MsgGenerationException", "is_simple"]

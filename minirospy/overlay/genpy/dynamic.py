@@ -1,5 +1,6 @@
 """genpy.dynamic, filled in by minirospy: message classes from a full text."""
 
-from minirospy.compat.genpy.message import MsgGenerationException, generate_dynamic
+from minirospy.compat.genpy.base import MsgGenerationException
+from minirospy.compat.genpy.dynamic import generate_dynamic
 
 __all__ = ["MsgGenerationException", "generate_dynamic"]

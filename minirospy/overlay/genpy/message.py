@@ -1,10 +1,10 @@
 """genpy.message, filled in by minirospy."""
 
+from minirospy.compat.genpy.base import is_simple
 from minirospy.compat.genpy.message import (
     RosMsgUnicodeErrors,
     get_message_class,
     get_service_class,
-    is_simple,
     isstring,
     struct_I,
 )

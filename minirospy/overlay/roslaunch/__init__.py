@@ -1,17 +1,12 @@
 """roslaunch, filled in by minirospy. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
 
 from minirospy.compat.roslaunch import NAME, configure_logging, main, write_pid_file
-from minirospy.compat.roslaunch.config import (
-    Master,
-    Node,
-    RLException,
-    ROSLaunchConfig,
-    Test,
-    XmlLoader,
-    XmlParseException,
-)
-from minirospy.compat.roslaunch.parent import ROSLaunch, ROSLaunchRunner
+from minirospy.compat.roslaunch.config import ROSLaunchConfig
+from minirospy.compat.roslaunch.core import Master, Node, RLException, Test
+from minirospy.compat.roslaunch.launch import ROSLaunchRunner
 from minirospy.compat.roslaunch.pmon import Process
+from minirospy.compat.roslaunch.scriptapi import ROSLaunch
+from minirospy.compat.roslaunch.xmlloader import XmlLoader, XmlParseException
 from minirospy.environment import DEFAULT_MASTER_PORT
 from roslaunch import arg_dump as arg_dump
 from roslaunch import config as config

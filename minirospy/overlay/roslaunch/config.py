@@ -1,15 +1,12 @@
 """roslaunch.config, filled in by minirospy."""
 
 from minirospy.compat.roslaunch.config import (
-    Master,
-    RLException,
     ROSLaunchConfig,
     get_roscore_filename,
-    is_machine_local,
     load_config_default,
-    local_machine,
     namespaces_of,
 )
+from minirospy.compat.roslaunch.core import Master, RLException, is_machine_local, local_machine
 from minirospy.environment import DEFAULT_MASTER_PORT
 
 __all__ = [

@@ -1,6 +1,9 @@
 """roslaunch.core, filled in by minirospy: nodes, parameters and machines, and what roslaunch says."""
 
-from minirospy.compat.roslaunch.config import (
+from minirospy.compat.roslaunch.core import (
+    PHASE_RUN,
+    PHASE_SETUP,
+    PHASE_TEARDOWN,
     TEST_TIME_LIMIT_DEFAULT,
     Machine,
     Master,
@@ -8,19 +11,14 @@ from minirospy.compat.roslaunch.config import (
     Param,
     RLException,
     Test,
-    is_machine_local,
-    local_machine,
-)
-from minirospy.compat.roslaunch.core import (
-    PHASE_RUN,
-    PHASE_SETUP,
-    PHASE_TEARDOWN,
     add_printerrlog_handler,
     add_printlog_handler,
     clear_printerrlog_handlers,
     clear_printlog_handlers,
     generate_run_id,
     get_master_uri_env,
+    is_machine_local,
+    local_machine,
     printerrlog,
     printlog,
     printlog_bold,

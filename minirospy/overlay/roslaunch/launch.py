@@ -1,7 +1,7 @@
 """roslaunch.launch, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import Machine, Master, Node, Param, RLException, Test
-from minirospy.compat.roslaunch.parent import ROSLaunchRunner
+from minirospy.compat.roslaunch.core import Machine, Master, Node, Param, RLException, Test
+from minirospy.compat.roslaunch.launch import ROSLaunchRunner
 from minirospy.compat.roslaunch.pmon import ProcessListener, start_process_monitor
 from minirospy.compat.roslaunch.pmon import ProcessListener as ROSLaunchListener
 

@@ -1,8 +1,8 @@
 """roslaunch.node_args, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import NodeParamsException
 from minirospy.compat.roslaunch.config import load_config_default as load_config_default
 from minirospy.compat.roslaunch.node_args import (
+    NodeParamsException,
     create_local_process_args,
     get_node_args,
     get_node_list,

@@ -1,6 +1,6 @@
 """roslaunch.nodeprocess, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import Machine, Master, Node, RLException
+from minirospy.compat.roslaunch.core import Machine, Master, Node, RLException
 from minirospy.compat.roslaunch.nodeprocess import DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM
 from minirospy.compat.roslaunch.pmon import Process, create_node_process
 from minirospy.compat.roslaunch.pmon import Process as LocalProcess

@@ -1,6 +1,6 @@
 """roslaunch.pmon, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import RLException
+from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.pmon import (
     Process,
     ProcessListener,

@@ -1,11 +1,12 @@
 """roslaunch.rlutil, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.parent import get_or_generate_uuid, resolve_launch_arguments
 from minirospy.compat.roslaunch.rlutil import (
     change_terminal_name,
     check_log_disk_usage,
     check_roslaunch,
+    get_or_generate_uuid,
     print_file_list,
+    resolve_launch_arguments,
     update_terminal_name,
 )
 

@@ -1,6 +1,6 @@
 """roslaunch.scriptapi, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import Master, Node, RLException
-from minirospy.compat.roslaunch.parent import ROSLaunch
+from minirospy.compat.roslaunch.core import Master, Node, RLException
+from minirospy.compat.roslaunch.scriptapi import ROSLaunch
 
 __all__ = ["Master", "Node", "RLException", "ROSLaunch"]

@@ -1,6 +1,6 @@
 """roslaunch.server, filled in by minirospy: what programs take from it; the parent's server is no business of theirs."""
 
-from minirospy.compat.roslaunch.config import RLException
+from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.pmon import Process, ProcessListener
 
 __all__ = ["Process", "ProcessListener", "RLException"]

@@ -1,5 +1,5 @@
 """roslaunch.substitution_args, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import ArgException, SubstitutionException, resolve_args
+from minirospy.compat.roslaunch.substitution_args import ArgException, SubstitutionException, resolve_args
 
 __all__ = ["ArgException", "SubstitutionException", "resolve_args"]

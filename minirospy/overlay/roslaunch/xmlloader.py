@@ -1,16 +1,8 @@
 """roslaunch.xmlloader, filled in by minirospy."""
 
-from minirospy.compat.roslaunch.config import (
-    ArgException,
-    Machine,
-    Node,
-    Param,
-    RLException,
-    SubstitutionException,
-    Test,
-    XmlLoader,
-    XmlParseException,
-)
+from minirospy.compat.roslaunch.core import Machine, Node, Param, RLException, Test
+from minirospy.compat.roslaunch.substitution_args import ArgException, SubstitutionException
+from minirospy.compat.roslaunch.xmlloader import XmlLoader, XmlParseException
 
 __all__ = [
     "ArgException",

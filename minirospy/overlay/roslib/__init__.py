@@ -1,7 +1,7 @@
 """roslib, filled in by minirospy. Source: http://wiki.ros.org/roslib."""
 
 from minirospy.compat.roslib import is_interactive, set_interactive
-from minirospy.compat.roslib.packages import load_manifest
+from minirospy.compat.roslib.launcher import load_manifest
 from roslib import exceptions as exceptions
 from roslib import launcher as launcher
 from roslib import packages as packages

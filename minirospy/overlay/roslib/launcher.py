@@ -1,5 +1,5 @@
 """roslib.launcher, filled in by minirospy."""
 
-from minirospy.compat.roslib.packages import load_manifest
+from minirospy.compat.roslib.launcher import load_manifest
 
 __all__ = ["load_manifest"]

@@ -15,7 +15,7 @@ from minirospy.compat.roslib.packages import (
     list_pkgs_by_path,
     resource_file,
 )
-from minirospy.compat.rospkg.rospack import MANIFEST_FILE, PACKAGE_FILE
+from minirospy.compat.rospkg.common import MANIFEST_FILE, PACKAGE_FILE
 
 __all__ = [
     "MANIFEST_FILE",

@@ -1,6 +1,10 @@
 """rospkg, filled in by minirospy: where packages are, and what they need."""
 
 from minirospy.compat.rospkg import __version__ as __version__
+from minirospy.compat.rospkg.common import MANIFEST_FILE as MANIFEST_FILE
+from minirospy.compat.rospkg.common import PACKAGE_FILE as PACKAGE_FILE
+from minirospy.compat.rospkg.common import STACK_FILE as STACK_FILE
+from minirospy.compat.rospkg.common import ResourceNotFound as ResourceNotFound
 from minirospy.compat.rospkg.environment import get_etc_ros_dir as get_etc_ros_dir
 from minirospy.compat.rospkg.environment import get_log_dir as get_log_dir
 from minirospy.compat.rospkg.environment import get_ros_home as get_ros_home
@@ -9,19 +13,15 @@ from minirospy.compat.rospkg.environment import get_ros_paths as get_ros_paths
 from minirospy.compat.rospkg.environment import get_ros_root as get_ros_root
 from minirospy.compat.rospkg.environment import get_test_results_dir as get_test_results_dir
 from minirospy.compat.rospkg.environment import on_ros_path as on_ros_path
-from minirospy.compat.rospkg.rospack import MANIFEST_FILE as MANIFEST_FILE
-from minirospy.compat.rospkg.rospack import PACKAGE_FILE as PACKAGE_FILE
-from minirospy.compat.rospkg.rospack import STACK_FILE as STACK_FILE
-from minirospy.compat.rospkg.rospack import InvalidManifest as InvalidManifest
-from minirospy.compat.rospkg.rospack import Manifest as Manifest
-from minirospy.compat.rospkg.rospack import ResourceNotFound as ResourceNotFound
+from minirospy.compat.rospkg.manifest import InvalidManifest as InvalidManifest
+from minirospy.compat.rospkg.manifest import Manifest as Manifest
+from minirospy.compat.rospkg.manifest import parse_manifest_file as parse_manifest_file
 from minirospy.compat.rospkg.rospack import RosPack as RosPack
 from minirospy.compat.rospkg.rospack import RosStack as RosStack
 from minirospy.compat.rospkg.rospack import expand_to_packages as expand_to_packages
 from minirospy.compat.rospkg.rospack import get_package_name as get_package_name
 from minirospy.compat.rospkg.rospack import get_stack_version_by_dir as get_stack_version_by_dir
 from minirospy.compat.rospkg.rospack import list_by_path as list_by_path
-from minirospy.compat.rospkg.rospack import parse_manifest_file as parse_manifest_file
 from rospkg import common as common
 from rospkg import environment as environment
 from rospkg import manifest as manifest

@@ -1,6 +1,6 @@
 """rospkg.common, filled in by minirospy."""
 
-from minirospy.compat.rospkg.rospack import (
+from minirospy.compat.rospkg.common import (
     MANIFEST_FILE,
     PACKAGE_FILE,
     ROS_STACK,

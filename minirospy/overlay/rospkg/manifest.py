@@ -1,6 +1,6 @@
 """rospkg.manifest, filled in by minirospy."""
 
-from minirospy.compat.rospkg.rospack import (
+from minirospy.compat.rospkg.manifest import (
     Depend,
     Export,
     InvalidManifest,

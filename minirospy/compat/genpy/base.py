@@ -1,0 +1,23 @@
+"""genpy.base: the types that `struct` packs."""
+
+from __future__ import annotations
+
+from minirospy.errors import MessageException
+
+__all__ = ["SIMPLE_TYPES", "SIMPLE_TYPES_DICT", "MsgGenerationException", "is_simple"]
+
+SIMPLE_TYPES_DICT = {
+    "int8": "b", "uint8": "B", "bool": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
+    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d", "char": "B", "byte": "b",
+}  # fmt: skip
+
+SIMPLE_TYPES = list(SIMPLE_TYPES_DICT)
+
+
+class MsgGenerationException(MessageException):
+    """A definition that no class can be made from."""
+
+
+def is_simple(type_: str) -> bool:
+    """Whether ``struct`` packs a type."""
+    return type_ in SIMPLE_TYPES_DICT

@@ -1,0 +1,20 @@
+"""genpy.dynamic: message classes from a full text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy.errors import DefinitionError
+
+__all__ = ["generate_dynamic"]
+
+
+def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, Any]:
+    """The class of a full text, and those of all types in it, by name. Raises InvalidMsgSpec on a text that is none."""
+    from minirospy.compat.genmsg.base import InvalidMsgSpec
+    from minirospy.idl import load
+
+    try:
+        return dict(load.classes_from_text(core_type, msg_cat))
+    except DefinitionError as error:
+        raise InvalidMsgSpec(str(error)) from error

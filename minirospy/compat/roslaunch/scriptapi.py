@@ -1,0 +1,64 @@
+"""roslaunch.scriptapi: start nodes one by one from a program."""
+
+from __future__ import annotations
+
+from minirospy.compat.roslaunch.config import ROSLaunchConfig
+from minirospy.compat.roslaunch.core import Node, RLException
+from minirospy.compat.roslaunch.parent import ROSLaunchParent
+from minirospy.compat.roslaunch.pmon import (
+    Process,
+)
+from minirospy.compat.roslaunch.rlutil import get_or_generate_uuid
+from minirospy.compat.roslaunch.xmlloader import XmlLoader
+
+__all__ = ["ROSLaunch"]
+
+
+class ROSLaunch:
+    """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Errors are RLException."""
+
+    def __init__(self) -> None:
+        self.parent = ROSLaunchParent(get_or_generate_uuid(None, True), [])
+        self.started = False
+
+    def load(self, f: str) -> None:
+        """Have start() run a launch file, too."""
+        XmlLoader().load(f, self._config)
+
+    def load_str(self, s: str) -> None:
+        """Have start() run the text of a launch file, too."""
+        XmlLoader().load_string(s, self._config)
+
+    def start(self) -> None:
+        """Begin; nodes can now be launched."""
+        self.parent.start(auto_terminate=False)
+        self.started = True
+
+    def launch(self, node: Node) -> Process:
+        """Start a node."""
+        if not self.started or self.parent.runner is None:
+            raise RLException("please start ROSLaunch first")
+        if not isinstance(node, Node):
+            raise ValueError("arg must be of type Node")
+        process, _ = self.parent.runner.launch_node(node)
+        if isinstance(process, str):
+            raise RLException(f"failed to launch {node.package}/{node.type}")
+        return process
+
+    def spin(self) -> None:
+        """Wait for the end."""
+        self.parent.spin()
+
+    def spin_once(self) -> bool:
+        """Whether it runs on."""
+        return self.parent.spin_once()
+
+    def stop(self) -> None:
+        """End all."""
+        self.parent.shutdown()
+
+    @property
+    def _config(self) -> ROSLaunchConfig:
+        if self.parent.config is None:
+            self.parent.config = ROSLaunchConfig()
+        return self.parent.config

@@ -1,0 +1,63 @@
+"""roslaunch.xmlloader: launch files into a configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from minirospy.compat.roslaunch.core import RLException
+from minirospy.errors import MinirospyError
+from minirospy.launch.load import STDIN, Source, load_sources
+from minirospy.launch.spec import LaunchSpec
+from minirospy.workspace.packages import Packages
+
+__all__ = ["XmlLoader", "XmlParseException", "assignments"]
+
+
+class XmlParseException(RLException):
+    """A launch file does not load."""
+
+
+class Configuration(Protocol):
+    """What launch files are loaded into: a ROSLaunchConfig."""
+
+    def add(self, spec: LaunchSpec) -> None:
+        """Add all that launch files say."""
+
+
+class XmlLoader:
+    """Loads launch files into a configuration."""
+
+    def __init__(self, resolve_anon: bool = True, args_only: bool = False) -> None:
+        self.resolve_anon = resolve_anon
+        self.args_only = args_only
+        self.ignore_unset_args = False
+        self._packages = Packages()
+
+    def load(
+        self,
+        filename: str,
+        ros_config: Configuration,
+        core: bool = False,
+        argv: Sequence[str] | None = None,
+        verbose: bool = True,
+    ) -> None:
+        """Load a file, its args given as ``["name:=value", ...]``. Raises XmlParseException."""
+        self._load(Source(filename, None, assignments(argv or ())), ros_config)
+
+    def load_string(
+        self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
+    ) -> None:
+        """Load a text. Raises XmlParseException."""
+        self._load(Source(STDIN, xml_text.encode(), {}), ros_config)
+
+    def _load(self, source: Source, config: Configuration) -> None:
+        try:
+            config.add(load_sources([source], self._packages))
+        except MinirospyError as error:
+            raise XmlParseException(str(error)) from error
+
+
+def assignments(argv: Sequence[str]) -> dict[str, str]:
+    """What ``["name:=value", ...]`` gives: name -> value."""
+    return {name: value for name, sep, value in (word.partition(":=") for word in argv) if sep}

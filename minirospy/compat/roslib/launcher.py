@@ -1,0 +1,55 @@
+"""roslib.launcher: a package and what it needs on sys.path."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.compat.roslib.packages import get_dir_pkg
+from minirospy.compat.rospkg.common import ResourceNotFound
+from minirospy.compat.rospkg.manifest import InvalidManifest
+from minirospy.compat.rospkg.rospack import RosPack
+
+__all__ = ["load_manifest"]
+
+
+def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
+    """Put the ``src`` folders of a package and of all that it needs on sys.path, as scripts of old ask for.
+
+    A package that the script itself lies in, or that can be imported, need not be on ROS_PACKAGE_PATH.
+    Raises ResourceNotFound.
+    """
+    rospack = RosPack()
+    try:
+        names = [package_name, *rospack.get_depends(package_name)]
+        folders = [Path(rospack.get_path(name)) for name in names]
+    except ResourceNotFound:
+        own = _folder_of_script(package_name)
+        if own is None and not _is_importable(package_name):
+            raise
+        folders = [own] if own else []
+    except InvalidManifest:
+        folders = [Path(rospack.get_path(package_name))]
+    for folder in reversed(folders):
+        source = str(folder / "src")
+        if source not in sys.path and any(Path(source).glob("*/__init__.py")):
+            # After the script's own folder, as rospack's packages come before what is installed.
+            sys.path.insert(1, source)
+
+
+def _folder_of_script(package: str) -> Path | None:
+    """The package that the running script lies in, if it has this name."""
+    script: Sequence[str] = sys.argv[:1]
+    if not script or not script[0]:
+        return None
+    folder, name = get_dir_pkg(str(Path(script[0]).resolve().parent))
+    return Path(folder) if folder and name == package else None
+
+
+def _is_importable(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False
