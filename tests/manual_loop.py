@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-__all__ = ["ManualLoop", "run_manually"]
+__all__ = ["ManualLoop", "run_manually", "until"]
+
+_PATIENCE = 60.0
+"""Seconds of the wall clock: a condition that does not hold by then never will."""
 
 
 class ManualLoop(asyncio.SelectorEventLoop):
@@ -22,9 +26,15 @@ class ManualLoop(asyncio.SelectorEventLoop):
 
     async def advance(self, seconds: float) -> None:
         """Move the clock in one leap, as a stall of the machine does, and run what is due then."""
+        # What has been started sets its own timers by the clock as it is now.
+        await self._settle()
         self._now += seconds
+        await self._settle()
+
+    @staticmethod
+    async def _settle() -> None:
         # The first turn collects the timers that are due, the next ones run what their callbacks start.
-        for _ in range(4):
+        for _ in range(20):
             await asyncio.sleep(0)
 
 
@@ -36,3 +46,12 @@ def run_manually(scene: Callable[[ManualLoop], Coroutine[Any, Any, None]]) -> No
     finally:
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.close()
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """Let sockets and threads do their part until the condition holds; the loop's clock stands still meanwhile."""
+    end = time.monotonic() + _PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            raise TimeoutError("the condition does not hold")
+        await asyncio.sleep(0)
