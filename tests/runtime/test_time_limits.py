@@ -19,6 +19,7 @@ from minirospy.runtime.node import Node
 from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.topics import Publication
+from minirospy.runtime.turns import Turns
 from minirospy.wire.http import serialize_request
 from minirospy.wire.tcpros import InterfaceType
 from minirospy.wire.xmlrpc import serialize_call
@@ -154,12 +155,25 @@ def test_answer_of_which_64_kib_are_read_in_30_seconds_goes_on() -> None:
 # --- the notifier (docs/master.md: 20 ms, 20 to 30 ms)
 
 
+class Graph:
+    """A graph with one publisher of every topic, and no parameter."""
+
+    def publisher_uris(self, topic: str) -> list[str]:
+        return ["http://x:1/"]
+
+    def parameter(self, key: str) -> Any:
+        return {}
+
+    def subscribed_parameters(self, uri: str) -> list[str]:
+        return []
+
+
 def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() -> None:
     async def scene(clock: ManualLoop) -> None:
         told: list[float] = []
         for fraction in range(10):
             told.clear()
-            notifier = Notifier(lambda _: ["http://x:1/"], 5.0)
+            notifier = Notifier(Graph(), Turns(), 5.0)
             notifier.here["http://n:1/"] = lambda topic, uris: told.append(clock.time())
             # The answer falls anywhere between two ticks of the clock.
             await clock.advance(0.001 * fraction)
@@ -179,7 +193,7 @@ def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() ->
 def test_update_after_the_pause_or_of_another_topic_is_sent_at_once() -> None:
     async def scene(clock: ManualLoop) -> None:
         told: list[str] = []
-        notifier = Notifier(lambda _: ["http://x:1/"], 5.0)
+        notifier = Notifier(Graph(), Turns(), 5.0)
         notifier.here["http://n:1/"] = lambda topic, uris: told.append(topic)
         notifier.hold("http://n:1/", "/t")
         notifier.send(PublisherUpdate("http://n:1/", "/other"))
