@@ -271,7 +271,7 @@ class ROSSerializationException(ROSException):
 
 
 class ROSInterruptException(ROSException):
-    """A blocking call was ended by the node's shutdown. That of rospy is a subclass: `minirospy.client.life`."""
+    """A blocking call was ended by the node's shutdown. That of rospy is a subclass: `minirospy.client.lifecycle`."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):

@@ -187,7 +187,7 @@ def spin() -> None:
 
 def is_shutdown() -> bool:
     """Whether the node has shut down."""
-    return process.tell_shutdown()
+    return process.poll_shutdown()
 
 
 def on_shutdown(h: Callable[[], object]) -> None:
@@ -198,8 +198,8 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; hooks run in this thread."""
     process.signal_shutdown(reason)
-    # Who asked for it knows of it: what the thread does now is its clean-up, and may sleep.
-    process.tell_shutdown()
+    # The caller needs no notification: what the thread does now is its clean-up, and may sleep.
+    process.poll_shutdown()
 
 
 def get_name() -> str:

@@ -202,7 +202,16 @@ def _offer_logger_services() -> None:
     Service("~set_logger_level", SetLoggerLevel, set_level)
 
 
-class RosStreamHandler(logging.Handler):
+class _DeferringHandler(logging.Handler):
+    """Files and streams are not reentrant: what a signal asks for waits until a record is written."""
+
+    def handle(self, record: logging.LogRecord) -> bool:
+        """Write one record."""
+        with process.deferral:
+            return super().handle(record)
+
+
+class RosStreamHandler(_DeferringHandler):
     """Lines as rospy prints them: debug and info to stdout, the rest to stderr, coloured on a terminal.
 
     ROSCONSOLE_FORMAT chooses the form (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
@@ -242,7 +251,7 @@ class RosStreamHandler(logging.Handler):
             pass
 
 
-class RosOutHandler(logging.Handler):
+class RosOutHandler(_DeferringHandler):
     """Log records to /rosout (http://wiki.ros.org/rosout); for a logger of the program's own, too."""
 
     def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
@@ -310,8 +319,11 @@ def _log_to_file(node: NodeProcess, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
     from minirospy.runtime.log_file import LogFileHandler
 
+    class LogFile(_DeferringHandler, LogFileHandler):
+        pass
+
     try:
-        file = LogFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
+        file = LogFile(path, _FILE_BYTES, _FILE_BACKUPS)
     except OSError as error:
         if path.parent.is_dir():
             _warn(f"cannot write the log file [{path}]: {error.strerror}")
@@ -438,9 +450,8 @@ def _write(
         stack = "Stack (most recent call last):\n" + "".join(traceback.format_stack(at)).rstrip("\n")
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, exc_info, function, extra, stack)
-    logger.handle(record)
-    if process.signals.late:
-        process.signals.take_late()
+    with process.deferral:
+        logger.handle(record)
 
 
 def _log_function(level: int, name: str) -> LogFunction:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy import names
 from minirospy.client.identity import Identity, private_parameters
-from minirospy.client.life import Life
-from minirospy.client.signals import Signals
+from minirospy.client.lifecycle import Lifecycle
+from minirospy.client.signals import SignalWatchdog, suppress_interrupt_tracebacks
 from minirospy.clock import Clock, SimulatedClock, WallClock, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 from minirospy.graph.parameter_cache import ParameterCache
@@ -39,20 +39,18 @@ __all__ = ["NodeProcess", "process"]
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
 """How long the master may take to answer: one of many nodes that start at once on a small computer waits for its turn."""
-_HOOKS_SECONDS = 3.0
-"""How long the hooks of a shutdown may take whose program has ended meanwhile."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
 
-class NodeProcess(Identity, Life):
+class NodeProcess(Identity, Lifecycle):
     """What rospy's functions share. One instance, :data:`process`, stands behind the module-level API."""
 
     def __init__(self) -> None:
         Identity.__init__(self)
-        Life.__init__(self)
+        Lifecycle.__init__(self)
         self.node: Node | None = None
-        self.signals = Signals(self)
+        self.signals = SignalWatchdog(self, self._is_sending)
         self.clock: Clock = WallClock()
         self.time_changed = threading.Condition()
         """Notified of each simulated time."""
@@ -74,7 +72,7 @@ class NodeProcess(Identity, Life):
         self._master: MasterProxy | None = None
         self._waiting_for_node: list[Callable[[], object]] = []
         self._watches_forks = False
-        self._is_forked = False
+        self._is_forked = self._installs_signals_in_fork = self._suppresses_tracebacks = False
 
     # --- what others ask
 
@@ -118,7 +116,7 @@ class NodeProcess(Identity, Life):
         try:
             return function()
         except LoopClosedError as error:
-            self.tell_shutdown()
+            self.poll_shutdown()
             raise self.interrupted("rospy shutdown") from error
 
     def _told_of_parameter(self, key: str, value: Any) -> None:
@@ -131,11 +129,13 @@ class NodeProcess(Identity, Life):
         if self._loop:
             self._loop.post(function, *args)
 
-    def tell_shutdown(self) -> bool:
-        """Whether the node has shut down, for user code: the calling thread counts as one that asks."""
-        if self._is_forked:
-            self.signals.take_in_fork()
-        return super().tell_shutdown()
+    def poll_shutdown(self) -> bool:
+        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        if self._installs_signals_in_fork:
+            # A copy of the node's process is left to the system until it polls.
+            self._installs_signals_in_fork = False
+            self.signals.install()
+        return super().poll_shutdown()
 
     def when_ready(self, function: Callable[[], object]) -> None:
         """Call ``function`` now, or in init_node where that has not been called yet."""
@@ -190,18 +190,18 @@ class NodeProcess(Identity, Life):
         for take_back in self.before_new_life:
             take_back()
         self.before_new_life.clear()
-        self.signals.end_quietly()
+        if not self._suppresses_tracebacks:
+            self._suppresses_tracebacks = True
+            suppress_interrupt_tracebacks(self)
         if not disable_signals:
-            self.signals.take()
+            self.signals.install()
         # Imported here: a program that has no node need not pay for them.
         from minirospy.client import log
-        from minirospy.runtime.links import is_sending
         from minirospy.runtime.loop import LoopThread
         from minirospy.runtime.node import Node
 
         if self.is_shutdown():
             raise self.interrupted("rospy shutdown")
-        self.signals.mind(is_sending)
         log.configure(self, log_level, self.arguments.special.get("__log"))
         self._loop = LoopThread()
         self._made = node = Node(
@@ -235,10 +235,12 @@ class NodeProcess(Identity, Life):
 
         What the program made for the old node, such as its publishers, stays with that.
         """
-        if not self.gone.is_set() or self.signals.is_ended:
+        if not self.left.is_set() or self.machine.signals:
             return
         self._forget_node()
-        self.begin_new_life()
+        self.signals.release()
+        self.begin_lifecycle()
+        self.signals = SignalWatchdog(self, self._is_sending)
 
     # --- ending
 
@@ -291,8 +293,10 @@ class NodeProcess(Identity, Life):
             publication.links = ()
         self._is_forked = True
         self._forget_node()
-        self.begin_life_in_fork()
-        self.signals.begin_in_fork()
+        self._installs_signals_in_fork = self.signals.is_installed
+        self.signals.release()
+        self.begin_lifecycle_in_fork()
+        self.signals = SignalWatchdog(self, self._is_sending)
 
     def _forget_node(self) -> None:
         self.node = self._made = self._loop = self._master = self.init_arguments = None
@@ -304,9 +308,11 @@ class NodeProcess(Identity, Life):
     def _at_exit(self) -> None:
         """The program has ended. Where another thread shuts down, let it take the node out of the graph first."""
         self.signal_shutdown("atexit")
-        if self.shutting_down.wait(_HOOKS_SECONDS):
-            self.gone.wait()
-        self.signals.at_exit()
+        wait_for_event(self.left, None)
+        self.signals.flush_at_exit()
+
+    def _is_sending(self) -> bool:
+        return self._made is not None and self._made.is_sending
 
     def _asked_to_shut_down(self, reason: str) -> None:
         """Somebody outside ends this node: as rospy does, say on stdout who and why."""

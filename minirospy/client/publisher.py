@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["Published", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
-_signals = process.signals
 _M = TypeVar("_M", bound=Any)
 
 
@@ -216,8 +215,8 @@ class Published(Shared):
             self.check_initialized()
         elif publication.links or publication.latch:
             publication.publish(self._frame(message))
-            if _signals.late:
-                _signals.take_late()
+            if process.deferral.pending:
+                process.deferral.poll()
         elif not self._was_heard:
             self._was_heard = True
             self._tell_unheard()

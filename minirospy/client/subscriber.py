@@ -295,5 +295,6 @@ def _call(callback: _Callback, message: Any) -> None:
         else:
             callback.function(message, callback.args)
     except Exception:  # noqa: BLE001 - the user's function: its fault must not end the connection
-        if not process.is_shutdown():
+        # While a shutdown hook releases what the callback uses, an error of it says nothing.
+        if not process.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

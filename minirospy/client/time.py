@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from minirospy import errors, times
-from minirospy.client.life import ROSInterruptException
+from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent, SimulatedClock
 from minirospy.errors import ROSInitException
@@ -241,11 +241,13 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
     """Sleep until ``stop`` is set, quietly; without it, until the node shuts down."""
     if nanoseconds <= 0:
         return
-    end = stop or (threading.Event() if process.knows_of_shutdown() else process.shutting_down)
+    process.deferral.poll()
+    end = stop or (threading.Event() if process.thread_state.notified else process.shutting_down)
     try:
         is_over = process.clock.sleep(nanoseconds, end)
     except errors.ROSTimeMovedBackwardsException as error:
         raise ROSTimeMovedBackwardsException(error.time) from None
+    process.deferral.poll()
     if not is_over and not stop:
         process.check_interrupted_sleep()
 

@@ -16,7 +16,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
-from types import FrameType
 from typing import Protocol
 
 from minirospy.errors import WireError
@@ -40,7 +39,7 @@ from minirospy.wire.framing import (
     split_sizes,
 )
 
-__all__ = ["Keeps", "OutLink", "Readers", "is_sending", "read_frames", "watch_frames"]
+__all__ = ["Keeps", "OutLink", "Readers", "read_frames", "watch_frames"]
 
 _GATHER = 64
 _DRAIN_BYTES = 64 * 1024 * 1024
@@ -102,7 +101,8 @@ class OutLink:
         self._outbox: deque[_Waiting] = deque([[header]] if header else [])
         self._begun = bool(header)
         self._is_reading = True
-        self._drained = threading.Condition(threading.Lock())
+        self._lock = threading.Lock()
+        self._drained = threading.Condition(self._lock)
         self._closed = False
         self._loop_thread = threading.get_ident()
 
@@ -115,6 +115,11 @@ class OutLink:
     def waiting(self) -> int:
         """How many frames wait for the socket to take them."""
         return len(self._outbox)
+
+    @property
+    def is_sending(self) -> bool:
+        """Whether a thread is inside :meth:`send`: a signal's handler in that very thread would wait for itself."""
+        return self._lock.locked()
 
     def open(self) -> None:
         """Send the header, and watch for the peer's hanging up (on the loop)."""
@@ -313,18 +318,6 @@ class OutLink:
         except OSError:
             pass
         self.close()
-
-
-def is_sending(frame: FrameType | None) -> bool:
-    """Whether the stack at ``frame`` is inside :meth:`OutLink.send`, where a link's lock is held.
-
-    A signal handler that finds its thread there must not send itself: it has to come back a moment later.
-    """
-    while frame is not None:
-        if frame.f_code is OutLink.send.__code__:
-            return True
-        frame = frame.f_back
-    return False
 
 
 class Keeps(Protocol):

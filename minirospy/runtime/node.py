@@ -139,6 +139,11 @@ class Node:
         """The port where topics and services of this node are served."""
         return self._listener.port
 
+    @property
+    def is_sending(self) -> bool:
+        """Whether a thread is publishing, and holds a lock. From any thread."""
+        return any(publication.is_sending for publication in list(self.publications.values()))
+
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
         """Open the node's servers; port 0 takes a free one. Raises OSError."""
         host = self.environment.bind_host

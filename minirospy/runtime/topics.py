@@ -83,6 +83,11 @@ class Publication:
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
 
+    @property
+    def is_sending(self) -> bool:
+        """Whether a thread is publishing, and holds a lock."""
+        return self._latch_lock.locked() or any(link.is_sending for link in self.links)
+
     def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
         if self.latch:

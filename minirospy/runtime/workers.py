@@ -23,7 +23,8 @@ class Workers:
 
     def __init__(self) -> None:
         self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
-        self._lock = threading.Lock()
+        # Reentrant: the main thread may hold it when a signal's handler runs a shutdown hook, which starts one, too.
+        self._lock = threading.RLock()
         self._idle = 0
 
     def start(self, function: Callable[..., object], *args: object) -> None:
@@ -64,7 +65,7 @@ class InOrder:
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
         self._waiting: deque[tuple[Callable[..., object], tuple[object, ...]]] = deque()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._is_running = False
 
     def start(self, function: Callable[..., object], *args: object) -> None:

@@ -73,7 +73,7 @@ def add_client_shutdown_hook(h: Callable[[], object]) -> None:
 
 def register_signals() -> None:
     """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
-    process.signals.take()
+    process.signals.install()
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:

@@ -72,7 +72,7 @@ from minirospy.client import sleep as sleep
 from minirospy.client import spin as spin
 from minirospy.client import wait_for_message as wait_for_message
 from minirospy.client import wait_for_service as wait_for_service
-from minirospy.client.life import ROSInterruptException as ROSInterruptException
+from minirospy.client.lifecycle import ROSInterruptException as ROSInterruptException
 from minirospy.client.time import ROSTimeMovedBackwardsException as ROSTimeMovedBackwardsException
 from minirospy.compat.rospy import live as _live  # after the modules that it completes
 from minirospy.compat.rospy.core import get_ros_root as get_ros_root

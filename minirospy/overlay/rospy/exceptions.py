@@ -1,6 +1,6 @@
 """rospy.exceptions, filled in by minirospy."""
 
-from minirospy.client.life import ROSInterruptException
+from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.time import ROSTimeMovedBackwardsException
 from minirospy.errors import (
     ROSException,

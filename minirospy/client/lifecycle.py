@@ -1,0 +1,272 @@
+"""The lifecycle of a node: its hooks, its shutdown, and which threads of the program were notified of it.
+
+Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from minirospy import errors
+from minirospy.client.shutdown import Phase, ShutdownMachine, ThreadState
+from minirospy.clock import SignalSafeEvent, wait_for_event
+
+__all__ = ["Deferral", "Lifecycle", "ROSInterruptException"]
+
+_TOO_LATE = "already shutdown"
+_log = logging.getLogger(__name__)
+
+
+class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
+    """A blocking call was ended by the node's shutdown; a KeyboardInterrupt, too, as in rospy.
+
+    asyncio would take a KeyboardInterrupt for the end of its loop: `minirospy.aio` raises the plain one, which is this
+    one's base and the `minirospy.ROSInterruptException` that catches both.
+    """
+
+
+class Deferral:
+    """A critical section of the main thread: ``with deferral:`` what a signal asks for is done when the block ends.
+
+    A hook may publish, log or register, and so must not run while the main thread is half way through such a thing. In
+    other threads, where no signal arrives, without effect.
+    """
+
+    def __init__(self) -> None:
+        self.pending = False
+        """Whether a signal waits for the main thread. Set by the signal's handler."""
+        self.dispatch: Callable[[], object] = lambda: None
+        """Do what the pending signal asks for. In the main thread."""
+        self._depth = 0
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the main thread is inside a critical section."""
+        return self._depth > 0
+
+    def __enter__(self) -> None:
+        if _is_main():
+            self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        if _is_main():
+            self._depth -= 1
+            self.poll()
+
+    def poll(self) -> None:
+        """Do what a pending signal asks for, where this is the main thread and outside of a critical section."""
+        if self.pending and not self._depth and _is_main():
+            self.dispatch()
+
+    @contextlib.contextmanager
+    def lifted(self) -> Iterator[None]:
+        """Leave the critical section for the length of a block: for the user's code."""
+        if not _is_main():
+            yield
+            return
+        depth, self._depth = self._depth, 0
+        try:
+            yield
+        finally:
+            self._depth = depth
+
+
+class Lifecycle:
+    """From the first hook to the last: what runs when the node shuts down, and in which order."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.begin_lifecycle()
+
+    def begin_lifecycle(self) -> None:
+        """Nothing has happened yet, and no thread was notified of anything."""
+        self.shutting_down = SignalSafeEvent()
+        """Set once the shutdown hooks have run: every blocking call ends."""
+        self.left = SignalSafeEvent()
+        """Set once the node has left the graph."""
+        self.deferral = Deferral()
+        self.hooks: list[Callable[[], object]] = []
+        """What on_shutdown was given."""
+        self._hooks_before: list[Callable[[object], object]] = []
+        self._hooks_after: list[Callable[[object], object]] = []
+        self._interrupts: list[Callable[[], object]] = []
+        self._main = ThreadState()
+        self._thread = threading.local()
+        self.machine = ShutdownMachine(self._main)
+        # A lock, since it is claimed in one step: a signal's handler may come between any two.
+        self._claim = threading.Lock()
+
+    # --- the shutdown
+
+    def on_shutdown(self, hook: Callable[[], object]) -> None:
+        """Call ``hook`` when the node shuts down, before it leaves the graph. Raises TypeError."""
+        self._add_hook(self.hooks, hook, ())
+
+    def before_shutdown(self, hook: Callable[[object], object]) -> None:
+        """Call ``hook(reason)`` after the hooks of :meth:`on_shutdown`, still before is_shutdown() is true."""
+        self._add_hook(self._hooks_before, hook, (_TOO_LATE,))
+
+    def after_shutdown(self, hook: Callable[[object], object]) -> None:
+        """Call ``hook(reason)`` once is_shutdown() is true, before the node leaves the graph."""
+        self._add_hook(self._hooks_after, hook, (_TOO_LATE,))
+
+    def signal_shutdown(self, reason: object) -> bool:
+        """Shut the node down: hooks run in this thread, blocking calls end, the node leaves the graph.
+
+        Return False, without waiting, where a shutdown is under way already.
+        """
+        if not self._claim.acquire(blocking=False):
+            return False
+        _log.debug("signal_shutdown [%s]", reason)
+
+        with self.deferral:
+            try:
+                self.machine.runs_in_main = _is_main()
+                self.machine.phase = Phase.HOOKS
+                self._run_hooks(self.hooks, ())
+                self._run_hooks(self._hooks_before, (reason,))
+                with self.lock:
+                    # A hook that is added from now on is called immediately.
+                    self.shutting_down.set()
+                self.machine.phase = Phase.DOWN
+                self._run_hooks(self._hooks_after, (reason,))
+            finally:
+                # Also where an exception ends a hook.
+                self.shutting_down.set()
+                self._leave()
+        return True
+
+    def leave(self) -> None:
+        """Leave the graph."""
+
+    def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
+        """``with process.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it.
+
+        A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
+        """
+        return _Interrupting(self._interrupts, interrupt, self.shutting_down)
+
+    def spin(self) -> None:
+        """Wait until the node shuts down."""
+        try:
+            wait_for_event(self.shutting_down, None)
+        except KeyboardInterrupt:
+            self.signal_shutdown("keyboard interrupt")
+        self.poll_shutdown()
+
+    # --- which threads were notified
+
+    @property
+    def is_shutdown_requested(self) -> bool:
+        """Whether a shutdown has started: its hooks may still be running."""
+        return self._claim.locked()
+
+    def is_shutdown(self) -> bool:
+        """Return whether the node has shut down."""
+        return self.shutting_down.is_set()
+
+    def poll_shutdown(self) -> bool:
+        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        state = self.thread_state
+        state.polls = state.polled = True
+        if self.deferral.pending:
+            self.deferral.poll()
+        if not self.shutting_down.is_set():
+            return False
+        state.notified = True
+        return True
+
+    def check_interrupted_sleep(self) -> None:
+        """Notify the calling thread, whose sleep a shutdown has cut short. Raises ROSInterruptException.
+
+        In a loop that polls is_shutdown() the sleep just ends early, as with rospy: the loop will poll, and what follows
+        it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
+        """
+        state = self.thread_state
+        if state.polled:
+            state.polled = False
+            return
+        raise self.interrupted("ROS shutdown request")
+
+    def interrupted(self, text: str) -> ROSInterruptException:
+        """Return the error that notifies the calling thread of the shutdown, for it to raise."""
+        self.thread_state.notified = True
+        return ROSInterruptException(text)
+
+    @property
+    def thread_state(self) -> ThreadState:
+        """What the calling thread knows of the shutdown."""
+        try:
+            found: ThreadState = self._thread.state
+        except AttributeError:
+            found = self._thread.state = self._main if _is_main() else ThreadState()
+        return found
+
+    # --- helpers
+
+    def begin_lifecycle_in_fork(self) -> None:
+        """Start anew: this process is a copy, with one thread. The hooks are for the parent's shutdown."""
+        was_down = self.is_shutdown()
+        self.lock = threading.RLock()
+        self.begin_lifecycle()
+        if was_down:
+            self.shutting_down.set()
+
+    def _leave(self) -> None:
+        for interrupt in list(self._interrupts):
+            with contextlib.suppress(Exception):
+                interrupt()
+        try:
+            self.leave()
+        finally:
+            self.machine.phase = Phase.LEFT
+            self.left.set()
+
+    def _add_hook(self, hooks: list[Any], hook: Callable[..., object], given: tuple[object, ...]) -> None:
+        if not callable(hook):
+            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
+        with self.lock:
+            if not self.is_shutdown():
+                hooks.append(hook)
+                return
+        hook(*given)
+
+    def _run_hooks(self, hooks: list[Any], given: tuple[object, ...]) -> None:
+        # A hook may add another: it runs last.
+        for hook in hooks:
+            try:
+                with self.deferral.lifted():
+                    hook(*given)
+            except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
+                # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
+                if type(error) is not KeyboardInterrupt:
+                    with contextlib.suppress(OSError, ValueError):
+                        traceback.print_exc()
+
+
+class _Interrupting:
+    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
+
+    def __init__(
+        self, interrupts: list[Callable[[], object]], interrupt: Callable[[], object], down: threading.Event
+    ) -> None:
+        self._interrupts = interrupts
+        self._interrupt = interrupt
+        self._down = down
+
+    def __enter__(self) -> None:
+        self._interrupts.append(self._interrupt)
+        if self._down.is_set():
+            self._interrupt()
+
+    def __exit__(self, *_: object) -> None:
+        self._interrupts.remove(self._interrupt)
+
+
+def _is_main() -> bool:
+    return threading.current_thread() is threading.main_thread()

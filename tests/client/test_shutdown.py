@@ -1,0 +1,230 @@
+"""The rules of a shutdown, by a manual clock; and the moments between a signal and what the main thread does about it."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+import threading
+
+import pytest
+
+from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
+from minirospy.client.shutdown import Action, Phase, ShutdownMachine, ThreadState
+from minirospy.client.signals import SignalWatchdog
+
+
+@pytest.fixture
+def machine() -> ShutdownMachine:
+    return ShutdownMachine(ThreadState())
+
+
+def timeline(machine: ShutdownMachine, start: float, end: float) -> list[tuple[float, Action]]:
+    """Return what ten ticks a second bring from ``start`` to ``end``, each with its time."""
+    times = [round(tenth / 10, 1) for tenth in range(round(start * 10), round(end * 10) + 1)]
+    return [(now, action) for now in times for action in machine.tick(now)]
+
+
+def test_nothing_happens_without_a_signal(machine: ShutdownMachine) -> None:
+    for phase in Phase:
+        machine.phase = phase
+        assert timeline(machine, 0.0, 100.0) == []
+        assert machine.is_settled
+
+
+def test_a_main_thread_that_goes_on_is_interrupted_once_and_reported(machine: ShutdownMachine) -> None:
+    assert machine.signal(10.0) is None
+    machine.phase = Phase.HOOKS
+    assert timeline(machine, 10.0, 10.2) == []
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 10.3, 100.0) == [(10.8, Action.INTERRUPT), (12.0, Action.REPORT)]
+    assert machine.is_settled
+
+
+def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: ShutdownMachine) -> None:
+    machine.signal(0.0)
+    assert timeline(machine, 0.0, 0.9) == [(0.5, Action.RUN_HOOKS)]
+    machine.phase = Phase.HOOKS
+    # However long they take, the main thread is not interrupted before is_shutdown() is true.
+    assert timeline(machine, 1.0, 9.9) == [(2.0, Action.REPORT)]
+    machine.phase = Phase.DOWN
+    assert not machine.is_settled
+    assert timeline(machine, 10.0, 20.0) == [(10.5, Action.INTERRUPT)]
+
+
+def test_a_main_thread_that_leaves_the_graph_itself_is_interrupted_after_that(
+    machine: ShutdownMachine,
+) -> None:
+    machine.runs_in_main = True
+    machine.signal(0.0)
+    machine.phase = Phase.DOWN
+    # Meanwhile the node reports that it waits for its master.
+    assert timeline(machine, 0.0, 4.9) == []
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 5.0, 10.0) == [(5.0, Action.REPORT), (5.5, Action.INTERRUPT)]
+
+
+@pytest.mark.parametrize("why", ["polls", "notified", "main_has_ended"])
+def test_a_main_thread_that_ends_by_itself_is_not_interrupted(machine: ShutdownMachine, why: str) -> None:
+    setattr(machine if why == "main_has_ended" else machine.main, why, True)
+    machine.signal(0.0)
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 10.0) == [(2.0, Action.REPORT)]
+
+
+def test_a_main_thread_that_is_notified_in_time_is_not_interrupted(machine: ShutdownMachine) -> None:
+    machine.signal(0.0)
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 0.4) == []
+    machine.main.notified = True
+    assert timeline(machine, 0.5, 1.9) == []
+
+
+def test_a_signal_after_another_shutdown_interrupts_half_a_second_later(machine: ShutdownMachine) -> None:
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 49.9) == []
+    machine.signal(50.0)
+    assert timeline(machine, 50.0, 60.0) == [(50.5, Action.INTERRUPT), (52.0, Action.REPORT)]
+
+
+def test_the_second_signal_interrupts_and_the_third_ends(machine: ShutdownMachine) -> None:
+    asked = [machine.signal(now) for now in (0.0, 0.1, 0.2, 0.3)]
+    assert asked == [None, Action.KEYBOARD_INTERRUPT, Action.EXIT, Action.EXIT]
+
+
+def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachine) -> None:
+    machine.signal(0.0)
+    machine.phase = Phase.LEFT
+    machine.tick(0.0)
+    machine.signal(0.4)
+    assert timeline(machine, 0.5, 10.0) == [(2.0, Action.REPORT)]
+
+
+@pytest.fixture
+def lifecycle() -> Lifecycle:
+    return Lifecycle()
+
+
+@pytest.fixture
+def watchdog(lifecycle: Lifecycle) -> SignalWatchdog:
+    """Not installed: the handler is called as the system would call it."""
+    return SignalWatchdog(lifecycle, lambda: False)
+
+
+@pytest.mark.parametrize("was_notified", [False, True])
+def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog, *, was_notified: bool
+) -> None:
+    lifecycle.signal_shutdown("test")
+    # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and goes to its clean-up.
+    watchdog._error = ROSInterruptException("the program was asked to end")
+    watchdog._is_nudge = True
+    if was_notified:
+        assert lifecycle.poll_shutdown()
+        watchdog._on_signal(signal.SIGINT, None)
+    else:
+        with pytest.raises(ROSInterruptException):
+            watchdog._on_signal(signal.SIGINT, None)
+    assert lifecycle.thread_state.notified
+
+
+@pytest.mark.parametrize("call", ["poll_shutdown", "deferral"])
+def test_a_signal_waits_for_the_next_call_of_rospy(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog, call: str
+) -> None:
+    """Until then the program may be about to use what a hook releases."""
+    watchdog._on_signal(signal.SIGINT, None)
+    assert not lifecycle.is_shutdown_requested
+    if call == "poll_shutdown":
+        assert lifecycle.poll_shutdown()
+    else:
+        with lifecycle.deferral:
+            assert not lifecycle.is_shutdown_requested
+    assert lifecycle.is_shutdown()
+
+
+def test_a_nudge_in_a_critical_section_waits_for_its_end(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    with lifecycle.deferral:
+        for _ in range(2):
+            watchdog._is_nudge = True
+            watchdog._on_signal(signal.SIGINT, None)
+        assert not lifecycle.is_shutdown_requested
+    assert lifecycle.is_shutdown()
+
+
+def test_a_nudge_while_a_link_is_sending_waits(lifecycle: Lifecycle) -> None:
+    sending = [True]
+    watchdog = SignalWatchdog(lifecycle, lambda: sending[0])
+    watchdog._is_nudge = True
+    watchdog._on_signal(signal.SIGINT, None)
+    assert not lifecycle.is_shutdown_requested
+    sending[0] = False
+    watchdog._is_nudge = True
+    watchdog._on_signal(signal.SIGINT, None)
+    assert lifecycle.is_shutdown()
+
+
+def test_hooks_run_once_though_signals_come_while_they_run(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    runs: list[bool] = []
+
+    class Interrupted(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            watchdog._is_nudge = True
+            watchdog._on_signal(signal.SIGINT, sys._getframe())
+
+    record = logging.LogRecord("test", logging.INFO, "", 1, "a line", None, None)
+
+    def hook() -> None:
+        runs.append(lifecycle.deferral.is_active)
+        with lifecycle.deferral:
+            Interrupted().handle(record)
+
+    lifecycle.on_shutdown(hook)
+    watchdog._on_signal(signal.SIGINT, None)
+    lifecycle.deferral.poll()
+    assert runs == [False]
+    assert lifecycle.is_shutdown()
+
+
+def test_a_second_signal_ends_a_hook_and_the_others_run(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog
+) -> None:
+    ran: list[str] = []
+
+    def hook() -> None:
+        watchdog._error = KeyboardInterrupt()
+        watchdog._is_nudge = True
+        watchdog._on_signal(signal.SIGINT, None)
+        ran.append("never")
+
+    lifecycle.on_shutdown(hook)
+    lifecycle.on_shutdown(lambda: ran.append("other"))
+    watchdog._on_signal(signal.SIGINT, None)
+    lifecycle.deferral.poll()
+    assert ran == ["other"]
+    assert lifecycle.left.is_set()
+
+
+def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycle) -> None:
+    active: list[bool] = []
+
+    def work() -> None:
+        with lifecycle.deferral:
+            active.append(lifecycle.deferral.is_active)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    worker.join()
+    assert active == [False]
+
+
+def test_a_nudge_is_no_signal_of_the_users(lifecycle: Lifecycle) -> None:
+    watchdog = SignalWatchdog(lifecycle, lambda: False)
+    watchdog._arrived, watchdog._handled, watchdog._nudges = 5, 3, 4
+    assert watchdog._new_signals() == 1
+    lifecycle.machine.signal(0.0)
+    assert watchdog._new_signals() == 0
