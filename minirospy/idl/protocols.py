@@ -1,0 +1,159 @@
+"""What messages, services and actions look like to code that works with all of them.
+
+Protocols, since the classes come from several generators: ours, real genpy's in packages that were built with ROS, and
+those made at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeAlias
+
+from minirospy.times import Time
+
+__all__ = [
+    "Action",
+    "ActionFeedback",
+    "ActionGoal",
+    "ActionResult",
+    "Buffer",
+    "GoalID",
+    "GoalStatus",
+    "Header",
+    "Message",
+    "ServiceClass",
+    "Stamped",
+    "Writer",
+]
+
+Buffer: TypeAlias = bytes | bytearray | memoryview
+"""Bytes that a message is read from."""
+
+
+class Writer(Protocol):
+    """What a message is written to: a BytesIO, a list of pieces."""
+
+    def write(self, data: bytes, /) -> object:
+        """Take the next bytes."""
+
+
+class Message(Protocol):
+    """A message of any type. Its fields are attributes, in the order of ``__slots__``."""
+
+    __slots__: list[str]
+    _type: str
+    _md5sum: str
+    _full_text: str
+    _has_header: bool
+    _slot_types: list[str]
+    _connection_header: dict[str, str]
+
+    def __init__(self, *args: object, **kwds: object) -> None:
+        """All fields in order, or some by name."""
+
+    def serialize(self, buff: Writer) -> None:
+        """Write the message. Raises genpy.SerializationError."""
+
+    def deserialize(self, data: Buffer) -> Message:
+        """Read the message from bytes, and return it. Raises genpy.DeserializationError."""
+
+
+class GoalID(Message, Protocol):
+    """actionlib_msgs/GoalID."""
+
+    stamp: Time
+    id: str
+
+
+class GoalStatus(Message, Protocol):
+    """actionlib_msgs/GoalStatus."""
+
+    @property
+    def goal_id(self) -> GoalID:
+        """Whose status it is."""
+
+    status: int
+    text: str
+
+
+class Header(Message, Protocol):
+    """std_msgs/Header."""
+
+    seq: int
+    stamp: Time
+    frame_id: str
+
+
+class Stamped(Message, Protocol):
+    """A message that starts with a header."""
+
+    @property
+    def header(self) -> Header:
+        """Sequence number, time and frame."""
+
+
+class ServiceClass(Protocol):
+    """A service's class itself, which joins those of its request and response; it has no instances."""
+
+    @property
+    def _type(self) -> str: ...
+
+    @property
+    def _md5sum(self) -> str: ...
+
+    @property
+    def _request_class(self) -> type[Message]: ...
+
+    @property
+    def _response_class(self) -> type[Message]: ...
+
+
+class ActionGoal(Stamped, Protocol):
+    """What an action client sends."""
+
+    @property
+    def goal_id(self) -> GoalID:
+        """The goal's name and time."""
+
+    @property
+    def goal(self) -> Message:
+        """What the client wants."""
+
+
+class ActionResult(Stamped, Protocol):
+    """What an action server sends at the end of a goal."""
+
+    @property
+    def status(self) -> GoalStatus:
+        """How the goal ended."""
+
+    @property
+    def result(self) -> Message:
+        """What came of it."""
+
+
+class ActionFeedback(Stamped, Protocol):
+    """What an action server sends on the way."""
+
+    @property
+    def status(self) -> GoalStatus:
+        """How the goal is."""
+
+    @property
+    def feedback(self) -> Message:
+        """How far it is."""
+
+
+class Action(Message, Protocol):
+    """An action: a message that names those of its goal, result and feedback. An action's class is ``type[Action]``."""
+
+    @property
+    def action_goal(self) -> ActionGoal:
+        """A goal."""
+
+    @property
+    def action_result(self) -> ActionResult:
+        """A result."""
+
+    @property
+    def action_feedback(self) -> ActionFeedback:
+        """A feedback."""
