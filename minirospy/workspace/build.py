@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 from minirospy.errors import BuildError, DefinitionError, NotFoundError, did_you_mean
 from minirospy.idl.load import Catalogue, compile_package, read_definition, write_if_changed
 from minirospy.idl.spec import MessageSpec
-from minirospy.workspace.manifest import Kind
+from minirospy.workspace.build_order import build_order
+from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
@@ -28,7 +29,6 @@ __all__ = [
     "PROVIDED",
     "Workspace",
     "build",
-    "build_order",
     "find_workspace",
     "own_set_up",
     "read_plans",
@@ -127,35 +127,21 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
                 f"{plans[plan.name].folder}; an empty file CATKIN_IGNORE in one of the folders hides it",
             )
         plans[plan.name] = plan
-    return build_order(plans)
+    return _ordered(plans)
 
 
-def build_order(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Each package after those that it depends on, otherwise by name. Raises BuildError on a cycle."""
-    ordered: list[Plan] = []
-    state: dict[str, bool] = {}
-
-    def visit(name: str, path: tuple[str, ...]) -> None:
-        if state.get(name):
-            return
-        if name in path:
-            cycle = [*path[path.index(name) :], name]
-            raise BuildError(
-                str(plans[name].folder / "package.xml"),
-                0,
-                f"packages depend on each other in a circle: {' -> '.join(cycle)}",
-            )
-        plan = plans[name]
-        kinds = (Kind.BUILD, Kind.BUILDTOOL, Kind.BUILD_EXPORT)
-        needed = {*plan.manifest.depends(*kinds), *plan.message_depends, *(need for need, _ in plan.needs)}
-        for other in sorted(needed & plans.keys()):
-            visit(other, (*path, name))
-        state[name] = True
-        ordered.append(plan)
-
-    for name in sorted(plans):
-        visit(name, ())
-    return ordered
+def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
+    """Each package after those that it is built from. Raises BuildError on a cycle."""
+    also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
+    try:
+        names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
+    except CircularDependencyError as error:
+        raise BuildError(
+            str(plans[error.circle[0]].folder / "package.xml"),
+            0,
+            f"packages depend on each other in a circle: {' -> '.join(error.circle)}",
+        ) from error
+    return [plans[name] for name in names]
 
 
 class Report(NamedTuple):

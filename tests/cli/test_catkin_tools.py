@@ -73,4 +73,4 @@ def test_order(workspace: Path, capsys: Capture) -> None:
     manifest = workspace / "src" / "c" / "package.xml"
     manifest.write_text(manifest.read_text().replace("</package>", "<depend>a</depend></package>"))
     assert catkin_topological_order(["src"]) == 1
-    assert "in a circle: a, c" in capsys.readouterr().err
+    assert "in a circle: a -> c -> a" in capsys.readouterr().err

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from minirospy.cli.command import Parser, run
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
-from minirospy.workspace.manifest import Kind, read_manifest
+from minirospy.workspace.build_order import build_order
+from minirospy.workspace.dependencies import CircularDependencyError
+from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages, built_in_roots
 
 __all__ = ["catkin_find", "catkin_find_pkg", "catkin_topological_order"]
@@ -135,16 +137,9 @@ def _topological_order(argv: Sequence[str] | None) -> None:
         print(folder if options.only_folders else name if options.only_names else f"{name} {folder}")
 
 
-def _ordered(folders: Mapping[str, Path]) -> Iterator[str]:
-    """The packages, each behind those that it is built from; of those that could come next, the first by name."""
-    kinds = (Kind.BUILD, Kind.BUILDTOOL, Kind.BUILD_EXPORT)
-    waiting = {
-        name: {*read_manifest(folder).depends(*kinds)} & folders.keys() for name, folder in folders.items()
-    }
-    while waiting:
-        free = sorted(name for name, needed in waiting.items() if not needed & waiting.keys())
-        if not free:
-            raise MinirospyError(f"packages depend on each other in a circle: {', '.join(sorted(waiting))}")
-        for name in free:
-            del waiting[name]
-        yield from free
+def _ordered(folders: Mapping[str, Path]) -> list[str]:
+    try:
+        return build_order({name: read_manifest(folder) for name, folder in folders.items()})
+    except CircularDependencyError as error:
+        circle = " -> ".join(error.circle)
+        raise MinirospyError(f"packages depend on each other in a circle: {circle}") from error

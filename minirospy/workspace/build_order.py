@@ -1,0 +1,94 @@
+"""The order to build packages in, as catkin has it: manifests in, names out.
+
+Source: the behaviour of catkin_pkg.topological_order.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Mapping
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+
+from minirospy.workspace.dependencies import CircularDependencyError
+from minirospy.workspace.manifest import Kind, Manifest
+
+__all__ = ["build_order"]
+
+_BUILT_FROM = (Kind.BUILD, Kind.BUILDTOOL, Kind.TEST)
+_RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
+
+
+def build_order(
+    manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
+) -> list[str]:
+    """Return the names of packages, each after those that it is built from; of those that could be next, the first.
+
+    A package is built from what it needs to build and test, from what those need to run, and from the packages
+    that ``also`` has for its name. Message generators and what they need go before all others.
+    Raises CircularDependencyError.
+    """
+    routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
+    early = _generators(manifests, routes)
+
+    sorter = TopologicalSorter(routes)
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        raise CircularDependencyError(_circle(error.args[1], routes)) from error
+
+    ordered: list[str] = []
+    ready = [(name not in early, name) for name in sorter.get_ready()]
+    heapq.heapify(ready)
+    while ready:
+        _, name = heapq.heappop(ready)
+        ordered.append(name)
+        sorter.done(name)
+        for each in sorter.get_ready():
+            heapq.heappush(ready, (each not in early, each))
+    return ordered
+
+
+def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
+    """The packages that one is built from, and all that those need to run: each with the one that names it."""
+    found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
+    waiting = list(found)
+    for each in waiting:
+        for other in manifests[each].depends(*_RUN_WITH):
+            if other in manifests and other not in found:
+                found[other] = each
+                waiting.append(other)
+    return found
+
+
+def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[str, str]]) -> set[str]:
+    """The packages that export a message generator, and all that those are built from."""
+    waiting = {
+        name
+        for name, manifest in manifests.items()
+        if any(export.tag == "message_generator" for export in manifest.exports)
+    }
+    found: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        found.add(name)
+        waiting |= routes[name].keys() - found
+    return found
+
+
+def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
+    """The names of a cycle, each before one that it needs, from the first by name back to itself.
+
+    graphlib has each of ``nodes`` before one that needs it, and the first of them twice.
+    """
+    backwards: list[str] = []
+    for needed, name in pairwise(nodes):
+        backwards.append(needed)
+        # What is between the two only needs to run with the other.
+        between = routes[name][needed]
+        while between != name:
+            backwards.append(between)
+            between = routes[name][between]
+    circle = backwards[::-1]
+    start = circle.index(min(circle))
+    return (*circle[start:], *circle[:start], circle[start])
