@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.command import run
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 from minirospy.gpio.board import Board, BoardState
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
     from rich.text import Text
 
-__all__ = ["Picture", "main", "render"]
+__all__ = ["FAMILY", "Picture", "main", "render"]
 
 _LOOK_SECONDS = 0.05
 """Between two looks at the board."""
@@ -45,13 +46,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
-            return run(_FAMILY.name, _missing_name)
+            return run(FAMILY.name, _missing_name)
         # For what the verbs open, as the variable would be for a node.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
-        return run(_FAMILY.name, _show)
-    return _FAMILY.main(words)
+        return run(FAMILY.name, _show)
+    return FAMILY.main(words)
 
 
 def _missing_name() -> int:
@@ -247,94 +248,124 @@ class _Keys:
         return self._ARROWS.get(sequence[-1:], "")
 
 
-def _press(argv: Sequence[str]) -> None:
-    pins = _pins("press", "Push buttons; they stay pressed until `release`.", argv)
+def _pins_parser(verb: str, description: str) -> Parser:
+    parser = Parser(f"minirospy board {verb}", description)
+    parser.add_argument("pin", nargs="+", type=int, help="BCM numbers", completer="pins")
+    return parser
+
+
+def _press_parser() -> Parser:
+    return _pins_parser("press", "Push buttons; they stay pressed until `release`.")
+
+
+def _press(pin: Sequence[int]) -> None:
     with Board() as board:
-        for pin in pins:
-            board.press(pin)
+        for each in pin:
+            board.press(each)
 
 
-def _release(argv: Sequence[str]) -> None:
-    pins = _pins("release", "Let go of buttons.", argv)
+def _release_parser() -> Parser:
+    return _pins_parser("release", "Release buttons.")
+
+
+def _release(pin: Sequence[int]) -> None:
     with Board() as board:
-        for pin in pins:
-            board.release(pin)
+        for each in pin:
+            board.release(each)
 
 
-def _get(argv: Sequence[str]) -> None:
-    pins = _pins("get", "Print the level of pins: a line with 0 or 1 for each.", argv)
+def _get_parser() -> Parser:
+    return _pins_parser("get", "Print the level of pins: a line with 0 or 1 for each.")
+
+
+def _get(pin: Sequence[int]) -> None:
     with Board() as board:
-        for pin in pins:
-            print(board.get(pin))
+        for each in pin:
+            print(board.get(each))
 
 
-def _set(argv: Sequence[str]) -> None:
-    parser = Parser(
-        "minirospy board set", description="Put a level on an input from outside, or on an output."
-    )
-    parser.add_argument("pin", type=int, help="BCM number")
+def _set_parser() -> Parser:
+    parser = Parser("minirospy board set", "Put a level on an input from outside, or on an output.")
+    parser.add_argument("pin", type=int, help="BCM number", completer="pins")
     parser.add_argument("level", type=int, choices=(0, 1))
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _set(pin: int, level: int) -> None:
     with Board() as board:
-        board.set(options.pin, options.level)
+        board.set(pin, level)
 
 
-def _person(argv: Sequence[str]) -> None:
+def _person_parser() -> Parser:
     parser = Parser(
         "minirospy board person",
-        description="Put a person before the simulated scanner, or send them away; alone: print where they are.",
+        "Put a person before the simulated scanner, or send them away; alone: print where they are.",
     )
-    parser.add_argument("ahead", nargs="?", help="metres ahead of the scanner, or `away`")
-    parser.add_argument("left", nargs="?", help="metres to its left (0)")
-    options = parser.parse_args(argv)
+    parser.add_argument(
+        "ahead", nargs="?", help="metres ahead of the scanner, or `away`", completer="nothing"
+    )
+    parser.add_argument("left", nargs="?", help="metres to its left (0)", completer="nothing")
+    return parser
+
+
+def _person(ahead: str | None, left: str | None) -> None:
     with Board() as board:
-        if options.ahead == "away" and options.left is None:
+        if ahead == "away" and left is None:
             board.move_person(None)
-        elif options.ahead is not None:
+        elif ahead is not None:
             try:
-                position = float(options.ahead), float(options.left or 0)
+                position = float(ahead), float(left or 0)
             except ValueError:
-                parser.error(
+                raise Misuse(
                     "metres are numbers: minirospy board person 0.3 0; or: minirospy board person away"
-                )
+                ) from None
             board.move_person(position)
         else:
             print(_where(board.person) if board.person else "away")
 
 
-def _boards(argv: Sequence[str]) -> None:
-    Parser("minirospy board boards", description="Print the names of the boards of this user.").parse_args(
-        argv
-    )
+def _boards_parser() -> Parser:
+    return Parser("minirospy board boards", "Print the names of the boards of this user.")
+
+
+def _boards() -> None:
     for name in Place.find().names():
         print(name)
 
 
-def _watch(argv: Sequence[str]) -> None:
-    parser = Parser("minirospy board watch", description="Print a line `PIN LEVEL` for each edge.")
-    parser.add_argument("pin", nargs="*", type=int, help="BCM numbers (all pins)")
+def _watch_parser() -> Parser:
+    parser = Parser("minirospy board watch", "Print a line `PIN LEVEL` for each edge.")
+    parser.add_argument("pin", nargs="*", type=int, help="BCM numbers (all pins)", completer="pins")
     parser.add_argument(
-        "-n", dest="count", type=int, default=0, help="end after COUNT lines", metavar="COUNT"
+        "-n", dest="count", type=int, default=0, help="exit after COUNT lines", metavar="COUNT"
     )
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _watch(pin: Sequence[int], count: int) -> None:
     with Board() as board:
-        for number, edge in enumerate(board.watch(options.pin or None), 1):
+        for number, edge in enumerate(board.watch(pin or None), 1):
             print(edge.pin, edge.level, flush=True)
-            if number == options.count:
+            if number == count:
                 break
 
 
-def _reset(argv: Sequence[str]) -> None:
-    Parser(
-        "minirospy board reset",
-        description="Make all pins inputs at 0, release all buttons, send the person away.",
-    ).parse_args(argv)
+def _reset_parser() -> Parser:
+    return Parser(
+        "minirospy board reset", "Make all pins inputs at 0, release all buttons, send the person away."
+    )
+
+
+def _reset() -> None:
     with Board() as board:
         board.reset()
 
 
-def _list(argv: Sequence[str]) -> None:
-    Parser("minirospy board list", description="Print the wired pins and those in use.").parse_args(argv)
+def _list_parser() -> Parser:
+    return Parser("minirospy board list", "Print the wired pins and those in use.")
+
+
+def _list() -> None:
     with Board() as board:
         _print_pins(board.state())
 
@@ -354,26 +385,19 @@ def _function(pin: Pin) -> str:
     return "out" if pin.function is Function.OUT else "in"
 
 
-def _pins(verb: str, description: str, argv: Sequence[str]) -> list[int]:
-    parser = Parser(f"minirospy board {verb}", description=description)
-    parser.add_argument("pin", nargs="+", type=int, help="BCM numbers")
-    pins: list[int] = parser.parse_args(argv).pin
-    return pins
-
-
-_FAMILY = Family(
+FAMILY = Family(
     "minirospy board",
     "minirospy board shows the virtual board live; with a command it serves scripts. Pins are BCM numbers.",
     (
-        Verb("person", "put a person before the scanner: person 0.3 0, person away", _person),
-        Verb("press", "push buttons: press 11", _press),
-        Verb("release", "let go of buttons: release 11", _release),
-        Verb("get", "print the level of pins: get 7", _get),
-        Verb("set", "put a level on a pin: set 7 1", _set),
-        Verb("watch", "print a line for each edge: watch 7", _watch),
-        Verb("list", "print the pins", _list),
-        Verb("reset", "make the board as new", _reset),
-        Verb("boards", "print the names of the boards", _boards),
+        Verb("person", "put a person before the scanner: person 0.3 0, person away", _person_parser, _person),
+        Verb("press", "push buttons: press 11", _press_parser, _press),
+        Verb("release", "let go of buttons: release 11", _release_parser, _release),
+        Verb("get", "print the level of pins: get 7", _get_parser, _get),
+        Verb("set", "put a level on a pin: set 7 1", _set_parser, _set),
+        Verb("watch", "print a line for each edge: watch 7", _watch_parser, _watch),
+        Verb("list", "print the pins", _list_parser, _list),
+        Verb("reset", "make the board as new", _reset_parser, _reset),
+        Verb("boards", "print the names of the boards", _boards_parser, _boards),
     ),
     "Several boards, one for each robot: `minirospy board -b NAME ...`, and MINIROSPY_BOARD=NAME for its nodes.",
 )

@@ -15,15 +15,14 @@ status when
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
-import itertools
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, NoReturn
 
+from minirospy.cli.parser import CommandLineError
 from minirospy.errors import (
     MessageException,
     MinirospyError,
@@ -41,10 +40,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "INTERRUPTED",
-    "Parser",
     "complain",
     "hint_near",
-    "one_argument",
     "refuse_bag",
     "run",
     "tool_node",
@@ -55,55 +52,6 @@ __all__ = [
 
 INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
-
-
-class _Help(argparse.HelpFormatter):
-    """Help as wide as the terminal; argparse asks shutil for that, whose import costs more than its own."""
-
-    def __init__(self, prog: str, *args: Any, **kwargs: Any) -> None:
-        try:
-            width = os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
-        except (OSError, ValueError):
-            width = 80
-        super().__init__(prog, *args, **{"width": max(width, 40) - 2, **kwargs})
-
-
-class Parser(argparse.ArgumentParser):
-    """An argument parser whose complaint is one line that ends with what to type for help."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **{"formatter_class": _Help, **kwargs})
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        self._check_options(args)
-        return super().parse_known_args(args, namespace)
-
-    def parse_known_intermixed_args(self, args: Any = None, namespace: Any = None) -> Any:
-        self._check_options(args)
-        return super().parse_known_intermixed_args(args, namespace)
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (`{self.prog} -h` shows what there is)")
-
-    def _check_options(self, args: Sequence[str] | None) -> None:
-        """Tell of a long option that does not exist before a missing argument: that may be what it has swallowed."""
-        if any(action.nargs == argparse.REMAINDER for action in self._actions):
-            return  # some of the options are another program's
-        for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
-            option = word.partition("=")[0]
-            if option.startswith("--") and not any(
-                known.startswith(option) for known in self._option_string_actions
-            ):
-                self.error(
-                    f"unrecognized arguments: {word}{did_you_mean(option, self._option_string_actions, 1)}"
-                )
-
-
-def one_argument(prog: str, description: str, name: str, help_: str, argv: Sequence[str]) -> str:
-    """The one word, as typed, that a command takes."""
-    parser = Parser(prog, description=description)
-    parser.add_argument(name, help=help_)
-    return str(getattr(parser.parse_args(argv), name))
 
 
 def refuse_bag(command: str) -> NoReturn:
@@ -118,6 +66,8 @@ def run(name: str, body: Callable[[], int | None], interrupted: int = 0) -> int:
         status = body() or 0
         sys.stdout.flush()
         return status
+    except CommandLineError as error:
+        return complain(name, error, 2, error.ros_text)
     except UsageError as error:
         return complain(name, error, 2)
     except (MinirospyError, ROSException, ServiceException, MessageException) as error:
@@ -205,9 +155,11 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
         signal.signal(signal.SIGTERM, before)
 
 
-def complain(name: str, error: Exception, status: int = 1) -> int:
-    """One line on stderr, after all that was printed before; ``status`` comes back."""
+def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -> int:
+    """Print an error on stderr, after all that was printed before: ROS's text, then ours. Return ``status``."""
     _flush()
+    if ros_text:
+        print(escaped(ros_text, "\n"), file=sys.stderr)
     print(escaped(f"{name}: ERROR: {error}", "\n"), file=sys.stderr)
     return status
 

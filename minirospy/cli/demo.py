@@ -14,14 +14,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
 from minirospy.gpio.board import Board
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
@@ -36,25 +37,24 @@ _WAY = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status 0 where the LED followed the button each time, else 1."""
-    parser = Parser(prog="minirospy demo", description=(__doc__ or "").partition("\n")[0])
+    """Run the command; return 0 where the LED followed the button each time, else 1."""
+    return COMMAND.main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser("minirospy demo", (__doc__ or "").partition("\n")[0])
     parser.add_argument(
         "--presses", type=int, metavar="N", help="end after N presses (default: 3, on a terminal at Ctrl-C)"
     )
-
-    def body() -> int:
-        options = parser.parse_args(argv)
-        if options.presses is not None and options.presses < 1:
-            parser.error("--presses takes a number from 1")
-        presses = options.presses
-        if presses is None and not sys.stdout.isatty():
-            presses = 3
-        return _demo(presses)
-
-    return run("minirospy demo", body)
+    return parser
 
 
 def _demo(presses: int | None) -> int:
+    if presses is not None and presses < 1:
+        raise Misuse("--presses takes a number from 1")
+    if presses is None and not sys.stdout.isatty():
+        presses = 3
+
     with _own_world() as folder, _launched(folder / "roslaunch.log") as launch, Board() as board:
         _wait_until_ready(board, launch, folder / "roslaunch.log")
         show = _Picture(board) if sys.stdout.isatty() and not _is_dumb() else _Lines()
@@ -226,3 +226,6 @@ class _Picture:
             Text(self._caption, style="bold"),
             Text("Ctrl-C ends it.", style="dim"),
         )
+
+
+COMMAND = Command("minirospy demo", _parser, _demo)

@@ -10,72 +10,87 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
 
-__all__ = ["main", "roswtf"]
+__all__ = ["DOCTOR", "ROSWTF", "main", "roswtf"]
 
 _WORDS = {Status.OK: "ok     ", Status.WARNING: "warning", Status.PROBLEM: "PROBLEM"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command `minirospy doctor`."""
-    return _command("minirospy doctor", argv)
+    """Run the command `minirospy doctor`; return its exit status."""
+    return DOCTOR.main(argv)
 
 
 def roswtf(argv: Sequence[str] | None = None) -> int:
-    """The command `roswtf`."""
-    return _command("roswtf", argv)
+    """Run the command `roswtf`; return its exit status."""
+    return ROSWTF.main(argv)
 
 
-def _command(name: str, argv: Sequence[str] | None) -> int:
-    parser = Parser(
-        prog=name,
-        description="Checks this machine, its network and the graph, and says what to do. "
-        "Exit status: 0 without problems, 1 with, 2 typed wrong.",
+class _DoctorParser(Parser):
+    """Takes ``name:=value`` from among the words."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name, the launch files' as ``args``. Raises CommandLineError."""
+        options = super().parse([word for word in words if ":=" not in word])
+        options["args"] = dict(
+            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
+        )
+        return options
+
+
+def _parser(name: str) -> Parser:
+    parser = _DoctorParser(
+        name,
+        "Checks this machine, its network and the graph, and says what to do. "
+        "Exit status: 0 without problems, 1 with, 2 usage error.",
     )
     parser.add_argument(
         "others",
         nargs="*",
         metavar="HOST|FILE.launch",
         help="another machine to try too, by its name or address; a launch file to check too (with arg:=value)",
+        completer="launch_files",
     )
     parser.add_argument(
         "--listen", action="store_true", help="then wait for the doctors of other machines, and connect back"
     )
     parser.add_argument("--offline", action="store_true", help="only what needs no network")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON, one a line")
-    # Options of ROS's roswtf that ask for nothing here.
+    # Options of ROS's roswtf that have no effect here.
     for word in ("--all", "--no-plugins"):
-        parser.add_argument(word, action="store_true", help="accepted, without effect")
+        parser.accept(word)
+    return parser
 
-    def body() -> int:
-        words = list(sys.argv[1:] if argv is None else argv)
-        options = parser.parse_args([word for word in words if ":=" not in word])
-        args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
-        if options.listen and options.offline:
-            parser.error("--listen needs the network")
-        # What the node under the checks would log is what they find out.
-        logging.getLogger("minirospy").addHandler(logging.NullHandler())
-        show = _show_json if options.json else _show
-        counts = dict.fromkeys(Status, 0)
-        machines = [word for word in options.others if not _is_file(word)]
-        if machines and options.offline:
-            parser.error(f"{machines[0]}: to try another machine needs the network")
-        with Examination(machines=machines, offline=options.offline) as examination:
-            for finding in _all(examination, list(filter(_is_file, options.others)), args):
-                counts[finding.status] += 1
-                show(finding)
-            if not options.json:
-                print(_summary(counts), flush=True)
-            if options.listen and examination.listen(show):
-                print("listening: type `minirospy doctor` on the other machine; Ctrl-C ends this", flush=True)
-                _wait_for_signal()
-        return 1 if counts[Status.PROBLEM] else 0
 
-    return run(name, body)
+def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args: dict[str, str]) -> int:
+    if listen and offline:
+        raise Misuse("--listen needs the network")
+    machines = [word for word in others if not _is_file(word)]
+    if machines and offline:
+        raise Misuse(f"{machines[0]}: to try another machine needs the network")
+
+    # What the node under the checks would log is what they find out.
+    logging.getLogger("minirospy").addHandler(logging.NullHandler())
+    show = _show_json if json else _show
+    counts = dict.fromkeys(Status, 0)
+    with Examination(machines=machines, offline=offline) as examination:
+        for finding in _all(examination, list(filter(_is_file, others)), args):
+            counts[finding.status] += 1
+            show(finding)
+
+        if not json:
+            print(_summary(counts), flush=True)
+        if listen and examination.listen(show):
+            print("listening: type `minirospy doctor` on the other machine; Ctrl-C ends this", flush=True)
+            _wait_for_signal()
+    return 1 if counts[Status.PROBLEM] else 0
 
 
 def _is_file(word: str) -> bool:
@@ -147,6 +162,10 @@ def _summary(counts: dict[Status, int]) -> str:
         if number
     ]
     return " and ".join(found) if found else "all is well"
+
+
+DOCTOR = Command("minirospy doctor", partial(_parser, "minirospy doctor"), _doctor)
+ROSWTF = Command("roswtf", partial(_parser, "roswtf"), _doctor)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,8 @@
-"""A command with verbs (`rostopic list`): a table of them, its help, and the way to the one typed."""
+"""What a command is made of: a parser and a typed function; and a family of such verbs under one name.
+
+The function's parameters are called as the parser's arguments: `Command.run` passes them by name. So a parser can be
+had without running its command, and the function be called without a command line.
+"""
 
 from __future__ import annotations
 
@@ -7,58 +11,99 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from minirospy.cli.command import run
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.errors import UsageError, did_you_mean
 from minirospy.names import parse_arguments
 
-__all__ = ["Family", "Verb"]
+__all__ = ["Command", "Family", "Verb"]
+
+
+class Command(NamedTuple):
+    """A command without verbs. ``interrupted`` is the exit status at Ctrl-C."""
+
+    name: str
+    parser: Callable[[], Parser]
+    body: Callable[..., int | None]
+    interrupted: int = 0
+
+    def main(self, argv: Sequence[str] | None = None) -> int:
+        """Run the command; return the exit status as :func:`minirospy.cli.command.run` does."""
+        words = sys.argv[1:] if argv is None else argv
+        return run(self.name, lambda: _call(self.parser(), self.body, words), self.interrupted)
 
 
 class Verb(NamedTuple):
-    """One verb: its name, one line of help, and the function that takes the rest of the command line.
+    """One verb of a family: its name, one line of help, its parser, and the function that is given what it parsed.
 
-    Of a family that is a node, the function takes the remapping arguments besides.
+    In a family that is a node, the function takes ``arguments``, the remapping arguments, besides.
     """
 
     name: str
     summary: str
+    parser: Callable[[], Parser]
     body: Callable[..., int | None]
 
 
 class Family(NamedTuple):
     """A command and its verbs. ``headline`` says what the command is for, ``footer`` where more help is.
 
-    ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic" args="pub ..."/>`), with
-    `__name:=` and remappings among its words. ``interrupted``: the exit status at Ctrl-C.
+    A verb may be a family itself. ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic"
+    args="pub ..."/>`), with `__name:=` and remappings among its words. ``interrupted``: the exit status at Ctrl-C.
     """
 
     name: str
     headline: str
-    verbs: tuple[Verb, ...]
+    verbs: tuple[Verb | Family, ...]
     footer: str = ""
     is_node: bool = False
     interrupted: int = 0
+    summary: str = ""
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the verb that was typed; the exit status as :func:`minirospy.cli.command.run` gives it."""
+        """Run the verb that was typed; return the exit status as :func:`minirospy.cli.command.run` does."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted)
 
+    def verb_name(self, verb: Verb | Family) -> str:
+        """Return what is typed for a verb."""
+        return verb.name.removeprefix(f"{self.name} ")
+
+    def find(self, name: str) -> Verb | Family | None:
+        """Return the verb that is called ``name``."""
+        return next((verb for verb in self.verbs if self.verb_name(verb) == name), None)
+
     def help(self) -> str:
-        """What `-h` prints."""
+        """Return what `-h` prints."""
         lines = [self.headline, ""] if self.headline else []
         lines.append("Commands:")
-        lines += [f"\t{self.name} {verb.name}\t{verb.summary}" for verb in self.verbs]
+        lines += [f"\t{self.name} {self.verb_name(verb)}\t{verb.summary}" for verb in self.verbs]
         return "\n".join([*lines, "", *([self.footer, ""] if self.footer else [])])
 
     def _dispatch(self, words: list[str]) -> int | None:
         if not words or words[0] in ("-h", "--help"):
             print(self.help())
             return 0 if words else 2
-        for verb in self.verbs:
-            if verb.name == words[0]:
-                if not self.is_node:
-                    return verb.body(words[1:])
-                arguments = parse_arguments(words[1:])
-                return verb.body(arguments.plain, arguments)
-        hint = did_you_mean(words[0], (verb.name for verb in self.verbs))
-        raise UsageError(f"there is no `{self.name} {words[0]}`{hint} (`{self.name} -h` shows what there is)")
+
+        verb = self.find(words[0])
+        if isinstance(verb, Family):
+            return verb._dispatch(words[1:])
+        if verb is None:
+            hint = did_you_mean(words[0], map(self.verb_name, self.verbs))
+            raise UsageError(
+                f"there is no `{self.name} {words[0]}`{hint} (`{self.name} -h` shows what there is)"
+            )
+        if not self.is_node:
+            return _call(verb.parser(), verb.body, words[1:])
+        arguments = parse_arguments(words[1:])
+        return _call(verb.parser(), verb.body, arguments.plain, arguments=arguments)
+
+
+def _call(
+    parser: Parser, body: Callable[..., int | None], words: Sequence[str], **others: object
+) -> int | None:
+    """Parse ``words`` and call ``body`` with what they say."""
+    options = parser.parse(words)
+    try:
+        return body(**options, **others)
+    except Misuse as misuse:
+        parser.error(str(misuse), misuse.ros)

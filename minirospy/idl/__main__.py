@@ -10,7 +10,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.idl.load import Catalogue, write_package
 
 __all__ = ["main"]
@@ -19,29 +20,32 @@ _PACKAGE = Path(__file__).parents[1]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
-    parser = Parser(prog="python -m minirospy.idl", description="Compile definitions into Python modules.")
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return Command("minirospy.idl", _parser, _compile).main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser("python -m minirospy.idl", "Compile definitions into Python modules.")
     parser.add_argument(
         "source", nargs="?", type=Path, help="a folder of packages with msg, srv, action folders"
     )
     parser.add_argument("target", nargs="?", type=Path, help="the folder that gets the Python packages")
+    return parser
 
-    def body() -> int:
-        options = parser.parse_args(argv)
-        own = next(p for p in (_PACKAGE.parent / "msgs", _PACKAGE / "share" / "msgs") if p.is_dir())
-        catalogue = Catalogue.below(*([options.source] if options.source else []), own)
-        chosen = Catalogue.below(options.source or own).packages
-        if not chosen:
-            parser.error(f"no package with a msg, srv or action folder below {options.source}")
-        written = [
-            path
-            for package in chosen
-            for path in write_package(catalogue, package, options.target or _PACKAGE / "overlay")
-        ]
-        print(f"{len(chosen)} packages, {len(written)} modules written")
-        return 0
 
-    return run("minirospy.idl", body)
+def _compile(source: Path | None, target: Path | None) -> int:
+    own = next(p for p in (_PACKAGE.parent / "msgs", _PACKAGE / "share" / "msgs") if p.is_dir())
+    catalogue = Catalogue.below(*([source] if source else []), own)
+    chosen = Catalogue.below(source or own).packages
+    if not chosen:
+        raise Misuse(f"no package with a msg, srv or action folder below {source}")
+    written = [
+        path
+        for package in chosen
+        for path in write_package(catalogue, package, target or _PACKAGE / "overlay")
+    ]
+    print(f"{len(chosen)} packages, {len(written)} modules written")
+    return 0
 
 
 if __name__ == "__main__":

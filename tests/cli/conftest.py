@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -103,6 +104,13 @@ class Result(NamedTuple):
 
 
 Command = Callable[..., Result]
+
+
+def own_lines(err: str) -> list[str]:
+    """The lines on stderr that are minirospy's own; ROS's usage and its own wording may stand before them."""
+    own = [line for line in err.splitlines() if re.match(r"[\w. -]+: ERROR: ", line)]
+    assert err.endswith(f"{own[-1]}\n")
+    return own
 
 
 @pytest.fixture

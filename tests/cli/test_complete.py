@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from importlib import import_module
+from collections.abc import Iterator
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 import yaml
 
-from minirospy.cli.command import Parser
 from minirospy.cli.completion import completers
-from minirospy.cli.completion.complete import BY_HAND, COMPLETED_WITH, ENTRANCES, _takes, candidates, main
-from minirospy.cli.main import _VERBS
-from minirospy.cli.verbs import Family
+from minirospy.cli.completion.complete import candidates, main
+from minirospy.cli.parser import completer_of
+from minirospy.cli.registry import COMMANDS, Entry
+from minirospy.cli.verbs import Command, Family, Verb
 from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
@@ -113,69 +114,79 @@ def test_the_small_commands(workspace: Path) -> None:
     assert tab("rosmsg-proto msg std_msgs/Boo") == ["std_msgs/Bool"]
 
 
-def test_every_command_that_is_installed_is_completed() -> None:
-    """The table of commands, and the entrances of each, are those of pyproject.toml."""
-    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
-    section = text.partition("[project.scripts]")[2].partition("\n[")[0]
-    installed = dict(re.findall(r'^([\w-]+) = "minirospy\.cli\.([\w.]+:\w+)"$', section, re.MULTILINE))
-    by_hand = {name: installed.pop(name) for name in ("minirospy", "rosrun", "rospack", "rosstack")}
-    assert installed == ENTRANCES
-    assert {*by_hand} - {"minirospy"} <= {*BY_HAND}
+_PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 
-_WITHOUT_WORDS = {"rosdep init", "rosdep update"}
+def test_registry_equals_the_console_scripts() -> None:
+    section = _PYPROJECT.read_text(encoding="utf-8").partition("[project.scripts]")[2].partition("\n[")[0]
+    scripts = dict(re.findall(r'^([\w-]+) = "([\w.]+:\w+)"$', section, re.MULTILINE))
+    assert scripts == {entry.script: entry.target for entry in COMMANDS if entry.script}
 
 
-def parsers() -> Iterator[tuple[str, str, Parser]]:
-    """Every parser that a command has: its name in the table, what is typed before its words, itself."""
-    entrances = {**ENTRANCES, "rosrun": "ros.rosrun:main", "rospack": "ros.rospack:main"}
-    by_verb = {
-        f"minirospy {verb}": f"{entry.module}:{entry.function}"
-        for verb, entry in _VERBS.items()
-        if entry.summary
+def leaves(grammar: Command | Family | Verb, typed: str) -> Iterator[tuple[str, Command | Verb]]:
+    """Every verb, or the command itself, with what is typed for it."""
+    if not isinstance(grammar, Family):
+        yield typed, grammar
+        return
+    for verb in grammar.verbs:
+        yield from leaves(verb, f"{typed} {grammar.verb_name(verb)}")
+
+
+LEAVES = [
+    leaf
+    for entry in COMMANDS
+    if (grammar := entry.load_grammar())
+    for leaf in leaves(grammar, entry.script or f"minirospy {entry.verb}")
+]
+
+
+@pytest.mark.parametrize("entry", COMMANDS, ids=lambda entry: entry.target)
+def test_every_command_is_completed(entry: Entry) -> None:
+    """A command has a grammar, or a completer of its words; only `minirospy` and `complete` themselves have neither."""
+    grammar = entry.load_grammar()
+    assert callable(entry.load_main())
+    assert grammar is None or isinstance(grammar, Command | Family)
+    assert (
+        grammar
+        or entry.completer
+        or entry.target
+        in (
+            "minirospy.cli.main:main",
+            "minirospy.cli.completion.complete:main",
+        )
+    )
+    assert not entry.completer or callable(getattr(completers, entry.completer))
+
+
+@pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
+def test_function_takes_what_its_parser_parses(typed: str, leaf: Command | Verb) -> None:
+    parser = leaf.parser()
+    names = {
+        action.dest
+        for action in parser._actions
+        if action.dest != "help" and type(action).__name__ != "_Accepted"
     }
-    for typed, entrance in (entrances | by_verb).items():
-        module, _, function = entrance.partition(":")
-        short = module.rpartition(".")[2]
-        if short not in BY_HAND:
-            yield from parsers_of(
-                short if typed in by_verb else typed,
-                typed,
-                getattr(import_module(f"minirospy.cli.{module}"), function),
-            )
+    parameters = inspect.signature(leaf.body).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return
+    taken = {parameter.name for parameter in parameters}
+    # Launch arguments and words for CMake are taken from among the words.
+    assert names <= taken
+    assert taken - names <= {"arguments", "args", "variables", "cmake_words"}
 
 
-def parsers_of(
-    name: str, typed: str, entrance: Callable[[Sequence[str]], object]
-) -> Iterator[tuple[str, str, Parser]]:
-    takes = _takes(entrance)
-    if isinstance(takes, Family):
-        for verb in takes.verbs:
-            yield from parsers_of(takes.name, f"{typed} {verb.name}", verb.body)
-    elif typed not in _WITHOUT_WORDS:
-        assert takes, f"{typed}: neither a family of verbs nor a parser"
-        yield name, typed, takes
-
-
-def test_every_verb_and_option_is_completed() -> None:
-    """What the parsers of all commands take, whatever a later command adds: a new name goes into COMPLETED_WITH."""
-    named = [name for names in COMPLETED_WITH.values() for name in names.split()]
-    assert len(named) == len({*named})
-    used: set[str] = set()
-    for name, typed, parser in parsers():
-        options = [option for action in parser._actions for option in action.option_strings]
-        assert tab(f"{typed} -") == options
-        command, _, verb = typed.rpartition(" ")
-        assert not command or tab(typed)[0] == verb
-        for action in parser._actions:
-            if action.nargs == 0 or action.choices is not None:
-                continue
-            known = {f"{name}.{action.dest}", action.dest} & {*named}
-            assert known, (
-                f"{typed}: what completes {action.option_strings or action.dest}? See COMPLETED_WITH"
-            )
-            used |= known
-    assert used == {*named}
+@pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
+def test_every_verb_and_option_is_completed(typed: str, leaf: Command | Verb) -> None:
+    """A new argument that takes a value names its completer, or `nothing`."""
+    parser = leaf.parser()
+    assert tab(f"{typed} -") == [option for action in parser._actions for option in action.option_strings]
+    for action in parser._actions:
+        is_number = action.type in (int, float) or isinstance(action.type, FunctionType)
+        if action.nargs == 0 or action.choices is not None or is_number:
+            continue
+        name = completer_of(action)
+        assert name, f"{typed}: what completes {action.option_strings or action.dest}?"
+        assert callable(getattr(completers, name))
 
 
 def test_choices_of_an_argument() -> None:

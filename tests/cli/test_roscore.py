@@ -20,6 +20,8 @@ from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
 from tests.conftest import free_port
 
+from .conftest import own_lines
+
 BIN = Path(sys.executable).parent
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="Windows has no such signals between processes"
@@ -308,7 +310,7 @@ def test_typed_wrong(words: list[str], says: str, capsys: pytest.CaptureFixture[
     assert roscore(words) == 2
     error: Any = capsys.readouterr().err
     assert says in error
-    assert error.count("\n") == 1
+    assert len(own_lines(error)) == 1
 
 
 def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(

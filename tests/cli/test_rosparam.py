@@ -13,6 +13,8 @@ import pytest
 
 from minirospy.runtime.master_proxy import MasterProxy
 
+from .conftest import own_lines
+
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
 
@@ -122,7 +124,7 @@ def test_what_cannot_be(
     result = command("rosparam", *argv)
     assert (result.status, result.out) == (status, "")
     assert why in result.err
-    assert result.err.count("\n") == 1
+    assert len(own_lines(result.err)) == 1
 
 
 def test_names_are_resolved_in_the_namespace(

@@ -22,6 +22,8 @@ from minirospy.runtime.master_proxy import MasterProxy
 from minirospy.runtime.topics import Publication
 from minirospy.wire.tcpros import InterfaceType
 
+from .conftest import own_lines
+
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
 
@@ -84,7 +86,7 @@ def test_help_and_wrong_words(command: Any) -> None:
     for verb in ("bw", "delay", "echo", "find", "hz", "info", "list", "pub", "type"):
         status, out, _ = command("rostopic", verb, "-h")
         assert status == 0
-        assert out.startswith(f"usage: rostopic {verb}")
+        assert out.lower().startswith(f"usage: rostopic {verb}")
         assert f"\trostopic {verb}\t" in command("rostopic", "-h").out
     status, _, err = command("rostopic", "lst")
     assert status == 2
@@ -221,7 +223,7 @@ def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: 
     result = command("rostopic", "pub", *argv)
     assert (result.status, result.out) == (status, "")
     assert why in result.err
-    assert result.err.count("\n") == 1
+    assert len(own_lines(result.err)) == 1
 
 
 def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:

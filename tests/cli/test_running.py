@@ -21,6 +21,8 @@ from minirospy.errors import MasterUnreachableError
 from minirospy.runtime.master_proxy import MasterProxy
 from tests.conftest import free_port
 
+from .conftest import own_lines
+
 BIN = Path(sys.executable).parent
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
 
@@ -146,7 +148,7 @@ def test_roscore_typed_wrong(words: list[str], capsys: pytest.CaptureFixture[str
     from minirospy.cli.ros.master import roscore
 
     assert roscore(words) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert len(own_lines(capsys.readouterr().err)) == 1
 
 
 # --- rosrun
@@ -178,7 +180,7 @@ def test_rosrun_typed_wrong(
     assert rosrun.main(words) == status
     errors = capsys.readouterr().err
     assert says in errors
-    assert errors.count("\n") == 1
+    assert len(own_lines(errors)) == 1
 
 
 # --- roslaunch
@@ -282,7 +284,7 @@ def test_a_node_that_dies_is_reported(master: str, package: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "status", "says"),
     [
-        ([], 2, "say what to launch"),
+        ([], 2, "specify what to launch"),
         (["rpi_feros_bringu", "x.launch"], 1, "did you mean rpi_feros_bringup"),
         (["rpi_feros_bringup", "rpi_let.launch"], 1, "did you mean rpi_led.launch"),
         (["rpi_feros_bringup", "rpi_led"], 1, "did you mean rpi_led.launch?"),
@@ -306,7 +308,7 @@ def test_roslaunch_typed_wrong(
     assert roslaunch.main(words) == status
     errors = capsys.readouterr().err
     assert says in errors
-    assert errors.count("\n") == 1
+    assert len(own_lines(errors)) == 1
 
 
 def test_roslaunch_without_running(package: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from minirospy.cli.catkin.make import catkin, catkin_make, catkin_make_isolated
+from minirospy.cli.catkin.make import catkin_make, catkin_make_isolated
+from minirospy.cli.catkin.tool import catkin
 from minirospy.errors import BuildError, DefinitionError, ManifestError, SourceError
 from minirospy.workspace.build import Report, Workspace, build, find_workspace, read_plans
 from minirospy.workspace.packages import Packages, built_in_roots

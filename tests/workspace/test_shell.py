@@ -16,7 +16,7 @@ from typing import NamedTuple
 import pytest
 
 import minirospy
-from minirospy.cli.completion.complete import BY_HAND, ENTRANCES
+from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS
 
 SHELL = Path(minirospy.__file__).parent / "workspace" / "shell"
 BIN = Path(sys.executable).parent
@@ -355,7 +355,7 @@ def test_bash_completes_names_with_blanks(bash: Shell) -> None:
     assert bash_tab(bash, "rosed my_robot 'a ", ["rosed", "my_robot", "'a "]) == ["a map.yaml'"]
 
 
-_COMMANDS = {*ENTRANCES, *BY_HAND, "minirospy"}
+_COMMANDS = {*(entry.script for entry in COMMANDS if entry.script), *SHELL_FUNCTIONS}
 
 
 def test_bash_knows_every_command(bash: Shell) -> None:

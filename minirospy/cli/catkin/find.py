@@ -11,14 +11,22 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages, built_in_roots
 
-__all__ = ["catkin_find", "catkin_find_pkg", "catkin_topological_order"]
+__all__ = [
+    "FIND",
+    "FIND_PKG",
+    "TOPOLOGICAL_ORDER",
+    "catkin_find",
+    "catkin_find_pkg",
+    "catkin_topological_order",
+]
 
 _PLACES: dict[str, Callable[[str], str]] = {
     "bin": lambda project: "bin",
@@ -35,49 +43,56 @@ _WITH_PROJECT = ("etc", "include", "libexec", "share")
 
 
 def catkin_find(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
-    return run("catkin_find", lambda: _find(argv))
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return FIND.main(argv)
 
 
 def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status is 2, as catkin's, where there is no such package."""
-    return run("catkin_find_pkg", lambda: _find_pkg(argv))
+    """Run the command; return 2, as catkin does, where there is no such package."""
+    return FIND_PKG.main(argv)
 
 
 def catkin_topological_order(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
-    return run("catkin_topological_order", lambda: _topological_order(argv))
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return TOPOLOGICAL_ORDER.main(argv)
 
 
-def _find(argv: Sequence[str] | None) -> None:
+def _find_parser() -> Parser:
     parser = Parser(
-        "catkin_find",
-        description="Print the folders and files of a package in the workspaces that are sourced.",
+        "catkin_find", "Print the folders and files of a package in the workspaces that are sourced."
     )
-    parser.add_argument(
-        "package", nargs="?", default="", help="the package; without one, the folders themselves"
+    add = parser.add_argument
+    add(
+        "package",
+        nargs="?",
+        default="",
+        help="the package; without one, the folders themselves",
+        completer="package_names",
     )
-    parser.add_argument("path", nargs="?", default="", help="a file or folder in it")
-    parser.add_argument("--first-only", action="store_true", help="only what is found first")
-    parser.add_argument(
-        "--without-underlays", action="store_true", help="end with the first workspace that has it"
-    )
+    add("path", nargs="?", default="", help="a file or folder in it", completer="package_path")
+    add("--first-only", action="store_true", help="only what is found first")
+    add("--without-underlays", action="store_true", help="end with the first workspace that has it")
     for name in _PLACES:
-        parser.add_argument(f"--{name}", action="store_true", help=f'search in "{name}"')
-    options = parser.parse_args(argv)
-    known = _WITH_PROJECT if options.package else _WITHOUT_PROJECT
-    chosen = [name for name in _PLACES if getattr(options, name)]
+        add(f"--{name}", dest="places", action="append_const", const=name, help=f'search in "{name}"')
+    return parser
+
+
+def _find(
+    package: str, path: str, first_only: bool, without_underlays: bool, places: Sequence[str] | None
+) -> None:
+    known = _WITH_PROJECT if package else _WITHOUT_PROJECT
+    chosen = [name for name in _PLACES if name in (places or ())]
     odd = [name for name in chosen if name not in known]
     if odd:
-        which = "for a package" if options.package else "without a package"
+        which = "for a package" if package else "without a package"
         raise UsageError(f"there is no search {which} in {', '.join(odd)}")
     for workspace in _workspaces():
-        found = list(_found(workspace, chosen or known, options.package, options.path))
-        if options.first_only:
+        found = list(_found(workspace, chosen or known, package, path))
+        if first_only:
             del found[1:]
-        for path in found:
-            print(path)
-        if found and (options.first_only or options.without_underlays):
+        for each in found:
+            print(each)
+        if found and (first_only or without_underlays):
             break
 
 
@@ -104,37 +119,46 @@ def _found(workspace: Path | None, places: Sequence[str], project: str, path: st
             return
 
 
-def _find_pkg(argv: Sequence[str] | None) -> int:
-    parser = Parser("catkin_find_pkg", description="Print where a package is, below a folder.")
-    parser.add_argument("pkg", help="the package's name")
-    parser.add_argument("directory", nargs="?", default=".", help="the folder to search (default: .)")
-    options = parser.parse_args(argv)
-    base = Path(options.directory)
-    folder = Packages.below(base).folders().get(options.pkg)
+def _find_pkg_parser() -> Parser:
+    parser = Parser("catkin_find_pkg", "Print where a package is, below a folder.")
+    parser.add_argument("pkg", help="the package's name", completer="package_names")
+    parser.add_argument(
+        "directory", nargs="?", default=".", help="the folder to search (default: .)", completer="folders"
+    )
+    return parser
+
+
+def _find_pkg(pkg: str, directory: str) -> int:
+    base = Path(directory)
+    folder = Packages.below(base).folders().get(pkg)
     if folder is None:
-        print(f"Could not find package '{options.pkg}'.", file=sys.stderr)
+        print(f"Could not find package '{pkg}'.", file=sys.stderr)
         return 2
     print(os.path.relpath(folder, base))
     return 0
 
 
-def _topological_order(argv: Sequence[str] | None) -> None:
+def _topological_order_parser() -> Parser:
     parser = Parser(
-        "catkin_topological_order",
-        description="Print the packages below a folder in the order to build them in.",
+        "catkin_topological_order", "Print the packages below a folder in the order to build them in."
     )
-    parser.add_argument("workspace", nargs="?", default=".", help="the folder (default: .)")
+    parser.add_argument(
+        "workspace", nargs="?", default=".", help="the folder (default: .)", completer="folders"
+    )
     only = parser.add_mutually_exclusive_group()
     only.add_argument("--only-folders", action="store_true", help="print their folders")
     only.add_argument("--only-names", action="store_true", help="print their names")
-    options = parser.parse_args(argv)
-    base = Path(options.workspace)
+    return parser
+
+
+def _topological_order(workspace: str, only_folders: bool, only_names: bool) -> None:
+    base = Path(workspace)
     if not base.is_dir():
         raise MinirospyError(f'Workspace "{base}" does not exist')
     folders = Packages.below(base).folders()
     for name in _ordered(folders):
         folder = os.path.relpath(folders[name], base)
-        print(folder if options.only_folders else name if options.only_names else f"{name} {folder}")
+        print(folder if only_folders else name if only_names else f"{name} {folder}")
 
 
 def _ordered(folders: Mapping[str, Path]) -> list[str]:
@@ -143,3 +167,8 @@ def _ordered(folders: Mapping[str, Path]) -> list[str]:
     except CircularDependencyError as error:
         circle = " -> ".join(error.circle)
         raise MinirospyError(f"packages depend on each other in a circle: {circle}") from error
+
+
+FIND = Command("catkin_find", _find_parser, _find)
+FIND_PKG = Command("catkin_find_pkg", _find_pkg_parser, _find_pkg)
+TOPOLOGICAL_ORDER = Command("catkin_topological_order", _topological_order_parser, _topological_order)

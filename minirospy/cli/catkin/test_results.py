@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
 
-__all__ = ["Counts", "main", "read_counts", "results_below"]
+__all__ = ["COMMAND", "Counts", "main", "read_counts", "results_below"]
 
 _LINE = "-" * 49
 _SKIPPED = ("skip", "skipped", "disabled")
@@ -42,8 +43,8 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; 0 all passed, 1 errors or failures, or no such folder."""
-    return run("catkin_test_results", lambda: _results(sys.argv[1:] if argv is None else argv))
+    """Run the command; return 0 where all passed, 1 after errors or failures, or where there is no such folder."""
+    return COMMAND.main(argv)
 
 
 def read_counts(file: Path) -> Counts:
@@ -74,21 +75,29 @@ def results_below(folder: Path) -> Iterator[tuple[Path, Counts | ValueError]]:
             yield file, error
 
 
-def _results(argv: Sequence[str]) -> int:
+def _parser() -> Parser:
     parser = Parser(
         prog="catkin_test_results",
         description="Outputs a summary of the test results. If there are any test errors or failures the exit "
         "status is 1.",
     )
     parser.add_argument(
-        "test_results_dir", nargs="?", type=Path, default=Path(), help="the folder (default: the current one)"
+        "test_results_dir",
+        nargs="?",
+        type=Path,
+        default=Path(),
+        help="the folder (default: the current one)",
+        completer="folders",
     )
     parser.add_argument(
         "--all", action="store_true", help="show also files without errors and failures, and those left out"
     )
     parser.add_argument("--verbose", action="store_true", help="show the files with errors or failures")
-    options = parser.parse_args(argv)
-    folder: Path = options.test_results_dir
+    return parser
+
+
+def _results(test_results_dir: Path, all: bool, verbose: bool) -> int:
+    folder = test_results_dir
     if not folder.is_dir():
         raise MinirospyError(f'Test results directory "{folder}" does not exist')
     found = [(file, file.relative_to(folder), counts) for file, counts in results_below(folder)]
@@ -96,19 +105,21 @@ def _results(argv: Sequence[str]) -> int:
     for file, name, counts in found:
         if isinstance(counts, Counts):
             total = total.plus(counts)
-            if options.verbose and counts.is_bad:
+            if verbose and counts.is_bad:
                 text = file.read_text(encoding="utf-8", errors="replace")
                 print(f"Full test results for '{name}'\n{_LINE}\n{text}\n{_LINE}")
-        elif options.all:
+        elif all:
             print(f'Skipping "{name}": {counts}')
     for _, name, counts in found:
         if isinstance(counts, Counts) and (counts.is_bad or counts.skipped):
             print(f"{name}: {counts}")
-        elif isinstance(counts, Counts) and options.all:
+        elif isinstance(counts, Counts) and all:
             print(f"{name}: {counts.tests} tests")
     print(f"Summary: {total}")
     return int(total.is_bad)
 
+
+COMMAND = Command("catkin_test_results", _parser, _results)
 
 if __name__ == "__main__":
     sys.exit(main())

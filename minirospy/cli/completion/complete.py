@@ -5,104 +5,35 @@ the cursor; candidates go out as the shell is to insert them: quoted where they 
 each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none). One that ends in ``/`` or ``=``
 goes on; after any other comes a space.
 
-Verbs and options are asked of the command's own parser: there is no second list of them. What an argument, or an
-option's value, is completed with, its name in that parser says: see :data:`COMPLETED_WITH`. Nothing here ends in an
-error, and a master is waited for no longer than a person does. Source: http://wiki.ros.org/rosbash#Tab_completion.
+Verbs and options come from the command's own parser: there is no second list of them. So does what completes an
+argument or an option's value: see minirospy.cli.parser.Parser.add_argument. Nothing here ends in an error, and the
+answer of a master is awaited no longer than a person waits. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib
-import io
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.cli.command import Parser
 from minirospy.cli.completion import completers
-from minirospy.cli.completion.completers import Place, Source, Text
+from minirospy.cli.completion.completers import Completer, Place, Text
+from minirospy.cli.parser import completer_of
+from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
 from minirospy.cli.verbs import Family
 from minirospy.errors import MinirospyError
 
 if TYPE_CHECKING:
     import argparse
 
+    from minirospy.cli.parser import Parser
+    from minirospy.cli.verbs import Command, Verb
 
-__all__ = ["BY_HAND", "COMPLETED_WITH", "ENTRANCES", "candidates", "main"]
 
-ENTRANCES = {
-    "roscore": "ros.master:roscore", "rosmaster": "ros.master:rosmaster", "roslaunch": "ros.roslaunch:main",
-    "roslaunch-deps": "ros.roslaunch_deps:main", "roslaunch-logs": "ros.roslaunch_logs:main", "rosdep": "ros.rosdep:main",
-    "rostopic": "ros.rostopic:main", "rosnode": "ros.rosnode:main", "rosservice": "ros.rosservice:main",
-    "rosparam": "ros.rosparam:main", "rosmsg": "ros.rosmsg:main", "rossrv": "ros.rosmsg:main_srv",
-    "rosmsg-proto": "ros.rosmsg_proto:main", "rosconsole": "ros.rosconsole:main", "rosgraph": "ros.rosgraph:main",
-    "rosclean": "ros.rosclean:main", "rosversion": "ros.rosversion:main", "roswtf": "doctor:roswtf",
-    "rostest": "ros.rostest:rostest", "rosunit": "ros.rostest:rosunit", "catkin": "catkin.make:catkin",
-    "catkin_make": "catkin.make:catkin_make", "catkin_make_isolated": "catkin.make:catkin_make_isolated",
-    "catkin_create_pkg": "catkin.make:catkin_create_pkg", "catkin_init_workspace": "catkin.make:catkin_init_workspace",
-    "catkin_find": "catkin.find:catkin_find", "catkin_find_pkg": "catkin.find:catkin_find_pkg",
-    "catkin_topological_order": "catkin.find:catkin_topological_order",
-    "catkin_test_results": "catkin.test_results:main",
-}  # fmt: skip
-"""Command -> where its parser is made: ``module:function`` of this folder, as in pyproject.toml."""
-
-BY_HAND: dict[str, Source] = {
-    "roscd": completers.package_folders,
-    "rospd": completers.package_folders,
-    "rosls": completers.package_folders,
-    "rosed": completers.package_file,
-    "roscat": completers.package_file,
-    "roscp": completers.package_file_and_target,
-    "rosmv": completers.package_file_and_target,
-    "rosrun": completers.rosrun_words,
-    "rospack": completers.rospack_words,
-    "rosstack": completers.rosstack_words,
-}
-"""Commands that read their words without a parser."""
-
-COMPLETED_WITH: dict[Source, str] = {
-    # of the graph, as it is now
-    completers.topics: "topic topics rostopic.namespace",
-    completers.topic_type: "rostopic.type",
-    completers.message_text: "rostopic.args",
-    completers.nodes: "node nodes rosnode.namespace",
-    completers.machines: "machine",
-    completers.services: "service rosservice.namespace",
-    completers.request_text: "rosservice.args",
-    completers.parameters: "parameter rosparam.namespace",
-    completers.parameter_value: "rosparam.value",
-    completers.loggers: "logger",
-    # of the packages
-    completers.message_types: "type",
-    completers.service_types: "rosservice.type rossrv.type",
-    completers.prototype_types: "rosmsg-proto.type",
-    completers.package_names: "package packages pkg only_pkg_with_deps dependencies catkin_deps "
-    "blacklist whitelist start_with",
-    completers.package_path: "catkin_find.path",
-    completers.build_targets: "targets",
-    completers.launch_words: "roslaunch.what rostest.what",
-    completers.launch_nodes: "roslaunch.args roslaunch.find_node",
-    completers.launch_files: "others roslaunch-deps.files",
-    # of this computer
-    completers.files: "file files textfile binfile bag pid arguments",
-    completers.folders: "build devel directory extend folder from_paths install_space pkgdir results_base_dir source "
-    "test_results_dir workspace",
-    # what there is to choose from
-    completers.pins: "pin",
-    completers.shells: "shell",
-    completers.kinds: "mode",
-    # numbers, names to be made up, expressions
-    completers.nothing: "ahead allow author boost_comps catkin_make_args child cmake_args count dependency_types description "
-    "exclude_slots filter j jobs keys left license load_average maintainer make_args mem_limit name numworkers os p "
-    "parallel_packages pkg_version port prefix presses rate results_filename rosdistro run_id server_uri sigint_timeout "
-    "sigterm_timeout size skip_keys sys_deps time_limit timeout width window",
-}
-"""Source -> what arguments and options are called (argparse's ``dest``) that it completes; ``command.name``: of that one."""
-
-_SOURCES = {name: source for source, names in COMPLETED_WITH.items() for name in names.split()}
+__all__ = ["candidates", "main"]
 
 _NUMBER = re.compile(r"-\.?\d")
 _VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
@@ -119,14 +50,6 @@ class _Word(NamedTuple):
     text: str
     quote: str
     at: int
-
-
-class _Asked(Exception):
-    """Raised in place of running a command: its family of verbs, or its parser."""
-
-    def __init__(self, answer: Family | Parser) -> None:
-        super().__init__()
-        self.answer = answer
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -164,103 +87,76 @@ def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> l
 def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
     if command == "minirospy":
         return _of_minirospy(before, word)
-    if command in BY_HAND:
-        return BY_HAND[command](Place("", tuple(before), word))
-    if command not in ENTRANCES:
-        return ()
-    module, _, function = ENTRANCES[command].partition(":")
-    return _of_module(command, module, function, before, word)
+    if command in SHELL_FUNCTIONS:
+        return _completer(SHELL_FUNCTIONS[command])(Place("", tuple(before), word))
+    entry = find_script(command)
+    return _of_entry(entry, before, word) if entry else ()
 
 
 def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
-    from minirospy.cli.main import _VERBS
-
     if not before:
-        return _OPTIONS if word.startswith("-") else [name for name, verb in _VERBS.items() if verb.summary]
-    entry = _VERBS.get(before[0])
-    if entry is None:
-        return ()
-    name = entry.module.rpartition(".")[2]
-    if name in BY_HAND:
-        return _of_command(name, before[1:], word)
-    return _of_module(name, entry.module, entry.function, before[1:], word)
+        verbs = [entry.verb for entry in COMMANDS if entry.verb and entry.summary]
+        return _OPTIONS if word.startswith("-") else verbs
+    entry = find_verb(before[0])
+    return _of_entry(entry, before[1:], word) if entry else ()
 
 
-def _of_module(command: str, module: str, function: str, before: list[str], word: str) -> Iterable[str]:
-    """The candidates for a command whose parser, or verbs, its own module makes."""
-    takes = _takes(getattr(importlib.import_module(f"minirospy.cli.{module}"), function))
+def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
+    """Return the candidates for a command's next word, by its own parser."""
+    if entry.completer:
+        return _completer(entry.completer)(Place("", tuple(before), word))
+    grammar: Command | Family | Verb | None = entry.load_grammar()
     verb = ""
-    while isinstance(takes, Family):
+    while isinstance(grammar, Family):
         if not before:
-            return _OPTIONS[:2] if word.startswith("-") else [each.name for each in takes.verbs]
-        command, verb, *before = takes.name, *before
-        bodies = [each.body for each in takes.verbs if each.name == verb]
-        takes = _takes(bodies[0]) if bodies else None
-    return _of_parser(takes, command, verb, before, word) if takes else ()
+            names = [grammar.verb_name(each) for each in grammar.verbs]
+            return _OPTIONS[:2] if word.startswith("-") else names
+        verb, *before = before
+        grammar = grammar.find(verb)
+    return _of_parser(grammar.parser(), verb, before, word) if grammar else ()
 
 
-def _takes(entrance: Callable[[Sequence[str]], object]) -> Family | Parser | None:
-    """What a command takes, from itself: it is stopped where it would read its words."""
-
-    def stop(self: Any, *_: object, **__: object) -> None:
-        raise _Asked(self)
-
-    doors: tuple[tuple[Any, str], ...] = ((Family, "main"), (Parser, "parse_known_args"))
-    kept = [owner.__dict__.get(name) for owner, name in doors]
-    silence = io.StringIO()
-    try:
-        for owner, name in doors:
-            setattr(owner, name, stop)
-        with contextlib.redirect_stdout(silence), contextlib.redirect_stderr(silence):
-            # Of a command that reads its words another way, -h does no harm.
-            entrance(["-h"])
-    except _Asked as asked:
-        return asked.answer
-    except SystemExit:
-        pass
-    finally:
-        for (owner, name), before in zip(doors, kept, strict=True):
-            if before is None:
-                delattr(owner, name)
-            else:
-                setattr(owner, name, before)
-    return None
-
-
-def _of_parser(parser: Parser, command: str, verb: str, before: list[str], word: str) -> Iterable[str]:
-    """The candidates for the next word of a parser's command line."""
+def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Iterable[str]:
+    """Return the candidates for the next word of a parser's command line."""
     options = {name: action for action in parser._actions for name in action.option_strings}
     given: list[str] = []
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # An option that may stand alone has a number: no candidate of what follows.
+            # An option that may stand alone has a number: not a candidate of what follows.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None
         elif (not each.startswith("-") or _NUMBER.match(each)) and ":=" not in each:
             given.append(each)
+
     place = Place(verb, tuple(given), word)
     if word.startswith("-") and not _NUMBER.match(word):
         name, assigned, value = word.partition("=")
         if assigned and name in options:
-            found = _of_action(options[name], command, place._replace(word=value))
+            found = _of_action(options[name], place._replace(word=value))
             return [f"{name}={each}" for each in found]
         return [name for name in options if name not in before]
     if pending is not None:
-        return _of_action(pending, command, place)
+        return _of_action(pending, place)
+
     positionals = [action for action in parser._actions if not action.option_strings]
     at = len(given)
     if positionals and at >= len(positionals) and positionals[-1].nargs in ("+", "*", "..."):
         at = len(positionals) - 1
-    return _of_action(positionals[at], command, place) if at < len(positionals) else ()
+    return _of_action(positionals[at], place) if at < len(positionals) else ()
 
 
-def _of_action(action: argparse.Action, command: str, place: Place) -> Iterable[str]:
+def _of_action(action: argparse.Action, place: Place) -> Iterable[str]:
     if action.choices is not None:
         return [str(choice) for choice in action.choices]
-    source = _SOURCES.get(f"{command}.{action.dest}") or _SOURCES.get(action.dest)
-    return source(place) if source else ()
+    name = completer_of(action)
+    return _completer(name)(place) if name else ()
+
+
+def _completer(name: str) -> Completer:
+    completer: Completer = getattr(completers, name)
+    return completer
 
 
 # --- words as shells write them

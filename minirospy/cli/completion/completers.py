@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "LIVE_SECONDS", "Place", "Source", "Text", "build_targets", "files", "folders", "kinds", "launch_files",
+    "LIVE_SECONDS", "Completer", "Place", "Text", "build_targets", "files", "folders", "kinds", "launch_files",
     "launch_nodes", "launch_words", "loggers", "machines", "message_text", "message_types", "nodes",
     "nothing", "on_one_line", "package_file", "package_file_and_target", "package_folders", "package_names",
     "package_path", "parameter_value", "parameters", "pins", "prototype_types", "request_text",
@@ -52,7 +52,7 @@ class Text(str):
     __slots__ = ()
 
 
-Source = Callable[[Place], Iterable[str]]
+Completer = Callable[[Place], Iterable[str]]
 
 
 def nothing(_: Place) -> Iterable[str]:

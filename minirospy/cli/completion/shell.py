@@ -7,31 +7,40 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import UsageError
 from minirospy.workspace.build import own_set_up
 from minirospy.workspace.setup_files import SHELLS, shell_text
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return COMMAND.main(argv)
 
-    def body() -> None:
-        parser = Parser(
-            "minirospy shell",
-            description='Print what a shell is to evaluate, for example in ~/.bashrc: eval "$(minirospy shell)"',
-        )
-        parser.add_argument(
-            "shell", nargs="?", help=f"{', '.join(SHELLS)} (default: the one that SHELL names)"
-        )
-        options = parser.parse_args(argv)
-        shell = (
-            options.shell or Path(os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")).stem
-        )
-        if shell not in SHELLS:
-            raise UsageError(f"there is nothing for the shell [{shell}], only for {', '.join(SHELLS)}")
-        sys.stdout.write(shell_text(shell, own_set_up(Path(), (), ())))
 
-    return run("minirospy shell", body)
+def _parser() -> Parser:
+    parser = Parser(
+        "minirospy shell",
+        'Print what a shell is to evaluate, for example in ~/.bashrc: eval "$(minirospy shell)"',
+    )
+    parser.add_argument(
+        "shell",
+        nargs="?",
+        help=f"{', '.join(SHELLS)} (default: the one that SHELL names)",
+        completer="shells",
+    )
+    return parser
+
+
+def _shell(shell: str | None) -> None:
+    default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
+    name = shell or Path(default).stem
+    if name not in SHELLS:
+        raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")
+    sys.stdout.write(shell_text(name, own_set_up(Path(), (), ())))
+
+
+COMMAND = Command("minirospy shell", _parser, _shell)

@@ -10,11 +10,12 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
 from minirospy.cli.ros.form import ask_for, fields, flow
+from minirospy.cli.verbs import Command
 from minirospy.errors import ROSException, UsageError
 
-__all__ = ["action_class", "main", "read_answer"]
+__all__ = ["COMMAND", "action_class", "main", "read_answer"]
 
 _BAR = 30
 _CANCEL_SECONDS = 10.0
@@ -22,49 +23,68 @@ _SLICE_SECONDS = 0.25
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status: 0 where the goal succeeded."""
-    return run("axclient.py", lambda: _axclient(argv))
+    """Run the command; return 0 where the goal succeeded."""
+    return COMMAND.main(argv)
 
 
-def _axclient(argv: Sequence[str] | None) -> int:
-    parser = Parser(
+class NodeParser(Parser):
+    """Leaves out the remapping arguments, which the node reads itself."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name. Raises CommandLineError."""
+        from minirospy import client as rospy
+
+        return super().parse(rospy.myargv(["", *words])[1:])
+
+
+def _parser() -> Parser:
+    parser = NodeParser(
         "axclient.py",
         description="Send a goal to an action server: asks for each field, shows the feedback, prints the result. "
         "Ctrl-C cancels the goal.",
     )
-    parser.add_argument("action", help="the server's name, as /run_led")
+    parser.add_argument("action", help="the server's name, as /run_led", completer="nothing")
     parser.add_argument(
-        "type", nargs="?", help="the action's type, as rpi_msgs/runningLed; found by the server's topics"
+        "type",
+        nargs="?",
+        help="the action's type, as rpi_msgs/runningLed; found by the server's topics",
+        completer="message_types",
     )
     parser.add_argument(
-        "goal", nargs="?", help="the goal as YAML, instead of the questions: '{numberOfRuns: 3}'"
+        "goal",
+        nargs="?",
+        help="the goal as YAML, instead of the questions: '{numberOfRuns: 3}'",
+        completer="nothing",
     )
     parser.add_argument("-t", "--timeout", type=float, metavar="SEC", help="how long to wait for the server")
+    return parser
+
+
+def _axclient(action: str, type: str | None, goal: str | None, timeout: float | None) -> int:
     from minirospy import client as rospy
 
-    options = parser.parse_args(rospy.myargv(argv)[0 if argv is not None else 1 :])
-    if options.goal is None and options.type and options.type.lstrip().startswith("{"):
-        options.type, options.goal = None, options.type
+    if goal is None and type and type.lstrip().startswith("{"):
+        type, goal = None, type
     # Ctrl-C is to cancel the goal first.
     rospy.init_node("axclient", anonymous=True, disable_signals=True, disable_rosout=True)
-    action = rospy.resolve_name(options.action)
-    cls = action_class(options.type or _found_type(action, options.timeout))
+    name = rospy.resolve_name(action)
+    cls = action_class(type or _found_type(name, timeout))
     from minirospy.actionlib import SimpleActionClient
 
-    client = SimpleActionClient(action, cls)
+    client = SimpleActionClient(name, cls)
     if not client.wait_for_server(rospy.Duration.from_sec(0.5)):
-        print(f"Waiting for an action server at {action} ...", flush=True)
-        if not client.wait_for_server(rospy.Duration.from_sec(options.timeout or 0.0)):
-            raise ROSException(f"no action server at {action}")
-    goal = client.action_client.ActionGoal().goal
-    if options.goal is not None:
+        print(f"Waiting for an action server at {name} ...", flush=True)
+        if not client.wait_for_server(rospy.Duration.from_sec(timeout or 0.0)):
+            raise ROSException(f"no action server at {name}")
+    message = client.action_client.ActionGoal().goal
+    if goal is not None:
         from minirospy.introspect.messages import check, fill
         from minirospy.introspect.values import parse_value
 
-        check(fill(goal, [parse_value(options.goal)]))
+        check(fill(message, [parse_value(goal)]))
     else:
-        ask_for(goal, read_answer, _complain)
-    return _Progress(client, goal).run()
+        ask_for(message, read_answer, _complain)
+    return _Progress(client, message).run()
 
 
 def action_class(type_: str) -> type[Any]:
@@ -196,3 +216,6 @@ def progress(goal: Any, feedback: Any) -> float | None:
     if len(wanted) != 1 or len(reached) != 1 or not 0 <= reached[0] <= wanted[0] or not wanted[0]:
         return None
     return float(reached[0] / wanted[0])
+
+
+COMMAND = Command("axclient.py", _parser, _axclient)

@@ -10,40 +10,45 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from minirospy.cli.command import Parser, run
-from minirospy.cli.ros.axclient import action_class, read_answer
+from minirospy.cli.parser import Parser
+from minirospy.cli.ros.axclient import NodeParser, action_class, read_answer
 from minirospy.cli.ros.form import ask_for
+from minirospy.cli.verbs import Command
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 _SLICE_SECONDS = 0.25
 _CHOICES = "f(eedback) s(ucceed) a(bort) p(reempted)? "
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return run("axserver.py", lambda: _axserver(argv))
+    """Run the command; return its exit status."""
+    return COMMAND.main(argv)
 
 
-def _axserver(argv: Sequence[str] | None) -> None:
-    parser = Parser(
-        "axserver.py", description="Serve an action; you answer each goal. Ends by Ctrl-C or the input's end."
+def _parser() -> Parser:
+    parser = NodeParser(
+        "axserver.py",
+        description="Serve an action; you answer each goal. Ends by Ctrl-C or the input's end.",
     )
-    parser.add_argument("action", help="the server's name, as /run_led")
-    parser.add_argument("type", help="the action's type, as rpi_msgs/runningLed")
+    parser.add_argument("action", help="the server's name, as /run_led", completer="nothing")
+    parser.add_argument("type", help="the action's type, as rpi_msgs/runningLed", completer="message_types")
+    return parser
+
+
+def _axserver(action: str, type: str) -> None:
     from minirospy import client as rospy
     from minirospy.actionlib import SimpleActionServer
     from minirospy.idl.message import strify_message
 
-    options = parser.parse_args(rospy.myargv(argv)[0 if argv is not None else 1 :])
-    cls = action_class(options.type)
+    cls = action_class(type)
     rospy.init_node("axserver", anonymous=True, disable_signals=True, disable_rosout=True)
-    server = SimpleActionServer(options.action, cls, auto_start=False)
+    server = SimpleActionServer(action, cls, auto_start=False)
     news = threading.Event()
     server.register_goal_callback(news.set)
     server.register_preempt_callback(lambda: print("\nA client wants the goal preempted.", flush=True))
     server.start()
-    print(f"Serving {rospy.resolve_name(options.action)} ({cls._type})", flush=True)
+    print(f"Serving {rospy.resolve_name(action)} ({cls._type})", flush=True)
     while True:
         while not news.wait(_SLICE_SECONDS):
             # In slices: a Ctrl-C just before a wait would be seen at its end only.
@@ -79,3 +84,6 @@ def _answer(server: Any) -> bool:
 
 def _complain(error: Exception) -> None:
     print(error, file=sys.stderr)
+
+
+COMMAND = Command("axserver.py", _parser, _axserver)

@@ -5,7 +5,6 @@ Source: http://wiki.ros.org/roscore.
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import contextlib
 import logging
@@ -15,12 +14,16 @@ import sys
 import threading
 import uuid
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import minirospy
 from minirospy import private_files
-from minirospy.cli.command import Parser, run, warn
-from minirospy.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment, is_local, is_own_host
+from minirospy.cli.command import warn
+from minirospy.cli.parser import Misuse, Parser, attach_completer
+from minirospy.cli.verbs import Command
+from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
 from minirospy.runtime.access import Access, listening_lines
 from minirospy.runtime.log_file import LogFile
@@ -31,7 +34,7 @@ from minirospy.runtime.rosout import RosoutNode
 from minirospy.runtime.rpc_client import RpcClient
 from minirospy.runtime.rpc_server import is_address_in_use
 
-__all__ = ["main", "roscore", "rosmaster"]
+__all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 _LEVELS = {
@@ -43,96 +46,157 @@ _LEVELS = {
 }
 
 
+class _Options(NamedTuple):
+    """What the command line asks of a master that is started."""
+
+    verbose: bool
+    quiet: bool
+    no_journal: bool
+    fresh: bool
+    no_rosout: bool
+    master_logger_level: str | None
+    timeout: float
+
+
 def roscore(argv: Sequence[str] | None = None) -> int:
-    """The command `roscore`."""
-    return _command("roscore", argv)
+    """Run the command `roscore`; return its exit status."""
+    return ROSCORE.main(argv)
 
 
 def rosmaster(argv: Sequence[str] | None = None) -> int:
-    """The command `rosmaster`: a roscore without the /rosout node."""
-    return _command("rosmaster", [*(sys.argv[1:] if argv is None else argv), "--no-rosout"])
+    """Run the command `rosmaster`, a roscore without the /rosout node; return its exit status."""
+    return ROSMASTER.main(argv)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command `minirospy master`."""
-    return _command("minirospy master", argv)
+    """Run the command `minirospy master`; return its exit status."""
+    return MASTER.main(argv)
 
 
-def _command(name: str, argv: Sequence[str] | None) -> int:
-    parser = Parser(
-        prog=name, description="Starts the ROS master, the parameter server and the /rosout node."
+class _MasterParser(Parser):
+    """Leaves out the remapping arguments that a launch file may add."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name. Raises CommandLineError."""
+        return super().parse([word for word in words if ":=" not in word])
+
+
+def _parser(name: str) -> Parser:
+    parser = _MasterParser(
+        name,
+        "Starts the ROS master, the parameter server and the /rosout node.",
+        f"{name} [options]",
+        about="roscore will start up a ROS Master, a ROS Parameter Server and a rosout logging node",
     )
-    parser.add_argument(
-        "-p", "--port", type=int, help=f"port (default: of ROS_MASTER_URI, else {DEFAULT_MASTER_PORT})"
+    add = parser.add_argument
+    add("-p", "--port", type=int, help="master port. Only valid if master is launched")
+    add("-v", dest="verbose", action="store_true", help="verbose printing")
+    # One loop serves every client, in one process.
+    parser.accept(
+        "-w",
+        "--numworkers",
+        nargs=None,
+        type=float,
+        metavar="NUM_WORKERS",
+        help="override number of worker threads",
     )
-    parser.add_argument("-v", "--verbose", action="store_true", help="print each registration")
-    parser.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors and warnings")
-    parser.add_argument("--status", action="store_true", help="say how the running master is, and end")
-    parser.add_argument(
+    add(
+        "-t",
+        "--timeout",
+        type=float,
+        default=3.0,
+        help="override the socket connection timeout (in seconds).",
+    )
+    add(
+        "--master-logger-level",
+        choices=_LEVELS,
+        metavar="MASTER_LOGGER_LEVEL",
+        help="set rosmaster.master logger level ('debug', 'info', 'warn', 'error', 'fatal')",
+    )
+    parser.accept(
+        "--sigint-timeout",
+        nargs=None,
+        type=float,
+        metavar="SIGINT_TIMEOUT",
+        help="the SIGINT timeout used when killing the core (in seconds).",
+    )
+    parser.accept(
+        "--sigterm-timeout",
+        nargs=None,
+        type=float,
+        metavar="SIGTERM_TIMEOUT",
+        help="the SIGTERM timeout used when killing core if SIGINT does not stop the core (in seconds).",
+    )
+    _add_own_options(parser)
+    return parser
+
+
+def _add_own_options(parser: Parser) -> None:
+    add = parser.own_options().add_argument
+    add("--verbose", action="store_true", help="print each registration")
+    add("-q", "--quiet", action="store_true", help="print nothing but errors and warnings")
+    add("--status", action="store_true", help="print the state of the running master, and exit")
+    allow = add(
         "--allow",
         action="append",
         default=[],
         metavar="NETWORK",
         help="only these may connect, as 192.168.65.0/24 (again for more; default: MINIROSPY_ALLOW, else all)",
     )
-    parser.add_argument(
+    attach_completer(allow, "nothing")
+    add(
         "--local",
         action="store_true",
         help="listen on loopback and refuse other machines, as MINIROSPY_LOCAL=1 has it for nodes and commands too",
     )
-    parser.add_argument(
+    add(
         "--no-journal",
         action="store_true",
         help="keep no file of the graph: a master that is killed forgets it",
     )
-    parser.add_argument(
-        "--fresh", action="store_true", help="start empty, whatever a master that was killed has left"
-    )
-    parser.add_argument("--no-rosout", action="store_true", help="without the /rosout node, as rosmaster")
-    parser.add_argument(
-        "--master-logger-level",
-        choices=_LEVELS,
-        metavar="LEVEL",
-        help=f"what goes into master.log: {', '.join(_LEVELS)} (default: info)",
-    )
-    parser.add_argument(
-        "-t",
-        "--timeout",
-        type=float,
-        default=3.0,
-        metavar="S",
-        help="seconds that a node has to take a call (default: 3)",
-    )
-    # Options of ROS's roscore that ask for nothing here: one loop serves every client, in one process.
-    parser.add_argument("--core", action="store_true", help="accepted, without effect")
-    for words in (("-w", "--numworkers"), ("--sigint-timeout",), ("--sigterm-timeout",)):
-        parser.add_argument(*words, type=float, metavar="N", help="accepted, without effect")
+    add("--fresh", action="store_true", help="start empty, whatever a master that was killed has left")
+    add("--no-rosout", action="store_true", help="without the /rosout node, as rosmaster")
+    parser.accept("--core", group=parser.own_options())
 
-    def body() -> int:
-        arguments = [a for a in (sys.argv[1:] if argv is None else argv) if ":=" not in a]
-        options = parser.parse_args(arguments)
-        environment = _environment(local=options.local)
-        port = environment.master_address[1] if options.port is None else options.port
-        if not 0 <= port < 65536:
-            parser.error(f"port {port} is not between 0 and 65535")
-        if options.status:
-            return _status(Environment.read(), port)
-        if not options.timeout > 0:
-            parser.error("the timeout is more than 0 seconds")
-        if not all(each.strip(" ,") for each in options.allow):
-            # A variable that is not set, perhaps: surely not what lets everybody in.
-            parser.error("--allow wants a network, as 192.168.65.0/24, or an address")
-        if environment.local:
-            _warn_of_contradictions(environment, options)
-        else:
-            environment = environment._replace(allow=",".join(options.allow) or environment.allow)
-        loop = new_event_loop()
-        try:
-            return loop.run_until_complete(_serve(name, environment, port, options))
-        finally:
-            loop.close()
 
-    return run(name, body)
+def _master(
+    name: str,
+    *,
+    port: int | None,
+    verbose: bool,
+    quiet: bool,
+    status: bool,
+    allow: Sequence[str],
+    local: bool,
+    no_journal: bool,
+    fresh: bool,
+    no_rosout: bool,
+    master_logger_level: str | None,
+    timeout: float,
+) -> int:
+    environment = _environment(local=local)
+    if port is None:
+        port = environment.master_address[1]
+    if not 0 <= port < 65536:
+        raise Misuse(f"port {port} is not between 0 and 65535")
+    if status:
+        return _status(Environment.read(), port)
+    if not timeout > 0:
+        raise Misuse("the timeout is more than 0 seconds")
+    if not all(each.strip(" ,") for each in allow):
+        # A variable that is not set, perhaps: surely not what lets everybody in.
+        raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
+
+    if environment.local:
+        _warn_of_contradictions(environment, allow, local=local)
+    else:
+        environment = environment._replace(allow=",".join(allow) or environment.allow)
+    options = _Options(verbose, quiet, no_journal, fresh, no_rosout, master_logger_level, timeout)
+    loop = new_event_loop()
+    try:
+        return loop.run_until_complete(_serve(name, environment, port, options))
+    finally:
+        loop.close()
 
 
 def _environment(*, local: bool) -> Environment:
@@ -144,20 +208,21 @@ def _environment(*, local: bool) -> Environment:
     return environment.on_this_machine() if local else environment
 
 
-def _warn_of_contradictions(environment: Environment, options: argparse.Namespace) -> None:
+def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
     """Name, in one line, what asks for other machines and has no effect in a local master."""
-    asked = ["--allow"] if options.allow else []
+    asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
         host = os.environ.get(name, "")
         if host and environment._replace(host=host).bind_host in ("0.0.0.0", "::"):
             asked.append(f"{name}={host}")
+
     if asked:
-        how = "--local" if options.local else "MINIROSPY_LOCAL=1"
+        how = "--local" if local else "MINIROSPY_LOCAL=1"
         warn(f"{how} keeps the master on this machine: {', '.join(asked)} has no effect")
 
 
-async def _serve(name: str, environment: Environment, port: int, options: argparse.Namespace) -> int:
+async def _serve(name: str, environment: Environment, port: int, options: _Options) -> int:
     access = Access.parse(environment.allow)
     journal = None if options.no_journal or not port else environment.home / "master" / f"journal-{port}"
     master = Master(
@@ -416,6 +481,17 @@ def _log_to_file(
         latest.unlink(missing_ok=True)
         latest.symlink_to(folder.name)
     return path, say
+
+
+def _rosmaster(**options: Any) -> int:
+    return _master("rosmaster", **{**options, "no_rosout": True})
+
+
+ROSCORE = Command("roscore", partial(_parser, "roscore"), partial(_master, "roscore"))
+ROSMASTER = Command("rosmaster", partial(_parser, "rosmaster"), _rosmaster)
+MASTER = Command(
+    "minirospy master", partial(_parser, "minirospy master"), partial(_master, "minirospy master")
+)
 
 
 if __name__ == "__main__":

@@ -13,11 +13,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.cli.command import Parser
+from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import MinirospyError, UsageError
 
-__all__ = ["disk_usage", "human_size", "main"]
+__all__ = ["FAMILY", "disk_usage", "human_size", "main"]
 
 _MEGABYTE = 1024 * 1024
 _BLOCK = 4096
@@ -29,38 +29,53 @@ class _Logs(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
-def _check(argv: Sequence[str]) -> None:
-    Parser("rosclean check", description="Print how much the log files take.").parse_args(argv)
+def _check_parser() -> Parser:
+    return Parser("rosclean check", "Print how much the log files take.")
+
+
+def _check() -> None:
     for folder, label in _places():
         print(f"{human_size(disk_usage(folder))} {label}")
 
 
-def _purge(argv: Sequence[str]) -> None:
-    parser = Parser("rosclean purge", description="Remove log files; asks before it does.")
+def _purge_parser() -> Parser:
+    parser = Parser("rosclean purge", "Remove log files; asks before it does.")
     parser.add_argument("-y", dest="yes", action="store_true", help="remove them without a question")
     parser.add_argument("--size", type=int, metavar="MB", help="keep the newest, so many MB of them")
-    options = parser.parse_args(argv)
-    if options.size is not None and options.size < 0:
-        raise UsageError(f"--size {options.size} is less than nothing")
+    return parser
+
+
+def _purge(yes: bool, size: int | None) -> None:
+    if size is not None and size < 0:
+        raise UsageError(f"--size {size} is less than nothing")
     for logs in _places():
-        if options.size is None:
-            print(f"Purging {logs.label}.", flush=True)
-            if options.yes or _agreed(f"rm -rf {logs.folder}"):
-                _remove(logs.folder)
-            continue
-        size = _size(logs.folder)
-        if size <= options.size * _MEGABYTE:
-            print(f"Directory size of {logs.label} is {size // _MEGABYTE} MB which is already below the "
-                  f"requested threshold of {options.size} MB.", flush=True)  # fmt: skip
-            continue
-        print(f"Purging {logs.label} until directory size is at most {options.size} MB "
-              f"(currently {size // _MEGABYTE} MB).", flush=True)  # fmt: skip
-        if options.yes or _agreed(f"Purge some of old logs in {logs.folder}"):
-            _remove_oldest(logs.folder, size - options.size * _MEGABYTE)
+        if size is None:
+            _purge_all(logs, yes=yes)
+        else:
+            _purge_oldest(logs, size, yes=yes)
+
+
+def _purge_all(logs: _Logs, *, yes: bool) -> None:
+    print(f"Purging {logs.label}.", flush=True)
+    if yes or _agreed(f"rm -rf {logs.folder}"):
+        _remove(logs.folder)
+
+
+def _purge_oldest(logs: _Logs, megabytes: int, *, yes: bool) -> None:
+    size = _size(logs.folder)
+    if size <= megabytes * _MEGABYTE:
+        print(f"Directory size of {logs.label} is {size // _MEGABYTE} MB which is already below the "
+              f"requested threshold of {megabytes} MB.", flush=True)  # fmt: skip
+        return
+
+    print(f"Purging {logs.label} until directory size is at most {megabytes} MB "
+          f"(currently {size // _MEGABYTE} MB).", flush=True)  # fmt: skip
+    if yes or _agreed(f"Purge some of old logs in {logs.folder}"):
+        _remove_oldest(logs.folder, size - megabytes * _MEGABYTE)
 
 
 def _places() -> list[_Logs]:
@@ -147,9 +162,12 @@ def human_size(size: float) -> str:
     return f"{math.ceil(size)}T"
 
 
-_FAMILY = Family(
+FAMILY = Family(
     "rosclean",
     "rosclean is a command-line tool for the log files of ROS.",
-    (Verb("check", "check usage of log files", _check), Verb("purge", "remove log files", _purge)),
+    (
+        Verb("check", "check usage of log files", _check_parser, _check),
+        Verb("purge", "remove log files", _purge_parser, _purge),
+    ),
     "Type rosclean <command> -h for more detailed usage, e.g. 'rosclean purge -h'",
 )

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser, one_argument, tool_node, warn, warn_unpublished
+from minirospy.cli.command import tool_node, warn, warn_unpublished
+from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import MinirospyError, UsageError
 from minirospy.introspect.graph import Graph
@@ -19,11 +20,9 @@ from minirospy.introspect.nodes import list_nodes
 from minirospy.introspect.topics import find_topic
 
 if TYPE_CHECKING:
-    from re import Pattern
-
     from minirospy.names import Arguments
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 _LEVELS = {"debug": 1, "info": 2, "warn": 4, "error": 8, "fatal": 16}
 """Names -> the levels of rosgraph_msgs/Log."""
@@ -32,74 +31,117 @@ _COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
-def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    node = one_argument("rosconsole list", "List the loggers of a node.", "node", "the node's name", argv)
+def _list_parser() -> Parser:
+    parser = Parser("rosconsole list", "List the loggers of a node.")
+    _add_node(parser)
+    return parser
+
+
+def _list(node: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosconsole", arguments=arguments) as graph:
         print("\n".join(logger_levels(graph, graph.resolve(node))))
 
 
-def _get(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rosconsole get", description="Print the level of a node's logger.")
-    parser.add_argument("node", help="the node's name")
-    parser.add_argument("logger", help="the logger, as rosout")
-    options = parser.parse_args(argv)
+def _get_parser() -> Parser:
+    parser = Parser("rosconsole get", "Print the level of a node's logger.")
+    _add_node(parser)
+    _add_logger(parser)
+    return parser
+
+
+def _get(node: str, logger: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosconsole", arguments=arguments) as graph:
-        print(logger_level(graph, graph.resolve(options.node), options.logger).upper())
+        print(logger_level(graph, graph.resolve(node), logger).upper())
 
 
-def _set(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rosconsole set", description="Set the level of a node's logger.")
-    parser.add_argument("node", help="the node's name")
-    parser.add_argument("logger", help="the logger, as rosout")
-    parser.add_argument("level", type=str.lower, choices=list(_LEVELS), help="what it says at least")
-    options = parser.parse_args(argv)
+def _set_parser() -> Parser:
+    parser = Parser("rosconsole set", "Set the level of a node's logger.")
+    _add_node(parser)
+    _add_logger(parser)
+    parser.add_argument("level", type=str.lower, choices=list(_LEVELS), help="the least level that it logs")
+    return parser
+
+
+def _set(node: str, logger: str, level: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosconsole", arguments=arguments) as graph:
-        set_logger_level(graph, graph.resolve(options.node), options.logger, options.level)
+        set_logger_level(graph, graph.resolve(node), logger, level)
 
 
-def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> int:
-    parser = Parser("rosconsole echo", description="Print what nodes log, until Ctrl-C.")
-    parser.add_argument("filter", metavar="FILTER", nargs="?", default=".*",
-                        help="a regular expression: only nodes whose name begins so (default: .*)")  # fmt: skip
-    parser.add_argument("-l", "--level", type=str.lower, choices=list(_LEVELS), default="warn",
-                        help="only what has at least this level (default: warn)")  # fmt: skip
-    parser.add_argument("-1", "--once", action="store_true", help="end after the first line")
-    parser.add_argument("--topic", default="/rosout", help="listen to this topic (default: /rosout)")
+def _echo_parser() -> Parser:
+    parser = Parser("rosconsole echo", "Print what nodes log, until Ctrl-C.")
+    parser.add_argument(
+        "filter",
+        metavar="FILTER",
+        nargs="?",
+        default=".*",
+        help="a regular expression: only nodes whose name begins so (default: .*)",
+        completer="nothing",
+    )
+    parser.add_argument(
+        "-l",
+        "--level",
+        type=str.lower,
+        choices=list(_LEVELS),
+        default="warn",
+        help="only what has at least this level (default: warn)",
+    )
+    parser.add_argument("-1", "--once", action="store_true", help="exit after the first line")
+    parser.add_argument(
+        "--topic", default="/rosout", help="listen to this topic (default: /rosout)", completer="topics"
+    )
     parser.add_argument("--nocolor", action="store_true", help="no colours")
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="print the time and the place in the code, too"
     )
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _echo(
+    filter: str,
+    level: str,
+    once: bool,
+    topic: str,
+    nocolor: bool,
+    verbose: bool,
+    arguments: Arguments | None = None,
+) -> int:
     try:
-        wanted = re.compile(options.filter)
+        wanted = re.compile(filter)
     except re.error as error:
-        raise UsageError(f"[{options.filter}] is not a regular expression: {error}") from error
-    return _print_lines(wanted, options, arguments)
+        raise UsageError(f"[{filter}] is not a regular expression: {error}") from error
 
-
-def _print_lines(wanted: Pattern[str], options: Any, arguments: Arguments | None) -> int:
     with Graph.open("rosconsole", arguments=arguments) as graph:
-        topic = graph.resolve(options.topic)
-        field = find_topic(graph, topic)
+        name = graph.resolve(topic)
+        field = find_topic(graph, name)
         if not field or field.path:
-            warn_unpublished(graph, topic)
+            warn_unpublished(graph, name)
         if not any(map(wanted.match, list_nodes(graph))):
             warn(f"no node's name begins as [{wanted.pattern}] yet")
+
     with tool_node("rosconsole", arguments) as node:
-        for received in node.inbox(topic):
+        for received in node.inbox(name):
             log = node.classes.read(received)
             if log._type != "rosgraph_msgs/Log":
-                raise MinirospyError(f"[{options.topic}] carries {log._type}, not rosgraph_msgs/Log")
-            if log.level < _LEVELS[options.level] or not wanted.match(log.name):
+                raise MinirospyError(f"[{topic}] carries {log._type}, not rosgraph_msgs/Log")
+            if log.level < _LEVELS[level] or not wanted.match(log.name):
                 continue
-            print(_shown(log, colour=not options.nocolor, verbose=options.verbose), flush=True)
-            if options.once:
+
+            print(_shown(log, colour=not nocolor, verbose=verbose), flush=True)
+            if once:
                 break
     return 0
+
+
+def _add_node(parser: Parser) -> None:
+    parser.add_argument("node", help="the node's name", completer="nodes")
+
+
+def _add_logger(parser: Parser) -> None:
+    parser.add_argument("logger", help="the logger, as rosout", completer="loggers")
 
 
 def _shown(log: Any, *, colour: bool, verbose: bool) -> str:
@@ -115,14 +157,14 @@ def _shown(log: Any, *, colour: bool, verbose: bool) -> str:
     return text
 
 
-_FAMILY = Family(
+FAMILY = Family(
     "rosconsole",
     "rosconsole is a command-line tool for configuring the logger level of ROS nodes.",
     (
-        Verb("get", "display level for a logger", _get),
-        Verb("list", "list loggers for a node", _list),
-        Verb("set", "set level for a logger", _set),
-        Verb("echo", "print logger messages", _echo),
+        Verb("get", "display level for a logger", _get_parser, _get),
+        Verb("list", "list loggers for a node", _list_parser, _list),
+        Verb("set", "set level for a logger", _set_parser, _set),
+        Verb("echo", "print logger messages", _echo_parser, _echo),
     ),
     "Type rosconsole <command> -h for more detailed usage, e.g. 'rosconsole list -h'",
     is_node=True,

@@ -13,13 +13,14 @@ import os
 import re
 import sys
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
-from minirospy.cli.command import Parser
+from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 _PYTHON_KEY = re.compile(r"^python3?-(?P<name>.+?)(-pip)?$|^(?P<other>.+)-pip$")
 _PYTHON_PACKAGES: dict[str, tuple[str, str]] = {
@@ -50,27 +51,31 @@ _TOOLS = frozenset(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status is 1 where something is missing."""
-    verbs = (
-        Verb("check", "Check whether all that packages need is there", _check),
-        Verb("init", "Nothing: there is no database to set up", _nothing),
-        Verb("install", "Say how what is missing is installed", _install),
-        Verb("keys", "List what packages need that is no package here", _keys),
-        Verb("resolve", "Print what a key means", _resolve),
-        Verb("update", "Nothing: there is no database to update", _nothing),
-    )
-    return Family("rosdep", "rosdep command", verbs).main(argv)
+    """Run the command; return its exit status, 1 where something is missing."""
+    return FAMILY.main(argv)
 
 
 def _parser(verb: str, description: str) -> Parser:
-    parser = Parser(f"rosdep {verb}", description=description)
-    parser.add_argument("packages", nargs="*", default=[], help="packages (without: those of --from-paths)")
-    parser.add_argument(
-        "--from-paths", nargs="+", type=Path, default=[], help="all packages in these folders"
+    parser = Parser(f"rosdep {verb}", description)
+    add = parser.add_argument
+    add(
+        "packages",
+        nargs="*",
+        default=[],
+        help="packages (without: those of --from-paths)",
+        completer="package_names",
     )
-    parser.add_argument("--skip-keys", action="append", default=[], help="keys to leave out")
-    parser.add_argument("-a", "--all", action="store_true", help="all packages that rospack finds")
-    parser.add_argument("-r", action="store_true", help="what is missing is no error")
+    add(
+        "--from-paths",
+        nargs="+",
+        type=Path,
+        default=[],
+        help="all packages in these folders",
+        completer="folders",
+    )
+    add("--skip-keys", action="append", default=[], help="keys to leave out", completer="nothing")
+    add("-a", "--all", action="store_true", help="all packages that rospack finds")
+    add("-r", dest="tolerant", action="store_true", help="what is missing is not an error")
     for flags in (
         ("-i", "--ignore-src", "--ignore-packages-from-source"),
         ("-y", "--default-yes"),
@@ -80,16 +85,16 @@ def _parser(verb: str, description: str) -> Parser:
         ("-v", "--verbose"),
         ("--reinstall",),
     ):
-        parser.add_argument(
-            *flags, action="store_true", help="accepted: nothing is installed, nothing is asked"
-        )
+        parser.accept(*flags, help="accepted: nothing is installed")
     for names in (("--rosdistro",), ("--os",), ("-t", "--dependency-types")):
-        parser.add_argument(*names, action="append", help="accepted")
+        parser.accept(*names, nargs=None, help="accepted")
     return parser
 
 
-def _missing(parser: Parser, argv: Sequence[str]) -> tuple[dict[str, list[str]], bool]:
-    """Key -> the packages that ask for it, of all keys that are not here; and whether that is no error.
+def _missing(
+    packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], *, everything: bool
+) -> dict[str, list[str]]:
+    """Return the packages that need each key that is not here.
 
     Raises NotFoundError, ManifestError, UsageError.
     """
@@ -97,25 +102,26 @@ def _missing(parser: Parser, argv: Sequence[str]) -> tuple[dict[str, list[str]],
     from minirospy.workspace.manifest import Kind, read_manifest
     from minirospy.workspace.packages import Packages
 
-    options = parser.parse_args(argv)
-    for path in options.from_paths:
+    for path in from_paths:
         if not path.is_dir():
             raise UsageError(f"--from-paths: there is no folder {path}")
+
     here = Packages()
-    folders = Packages.below(*options.from_paths).folders()
-    known = {*here.folders(), *folders, *PROVIDED, *_TOOLS, *" ".join(options.skip_keys).split()}
-    if options.all:
+    folders = Packages.below(*from_paths).folders()
+    known = {*here.folders(), *folders, *PROVIDED, *_TOOLS, *" ".join(skip_keys).split()}
+    if everything:
         folders.update(here.folders())
-    folders.update({name: here.find(name) for name in options.packages})
-    if not (folders or options.from_paths):
+    folders.update({name: here.find(name) for name in packages})
+    if not (folders or from_paths):
         raise UsageError("which packages? `rosdep install --from-paths src --ignore-src`, or their names")
+
     found: dict[str, list[str]] = {}
     kinds = [kind for kind in Kind if kind is not Kind.DOC]
     for name, folder in sorted(folders.items()):
         for key in read_manifest(folder, os.environ).depends(*kinds):
             if key not in known:
                 found.setdefault(key, []).append(name)
-    return dict(sorted(found.items())), options.r
+    return dict(sorted(found.items()))
 
 
 def _module(key: str) -> tuple[str, str] | None:
@@ -147,44 +153,68 @@ def _says(keys: dict[str, list[str]]) -> Iterator[str]:
         yield f"{key} (of {', '.join(packages)}): {how}"
 
 
-def _install(argv: Sequence[str]) -> int:
-    parser = _parser(
-        "install", "Say how what packages need is installed. Nothing is fetched, nothing is installed."
+def _install_parser() -> Parser:
+    return _parser(
+        "install", "Print how what packages need is installed. Nothing is fetched, nothing is installed."
     )
-    keys, is_no_error = _missing(parser, argv)
-    missing = {key: packages for key, packages in keys.items() if not _is_installed(key)}
+
+
+def _install(
+    packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], all: bool, tolerant: bool
+) -> int:
+    keys = _missing(packages, from_paths, skip_keys, everything=all)
+    missing = {key: needed_by for key, needed_by in keys.items() if not _is_installed(key)}
     if not missing:
         print("#All required rosdeps installed successfully")
         return 0
+
     for line in _says(missing):
         print(line)
     print("rosdep: not installed; nodes in Python may do without what is not of Python", file=sys.stderr)
-    return 0 if is_no_error else 1
+    return 0 if tolerant else 1
 
 
-def _check(argv: Sequence[str]) -> int:
-    keys, _ = _missing(_parser("check", "Check whether all that packages need is there."), argv)
-    missing = {key: packages for key, packages in keys.items() if not _is_installed(key)}
+def _check_parser() -> Parser:
+    return _parser("check", "Check whether all that packages need is there.")
+
+
+def _check(
+    packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], all: bool, tolerant: bool
+) -> int:
+    keys = _missing(packages, from_paths, skip_keys, everything=all)
+    missing = {key: needed_by for key, needed_by in keys.items() if not _is_installed(key)}
     if not missing:
         print("All system dependencies have been satisfied")
         return 0
+
     print("System dependencies have not been satisfied:")
     for line in _says(missing):
         print(line)
     return 1
 
 
-def _keys(argv: Sequence[str]) -> int:
-    for key in _missing(_parser("keys", "List what packages need that is no package here."), argv)[0]:
+def _keys_parser() -> Parser:
+    return _parser("keys", "List what packages need that is not a package here.")
+
+
+def _keys(
+    packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], all: bool, tolerant: bool
+) -> None:
+    for key in _missing(packages, from_paths, skip_keys, everything=all):
         print(key)
-    return 0
 
 
-def _resolve(argv: Sequence[str]) -> int:
-    parser = Parser("rosdep resolve", description="Print what a key means: a package of Python.")
-    parser.add_argument("keys", nargs="+", metavar="key", help="as in package.xml: python3-serial")
+def _resolve_parser() -> Parser:
+    parser = Parser("rosdep resolve", "Print what a key means: a package of Python.")
+    parser.add_argument(
+        "keys", nargs="+", metavar="key", help="as in package.xml: python3-serial", completer="nothing"
+    )
+    return parser
+
+
+def _resolve(keys: Sequence[str]) -> int:
     status = 0
-    for key in parser.parse_args(argv).keys:
+    for key in keys:
         module = _module(key)
         if module:
             print(f"#pip\n{module[1]}")
@@ -194,6 +224,33 @@ def _resolve(argv: Sequence[str]) -> int:
     return status
 
 
-def _nothing(argv: Sequence[str]) -> int:
+class _IgnoringParser(Parser):
+    """Takes any words, and ignores them."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
+        """Return no arguments."""
+        return {}
+
+
+def _nothing_parser(verb: str) -> Parser:
+    return _IgnoringParser(f"rosdep {verb}", "Nothing: there is no database.")
+
+
+def _nothing() -> None:
     print("Nothing to do: minirospy brings along what ROS needs, and no database is asked")
-    return 0
+
+
+FAMILY = Family(
+    "rosdep",
+    "rosdep command",
+    (
+        Verb("check", "Check whether all that packages need is there", _check_parser, _check),
+        Verb("init", "Nothing: there is no database to set up", partial(_nothing_parser, "init"), _nothing),
+        Verb("install", "Say how what is missing is installed", _install_parser, _install),
+        Verb("keys", "List what packages need that is no package here", _keys_parser, _keys),
+        Verb("resolve", "Print what a key means", _resolve_parser, _resolve),
+        Verb(
+            "update", "Nothing: there is no database to update", partial(_nothing_parser, "update"), _nothing
+        ),
+    ),
+)

@@ -10,32 +10,36 @@ import sys
 import time
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.nodes import Neighbours, neighbours
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 _PAUSE_SECONDS = 1.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
-    return run("rosgraph", lambda: _rosgraph(argv))
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return COMMAND.main(argv)
 
 
-def _rosgraph(argv: Sequence[str] | None) -> None:
+def _parser() -> Parser:
     parser = Parser(
         "rosgraph", description="Print the nodes, who sends to them and to whom they send, each second."
     )
-    parser.add_argument("-1", "--once", action="store_true", help="print it once and end")
-    options = parser.parse_args(argv)
+    parser.add_argument("-1", "--once", action="store_true", help="print it once and exit")
+    return parser
+
+
+def _rosgraph(once: bool) -> None:
     with Graph.open("rosgraph") as graph:
         while True:
             state = graph.state()
             sys.stdout.write(_text(neighbours(state), sorted(state.services)))
             sys.stdout.flush()
-            if options.once:
+            if once:
                 return
             time.sleep(_PAUSE_SECONDS)
 
@@ -50,6 +54,8 @@ def _text(nodes: dict[str, Neighbours], services: Sequence[str]) -> str:
     lines += ["Services:", *(f"  {name}" for name in services)]
     return "\n".join([*lines, ""])
 
+
+COMMAND = Command("rosgraph", _parser, _rosgraph)
 
 if __name__ == "__main__":
     sys.exit(main())

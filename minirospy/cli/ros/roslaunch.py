@@ -7,10 +7,11 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy import private_files
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
 from minirospy.launch.command import shell_line
@@ -21,45 +22,85 @@ from minirospy.workspace.packages import Packages
 if TYPE_CHECKING:
     from minirospy.launch.runner import RunOptions
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "LaunchOptions", "main"]
 
-_USAGE = "roslaunch [options] PACKAGE FILE [arg:=value ...]\n       roslaunch [options] FILE [FILE ...] [arg:=value ...]"
+_USAGE = """roslaunch [options] [package] <filename> [arg_name:=value...]
+       roslaunch [options] <filename> [<filename>...] [arg_name:=value...]
+
+If <filename> is a single dash ('-'), launch XML is read from standard input."""
+
+
+class LaunchOptions(NamedTuple):
+    """The command line of roslaunch."""
+
+    what: list[str]
+    args: dict[str, str]
+    """Name -> value of each ``name:=value``."""
+    nodes: bool
+    files: bool
+    find_node: str | None
+    node_args: str | None
+    ros_args: bool
+    dump_params: bool
+    check: bool
+    port: int | None
+    wait: bool
+    local: bool
+    screen: bool
+    log: bool
+    required: bool
+    core: bool
+    watch: bool
+    ui: bool
+    verbose: bool
+    no_summary: bool
+    pid: str | None
+    disable_title: bool
+    skip_log_check: bool
+    timeout: float | None
+    master_logger_level: str | None
+    sigint_timeout: float
+    sigterm_timeout: float
+    child: str | None
+    server_uri: str | None
+    run_id: str | None
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command, 1 also where a required node died of a fault."""
-    words = list(sys.argv[1:] if argv is None else argv)
-    return run("roslaunch", lambda: _roslaunch(words))
+    """Run the command; return the exit status as in minirospy.cli.command, 1 also where a required node died of a fault."""
+    return COMMAND.main(argv)
 
 
-def _roslaunch(words: list[str]) -> int:
-    parser = _parser()
-    options = parser.parse_args([word for word in words if ":=" not in word])
-    args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
+def _roslaunch(**words: Any) -> int:
+    options = LaunchOptions(**words)
     environment = Environment.read()
     if options.port is not None:
         if not 0 < options.port < 65536:
-            parser.error(f"port {options.port} is not between 1 and 65535")
+            raise Misuse(f"port {options.port} is not between 1 and 65535")
         environment = environment._replace(master_uri=f"http://{environment.uri_host}:{options.port}")
+
     packages = Packages(environment)
     if options.child or options.server_uri or options.run_id:
-        if not (options.child and options.server_uri and options.run_id):
-            parser.error("--child, --server_uri and --run_id go together")
         return _child(options, environment, packages)
     if not options.what and not options.core:
-        parser.error("say what to launch: PACKAGE FILE, or one or more launch files")
+        raise Misuse(
+            "specify what to launch: PACKAGE FILE, or one or more launch files",
+            "you must specify at least one input file",
+        )
+
     files = [STDIN] if options.what == ["-"] else find_files(options.what, packages)
     text = sys.stdin.read() if files == [STDIN] else None
     if options.ros_args:
         if text is not None:
-            parser.error("--ros-args takes a file")
-        _print_args(resolved_arg_docs(files[-1], args, packages))
+            raise Misuse("--ros-args takes a file")
+        _print_args(resolved_arg_docs(files[-1], options.args, packages))
         return 0
-    sources = [Source(file, None if text is None else text.encode(), args) for file in files]
+
+    sources = [Source(file, None if text is None else text.encode(), options.args) for file in files]
     if options.check:
         return _check(sources, packages)
     spec = load_sources(sources, packages)
-    _refuse_unknown(args, spec)
+    _refuse_unknown(options.args, spec)
     for name, show in _SHOWS.items():
         if (asked := getattr(options, name)) not in (None, False):
             show(spec, asked, packages)
@@ -68,7 +109,7 @@ def _roslaunch(words: list[str]) -> int:
 
 
 def _run(
-    options: argparse.Namespace, spec: LaunchSpec, environment: Environment, packages: Packages, name: str
+    options: LaunchOptions, spec: LaunchSpec, environment: Environment, packages: Packages, name: str
 ) -> int:
     from minirospy.launch.output import Output
     from minirospy.launch.runner import Launcher
@@ -98,7 +139,7 @@ def _run(
         return launcher.run(wait=options.wait)
 
 
-def _run_options(options: argparse.Namespace, name: str) -> RunOptions:
+def _run_options(options: LaunchOptions, name: str) -> RunOptions:
     from minirospy.launch.process import Timeouts
     from minirospy.launch.runner import RunOptions
 
@@ -123,7 +164,10 @@ def _run_options(options: argparse.Namespace, name: str) -> RunOptions:
     )
 
 
-def _child(options: argparse.Namespace, environment: Environment, packages: Packages) -> int:
+def _child(options: LaunchOptions, environment: Environment, packages: Packages) -> int:
+    if not (options.child and options.server_uri and options.run_id):
+        raise Misuse("--child, --server_uri and --run_id go together")
+
     from minirospy.launch.child import run_child
 
     return run_child(
@@ -131,59 +175,112 @@ def _child(options: argparse.Namespace, environment: Environment, packages: Pack
     )
 
 
+class _LaunchParser(Parser):
+    """Takes ``name:=value`` from among the words."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
+        options = super().parse([word for word in words if ":=" not in word])
+        options["args"] = dict(
+            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
+        )
+        return options
+
+
 def _parser() -> Parser:
-    parser = Parser(
-        prog="roslaunch",
-        usage=_USAGE,
-        description="Runs the nodes of launch files, and a master where there is none. Ctrl-C ends them all. "
-        "Where FILE is -, it is read from standard input.",
+    parser = _LaunchParser(
+        "roslaunch",
+        "Runs the nodes of launch files, and a master where there is none. Ctrl-C stops them all.",
+        _USAGE,
     )
     add = parser.add_argument
-    add("what", nargs="*", help=argparse.SUPPRESS)
-    shows = parser.add_argument_group("without running anything")
-    shows.add_argument("--nodes", action="store_true", help="list the nodes")
-    shows.add_argument("--files", action="store_true", help="list the files that are read")
-    shows.add_argument("--find-node", metavar="NODE", help="print the file that a node is in")
-    shows.add_argument("--args", metavar="NODE", help="print the command line of a node")
-    shows.add_argument("--ros-args", action="store_true", help="list the arguments of the file")
-    shows.add_argument("--dump-params", action="store_true", help="print the parameters as YAML")
-    shows.add_argument(
-        "--check", action="store_true", help="tell every fault of the files, with its line; status 1 if any"
+    add("what", nargs="*", help=argparse.SUPPRESS, completer="launch_words")
+    add(
+        "--files",
+        action="store_true",
+        help="Print list files loaded by launch file, including launch file itself",
     )
-    add("-p", "--port", type=int, help="port of the master on this machine")
-    add("--wait", action="store_true", help="wait for a master instead of starting one")
-    add("--local", action="store_true", help="do not start the nodes of other machines")
-    add("--screen", action="store_true", help="show the output of all nodes")
-    add("--log", action="store_true", help="show the output of no node: it goes to the log files")
-    add("--required", action="store_true", help="end all when any node ends")
-    add("--core", action="store_true", help="the master alone, if no file is given")
-    add("--watch", action="store_true", help="start a node again when its file changes")
-    add("--ui", action="store_true", help="show the nodes in a table: state, CPU, memory, last line")
-    add("-v", "--verbose", action="store_true", help="print each file that is read")
-    add("--no-summary", action="store_true", help="print no summary")
-    add("--pid", metavar="FILE", help="write the process id of roslaunch to FILE")
-    add("--disable-title", action="store_true", help="leave the terminal's title as it is")
-    add("--skip-log-check", action="store_true", help="do not look how large the log folder is")
-    add("-t", "--timeout", type=float, metavar="S", help="of a master that is started: seconds for a call")
+    add(
+        "--args",
+        dest="node_args",
+        metavar="NODE_NAME",
+        help="Print command-line arguments for node",
+        completer="launch_nodes",
+    )
+    add("--nodes", action="store_true", help="Print list of node names in launch file")
+    add(
+        "--find-node",
+        metavar="NODE_NAME",
+        help="Find launch file that node is defined in",
+        completer="launch_nodes",
+    )
+    add(
+        "-c",
+        "--child",
+        metavar="NAME",
+        help="Run as child service 'NAME'. Required with -u",
+        completer="nothing",
+    )
+    add("--local", action="store_true", help="Do not launch remote nodes")
+    add("--screen", action="store_true", help="Force output of all local nodes to screen")
+    add("--required", action="store_true", help="Force all nodes to be required")
+    add("--log", action="store_true", help="Force output of all local nodes to log")
+    add("-u", "--server_uri", metavar="URI", help="URI of server. Required with -c", completer="nothing")
+    add("--run_id", help="run_id of session. Required with -c", completer="nothing")
+    add("--wait", action="store_true", help="wait for master to start before launching")
+    add("-p", "--port", type=int, help="master port. Only valid if master is launched")
+    add("--core", action="store_true", help="Launch core services only")
+    add("--pid", metavar="PID_FN", help="write the roslaunch pid to filename", completer="files")
+    add("-v", dest="verbose", action="store_true", help="verbose printing")
+    add("--no-summary", action="store_true", help="hide summary printing")
+    add("--dump-params", action="store_true", help="Dump parameters of all roslaunch files to stdout")
+    add("--skip-log-check", action="store_true", help="skip check size of log folder")
+    add("--ros-args", action="store_true", help="Display command-line arguments for this launch file")
+    add("--disable-title", action="store_true", help="Disable setting of terminal title")
+    parser.accept(
+        "-w",
+        "--numworkers",
+        nargs=None,
+        type=int,
+        metavar="NUM_WORKERS",
+        help="override number of worker threads. Only valid for core services.",
+    )
+    add(
+        "-t",
+        "--timeout",
+        type=float,
+        help="override the socket connection timeout (in seconds). Only valid for core services.",
+    )
     add(
         "--master-logger-level",
         choices=("debug", "info", "warn", "error", "fatal"),
-        metavar="LEVEL",
-        help="of a master that is started: what goes into its log",
+        metavar="MASTER_LOGGER_LEVEL",
+        help="set rosmaster.master logger level ('debug', 'info', 'warn', 'error', 'fatal')",
     )
-    add("-w", "--numworkers", type=int, metavar="N", help="accepted, without effect")
-    for name, seconds in (("sigint", 15.0), ("sigterm", 2.0)):
-        add(
-            f"--{name}-timeout",
-            type=_seconds,
-            default=seconds,
-            metavar="S",
-            help=f"seconds that a node has to end after {name.upper()} (default: {seconds:g})",
-        )
-    add("-c", "--child", metavar="NAME", help="run as a part of the roslaunch at URI")
-    add("-u", "--server_uri", metavar="URI", help="of the roslaunch that started this one")
-    add("--run_id", metavar="ID", help="of its session")
+    add(
+        "--sigint-timeout",
+        type=_seconds,
+        default=15.0,
+        help="the SIGINT timeout used when killing nodes (in seconds).",
+    )
+    add(
+        "--sigterm-timeout",
+        type=_seconds,
+        default=2.0,
+        help="the SIGTERM timeout used when killing nodes if SIGINT does not stop the node (in seconds).",
+    )
+    _add_own_options(parser)
     return parser
+
+
+def _add_own_options(parser: Parser) -> None:
+    add = parser.own_options().add_argument
+    add(
+        "--check", action="store_true", help="report every fault of the files, with its line; status 1 if any"
+    )
+    add("--watch", action="store_true", help="start a node again when its file changes")
+    add("--ui", action="store_true", help="show the nodes in a table: state, CPU, memory, last line")
+    add("--verbose", action="store_true", help="as -v: print each file that is read")
 
 
 def _seconds(text: str) -> float:
@@ -274,9 +371,11 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
     "nodes": _show_nodes,
     "find_node": _show_file_of,
     "dump_params": _show_params,
-    "args": _show_command,
+    "node_args": _show_command,
 }
 """In this order, where several are asked for."""
+
+COMMAND = Command("roslaunch", _parser, _roslaunch)
 
 
 if __name__ == "__main__":

@@ -10,53 +10,64 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
 from minirospy.launch.check import faults_of, told
 from minirospy.testing.junit import failure_junit_xml, success_junit_xml
 from minirospy.workspace.packages import Packages, package_name
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 _CLASS = "roslaunch.RoslaunchCheck"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; 0 all files are right, 1 one is not."""
-    return run("roslaunch-check", lambda: _check(sys.argv[1:] if argv is None else argv))
+    """Run the command; return 0 where all files are right, 1 where one is not."""
+    return COMMAND.main(argv)
 
 
-def _check(argv: Sequence[str]) -> int:
+def _parser() -> Parser:
     parser = Parser(
         prog="roslaunch-check",
         usage="roslaunch-check [options] FILE|FOLDER [VARIABLE=value ...]",
         description="Loads launch files without running them; status 1 where one has a fault.",
     )
-    parser.add_argument("path", type=Path, help="a launch file, or a folder of them")
-    parser.add_argument("variables", nargs="*", help="VARIABLE=value: put into the environment")
     parser.add_argument(
-        "-o", "--output-file", type=Path, metavar="FILE", help="write the result there, as JUnit XML"
+        "path", type=Path, help="a launch file, or a folder of them", completer="launch_files"
     )
-    parser.add_argument("-t", "--use-test-depends", action="store_true", help="accepted, without effect")
+    parser.add_argument(
+        "variables", nargs="*", help="VARIABLE=value: put into the environment", completer="nothing"
+    )
+    parser.add_argument(
+        "-o",
+        "--output-file",
+        type=Path,
+        metavar="FILE",
+        help="write the result there, as JUnit XML",
+        completer="files",
+    )
+    parser.accept("-t", "--use-test-depends")
     parser.add_argument(
         "-i", "--ignore-unset-args", action="store_true", help="an argument without a default is no fault"
     )
-    options = parser.parse_args(argv)
-    path: Path = options.path
+    return parser
+
+
+def _check(path: Path, variables: Sequence[str], output_file: Path | None, ignore_unset_args: bool) -> int:
     if not path.exists():
         raise MinirospyError(f"there is no launch file or folder [{path}]")
-    os.environ.update(word.split("=", 1) for word in options.variables if "=" in word)
+    os.environ.update(dict(word.split("=", 1) for word in variables if "=" in word))
     files = [path] if path.is_file() else sorted(path.rglob("*.launch"))
-    faults = [line for file in files for line in _faults(file, ignore_unset_args=options.ignore_unset_args)]
-    if options.output_file:
-        output: Path = options.output_file
-        output.parent.mkdir(parents=True, exist_ok=True)
+    faults = [line for file in files for line in _faults(file, ignore_unset_args=ignore_unset_args)]
+    if output_file:
+        output_file.parent.mkdir(parents=True, exist_ok=True)
         name = _test_name(path.resolve())
-        result = (output.name, "\n".join(faults), None, _CLASS, name)
-        output.write_bytes(
-            failure_junit_xml(*result) if faults else success_junit_xml(output.name, _CLASS, name)
+        result = (output_file.name, "\n".join(faults), None, _CLASS, name)
+        output_file.write_bytes(
+            failure_junit_xml(*result) if faults else success_junit_xml(output_file.name, _CLASS, name)
         )
-        print(f"...writing test results to {output}")
+        print(f"...writing test results to {output_file}")
     if faults:
         print("FAILURE:", *faults, sep="\n", file=sys.stderr)
         return 1
@@ -78,6 +89,8 @@ def _test_name(path: Path) -> str:
             return "_".join([name, *filter(None, parts)])
     return path.name.replace(".", "_")
 
+
+COMMAND = Command("roslaunch-check", _parser, _check)
 
 if __name__ == "__main__":
     sys.exit(main())

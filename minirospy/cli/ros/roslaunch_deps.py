@@ -9,44 +9,48 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from minirospy.cli.command import Parser, run, warn
+from minirospy.cli.command import warn as print_warning
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.launch.depends import FileNeeds, file_needs, missing_declarations, package_of
 from minirospy.workspace.packages import Packages
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return run("roslaunch-deps", lambda: _deps(sys.argv[1:] if argv is None else argv))
+    """Run the command; return its exit status."""
+    return COMMAND.main(argv)
 
 
-def _deps(argv: Sequence[str]) -> int:
+def _parser() -> Parser:
     parser = Parser(
-        prog="roslaunch-deps",
-        usage="roslaunch-deps [options] FILE [FILE ...]",
-        description="Prints the packages that launch files need.",
+        "roslaunch-deps",
+        "Print the packages that launch files need.",
+        "roslaunch-deps [options] <file(s)...>",
+        missing="please specify a launch file",
     )
-    parser.add_argument("files", nargs="+", metavar="FILE")
-    parser.add_argument("-v", "--verbose", action="store_true", help="print what each file needs")
-    parser.add_argument(
-        "-w", "--warn", action="store_true", help="print the packages that package.xml does not name"
-    )
-    options = parser.parse_args(argv)
-    files: list[str] = options.files
+    parser.add_argument("files", nargs="+", metavar="FILE", completer="launch_files")
+    parser.add_argument("-v", "--verbose", action="store_true", help="Verbose output")
+    parser.add_argument("-w", "--warn", action="store_true", help="Warn about missing manifest dependencies")
+    return parser
+
+
+def _deps(files: Sequence[str], verbose: bool, warn: bool) -> int:
     for file in files:
         if not Path(file).is_file():
-            parser.error(f"cannot locate {file}")
-    needs = file_needs(files, Packages(), lambda problem: warn(str(problem)))
-    if options.warn:
+            raise Misuse(f"cannot locate {file}")
+
+    needs = file_needs(files, Packages(), lambda problem: print_warning(str(problem)))
+    if warn:
         print("Dependencies:")
-    if options.verbose:
+    if verbose:
         _print_files(needs)
     own = package_of(files[0])
     wanted = {package for what in needs.values() for package in what.packages}
     # Its own package is named where nothing else is.
     print(" ".join(sorted(wanted - {own} or wanted)))
-    if options.warn:
+    if warn:
         print("\nMissing declarations:")
         for package, missing in missing_declarations(needs).items():
             print(
@@ -64,6 +68,8 @@ def _print_files(needs: Mapping[str, FileNeeds]) -> None:
         print(f"{package_of(file)} [{file}]")
     print("-" * 80)
 
+
+COMMAND = Command("roslaunch-deps", _parser, _deps)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -8,17 +8,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.environment import Environment, run_folder
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.runtime.master_proxy import MasterProxy
 
-__all__ = ["get_run_id", "main"]
+__all__ = ["COMMAND", "get_run_id", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; 0, or 2 (as in ROS) where no master answers, and the folder of all runs is printed."""
-    return run("roslaunch-logs", lambda: _logs(sys.argv[1:] if argv is None else argv))
+    """Run the command; return 0, or 2 (as in ROS) where no master answers, and the folder of all runs is printed."""
+    return COMMAND.main(argv)
 
 
 def get_run_id() -> str | None:
@@ -32,10 +33,11 @@ def get_run_id() -> str | None:
         master.close()
 
 
-def _logs(argv: Sequence[str]) -> int:
-    Parser(prog="roslaunch-logs", description="Prints the folder of the present run's log files.").parse_args(
-        argv
-    )
+def _parser() -> Parser:
+    return Parser("roslaunch-logs", "Print the folder of the present run's log files.", "roslaunch-logs")
+
+
+def _logs() -> int:
     run_id = get_run_id()
     log_dir = Environment.read().log_dir
     if run_id is None:
@@ -48,6 +50,8 @@ def _logs(argv: Sequence[str]) -> int:
     print(folder)
     return 0
 
+
+COMMAND = Command("roslaunch-logs", _parser, _logs)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -8,54 +8,73 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import DefinitionError, NotFoundError
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 _INSUFFICIENT = 64
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return run("rosmsg-proto", lambda: _main(argv))
+    """Run the command; return its exit status."""
+    return COMMAND.main(argv)
 
 
-def _main(argv: Sequence[str] | None) -> int:
-    parser = Parser("rosmsg-proto", description="Print a message or request of default values as YAML.")
-    parser.add_argument("mode", nargs="?", help="msg or srv")
-    parser.add_argument("type", nargs="?", help="pkg/Name, or the Name alone")
+def _parser() -> Parser:
+    parser = Parser("rosmsg-proto", "Print a message or request of default values as YAML.", intermixed=True)
+    parser.add_argument("mode", nargs="?", help="msg or srv", completer="kinds")
+    parser.add_argument("type", nargs="?", help="pkg/Name, or the Name alone", completer="prototype_types")
     parser.add_argument("-f", "--flow_style", choices=("0", "1"), help="1: brackets everywhere; 0: nowhere")
     parser.add_argument("-s", "--silent", action="store_true", help="print no errors")
-    parser.add_argument("-p", "--prefix", default="", help="what to print before each line")
+    parser.add_argument(
+        "-p", "--prefix", default="", help="what to print before each line", completer="nothing"
+    )
     parser.add_argument("-H", "--no-hyphens", action="store_true", help="no quotation marks around it all")
     parser.add_argument(
         "-e", "--empty-arrays", action="store_true", help="arrays of no fixed length are empty"
     )
     parser.add_argument(
-        "-x", "--exclude-slots", default="", metavar="FIELDS", help="fields to leave out, with commas between"
+        "-x",
+        "--exclude-slots",
+        default="",
+        metavar="FIELDS",
+        help="fields to leave out, with commas between",
+        completer="nothing",
     )
-    options = parser.parse_intermixed_args(argv)
+    return parser
 
+
+def _rosmsg_proto(
+    mode: str | None,
+    type: str | None,
+    flow_style: str | None,
+    silent: bool,
+    prefix: str,
+    no_hyphens: bool,
+    empty_arrays: bool,
+    exclude_slots: str,
+) -> int:
     def fail(status: int, text: str) -> int:
-        if options.silent:
+        if silent:
             return 0
         print(text, file=sys.stderr)
         return status
 
-    if options.type is None:
+    if type is None:
         return fail(_INSUFFICIENT, "Insufficient arguments")
-    if options.mode not in ("msg", "srv"):
-        return fail(1, f"Invalid mode: .{options.mode}")
+    if mode not in ("msg", "srv"):
+        return fail(1, f"Invalid mode: .{mode}")
     try:
-        text = _prototype(options.mode, options.type, options.exclude_slots.split(","), options.empty_arrays)
+        text = _prototype(mode, type, exclude_slots.split(","), empty_arrays)
     except (NotFoundError, DefinitionError) as error:
-        return fail(1, f"Unknown message class: {options.type} ({error})")
-    if options.flow_style:
-        text = _restyled(text, flow=options.flow_style == "1")
-    if options.prefix:
-        text = "\n".join(options.prefix + line for line in text.split("\n"))
-    print(text if options.no_hyphens else f'"{text}"')
+        return fail(1, f"Unknown message class: {type} ({error})")
+    if flow_style:
+        text = _restyled(text, flow=flow_style == "1")
+    if prefix:
+        text = "\n".join(prefix + line for line in text.split("\n"))
+    print(text if no_hyphens else f'"{text}"')
     return 0
 
 
@@ -82,3 +101,6 @@ def _restyled(text: str, *, flow: bool) -> str:
     return str(yaml.safe_dump(yaml.safe_load(text), default_flow_style=flow, sort_keys=False)).removesuffix(
         "\n"
     )
+
+
+COMMAND = Command("rosmsg-proto", _parser, _rosmsg_proto)

@@ -9,9 +9,10 @@ import sys
 import time
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser, complain
+from minirospy.cli.command import complain
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import NodeUnreachableError, NotFoundError, UsageError
+from minirospy.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import (
     NodeDetail,
@@ -28,48 +29,87 @@ from minirospy.introspect.nodes import (
 )
 from minirospy.introspect.texts import connections_text, node_text
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 _PING_SECONDS = 3.0
 _RULE = "-" * 80
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
-def _ping(argv: Sequence[str]) -> int:
-    parser = Parser("rosnode ping", description="Call a node once a second and print how long it takes.")
-    parser.add_argument("node", nargs="?", help="the node's name")
-    parser.add_argument("-a", "--all", action="store_true", help="ping all nodes once")
-    parser.add_argument(
-        "-c", dest="count", type=int, default=0, metavar="COUNT", help="number of pings to send"
+def _ping_parser() -> Parser:
+    parser = Parser(
+        "rosnode ping",
+        "Call a node once a second and print how long it takes.",
+        "rosnode ping [options] <node>",
+        surplus="you may only specify one input node",
     )
-    options = parser.parse_args(argv)
-    if options.all and (options.node or options.count):
-        parser.error("-a pings all nodes once: it takes neither a name nor -c")
+    parser.add_argument("node", nargs="?", help="the node's name", completer="nodes")
+    parser.add_argument("-a", "--all", action="store_true", help="ping all nodes")
+    parser.add_argument(
+        "-c",
+        dest="count",
+        type=int,
+        default=0,
+        metavar="COUNT",
+        help="number of pings to send. Not available with --all",
+    )
+    return parser
+
+
+def _ping(node: str | None, all: bool, count: int) -> int:
+    if all and node:
+        raise Misuse(
+            "-a pings all nodes once: it takes neither a name nor -c",
+            f"Invalid arguments '{node}' used with --all",
+        )
+    if all and count:
+        raise Misuse(
+            "-a pings all nodes once: it takes neither a name nor -c", "-c may not be used with --all"
+        )
+
+    if not all and not node:
+        raise _no_node_to_ping()
     with Graph.open("rosnode") as graph:
-        if options.all:
+        if not node:
             return _ping_all(graph)
-        if not options.node:
+        return _ping_one(graph, find_node(graph, graph.resolve(node)), count)
+
+
+def _no_node_to_ping() -> Misuse:
+    """Return the error that lists the nodes, where a master answers."""
+    try:
+        with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
-            raise UsageError(f"please enter a node to ping: {' '.join(nodes) or 'there are none'}")
-        node = find_node(graph, graph.resolve(options.node))
-        print(f"rosnode: node is [{node.name}]")
-        print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
-        times: list[float] = []
-        try:
-            while True:
-                _ping_once(graph, node, times)
-                if len(times) == options.count:
-                    break
-                time.sleep(1.0)
-        except KeyboardInterrupt:
-            pass
-        if times and options.count != 1:
-            print(f"ping average: {sum(times) / len(times):f}ms")
-        return 0
+    except MasterUnreachableError:
+        return Misuse("please enter a node to ping", "Please enter a node to ping")
+    available = "".join(f"\n{name}" for name in nodes)
+    return Misuse(
+        f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
+        f"Please enter a node to ping. Available nodes are:{available}",
+    )
+
+
+def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
+    """Ping a node once a second: ``count`` times, or until Ctrl-C where it is 0."""
+    print(f"rosnode: node is [{node.name}]")
+    print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
+    times: list[float] = []
+    try:
+        while True:
+            _ping_once(graph, node, times)
+            if len(times) == count:
+                break
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        pass
+
+    if times and count != 1:
+        print(f"ping average: {sum(times) / len(times):f}ms")
+    return 0
 
 
 def _ping_all(graph: Graph) -> int:
@@ -92,43 +132,63 @@ def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
 
-def _list(argv: Sequence[str]) -> None:
-    parser = Parser("rosnode list", description="List the nodes, or those in a namespace.")
-    parser.add_argument("namespace", nargs="?", help="only nodes at or below this name")
+def _list_parser() -> Parser:
+    parser = Parser(
+        "rosnode list",
+        "List the nodes, or those in a namespace.",
+        "rosnode list",
+        surplus="invalid args: you may only specify one namespace",
+    )
+    parser.add_argument("namespace", nargs="?", help="only nodes at or below this name", completer="nodes")
     parser.add_argument("-u", dest="uris", action="store_true", help="list XML-RPC URIs")
-    parser.add_argument("-a", "--all", action="store_true", help="list names and URIs")
-    options = parser.parse_args(argv)
+    parser.add_argument("-a", "--all", action="store_true", help="list all information")
+    return parser
+
+
+def _list(namespace: str | None, uris: bool, all: bool) -> None:
     with Graph.open("rosnode") as graph:
-        nodes = list_nodes(graph, graph.resolve(options.namespace) if options.namespace else "/")
-        if options.all:
+        nodes = list_nodes(graph, graph.resolve(namespace) if namespace else "/")
+        if all:
             lines = [f"{node.uri or 'unknown address'} \t{node.name}" for node in graph.addresses(nodes)]
-        elif options.uris:
+        elif uris:
             lines = [node.uri or "unknown address" for node in graph.addresses(nodes)]
         else:
             lines = nodes
         print("\n".join(lines))
 
 
-def _info(argv: Sequence[str]) -> int:
+def _info_parser() -> Parser:
     parser = Parser(
-        "rosnode info", description="Print what nodes publish, subscribe to, serve, and their connections."
+        "rosnode info",
+        "Print what nodes publish, subscribe to, serve, and their connections.",
+        "rosnode info [options] node1 [node2...]",
+        missing="You must specify at least one node name",
     )
-    parser.add_argument("nodes", nargs="+", metavar="node", help="names of nodes")
-    parser.add_argument("-q", "--quiet", action="store_true", help="only what the master knows; ask no node")
-    options = parser.parse_args(argv)
+    _add_nodes(parser, "+")
+    parser.add_argument(
+        "-q",
+        "--quiet",
+        action="store_true",
+        help="Prints only basic information such as pubs/subs and does not contact nodes for more information",
+    )
+    return parser
+
+
+def _info(nodes: Sequence[str], quiet: bool) -> int:
+    failed = 0
     with Graph.open("rosnode") as graph:
-        failed = 0
-        for name in options.nodes:
+        for name in nodes:
             try:
                 detail = node_detail(graph, graph.resolve(name))
             except NotFoundError as error:
                 complain("rosnode", error)
                 failed += 1
                 continue
+
             print(f"{_RULE}\n{node_text(detail)}")
-            if not options.quiet:
+            if not quiet:
                 failed += not _print_connections(graph, detail)
-        return 1 if failed else 0
+    return 1 if failed else 0
 
 
 def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
@@ -142,50 +202,68 @@ def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
     return True
 
 
-def _machine(argv: Sequence[str]) -> None:
+def _machine_parser() -> Parser:
     parser = Parser(
-        "rosnode machine", description="List the machines that nodes run on, or the nodes on one."
+        "rosnode machine",
+        "List the machines that nodes run on, or the nodes on one.",
+        "rosnode machine [machine-name]",
+        surplus="please enter only one machine name",
     )
-    parser.add_argument("machine", nargs="?", help="a machine's name or address")
-    options = parser.parse_args(argv)
+    parser.add_argument("machine", nargs="?", help="a machine's name or address", completer="machines")
+    return parser
+
+
+def _machine(machine: str | None) -> None:
     with Graph.open("rosnode") as graph:
-        found = nodes_on(graph, options.machine) if options.machine else sorted({*node_hosts(graph).values()})
+        found = nodes_on(graph, machine) if machine else sorted({*node_hosts(graph).values()})
         print("\n".join(found))
 
 
-def _kill(argv: Sequence[str]) -> int:
-    parser = Parser("rosnode kill", description="Ask nodes to shut down; without a name, choose from a list.")
-    parser.add_argument("nodes", nargs="*", metavar="node", help="names of nodes")
+def _kill_parser() -> Parser:
+    parser = Parser(
+        "rosnode kill",
+        "Request nodes to shut down; without a name, choose from a list.",
+        "rosnode kill [node]...",
+    )
+    _add_nodes(parser, "*")
     parser.add_argument("-a", "--all", action="store_true", help="kill all nodes")
-    options = parser.parse_args(argv)
-    if options.all and options.nodes:
-        parser.error("-a kills all nodes: it takes no names")
+    return parser
+
+
+def _kill(nodes: Sequence[str], all: bool) -> int:
+    if all and nodes:
+        raise Misuse("-a kills all nodes: it takes no names", "invalid arguments with kill all (-a) option")
+
     with Graph.open("rosnode") as graph:
-        if options.all:
-            nodes = graph.addresses(list_nodes(graph))
-        elif options.nodes:
-            nodes = _known(graph, [graph.resolve(name) for name in options.nodes])
-            if len(nodes) < len(options.nodes):
+        if all:
+            chosen = graph.addresses(list_nodes(graph))
+        elif nodes:
+            chosen = _known(graph, [graph.resolve(name) for name in nodes])
+            if len(chosen) < len(nodes):
                 return 1
         else:
-            nodes = [find_node(graph, _chosen(list_nodes(graph)))]
-        if not nodes:
-            raise NotFoundError("node", "any", hint="there is none to kill")
-        if len(nodes) == 1:
-            print(f"killing {nodes[0].name}")
-        else:
-            print("killing:\n" + "\n".join(f" * {node.name}" for node in nodes))
-        sys.stdout.flush()
-        hung = 0
-        for node in nodes:
-            try:
-                kill_node(graph, node)
-            except NodeUnreachableError as error:
-                complain("rosnode", error)
-                hung += 1
-        if hung < len(nodes):
-            print("killed")
-        return 1 if hung else 0
+            chosen = [find_node(graph, _chosen(list_nodes(graph)))]
+        return _kill_all(graph, chosen)
+
+
+def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
+    if not nodes:
+        raise NotFoundError("node", "any", hint="there is none to kill")
+    if len(nodes) == 1:
+        print(f"killing {nodes[0].name}")
+    else:
+        print("killing:\n" + "\n".join(f" * {node.name}" for node in nodes))
+    sys.stdout.flush()
+    hung = 0
+    for node in nodes:
+        try:
+            kill_node(graph, node)
+        except NodeUnreachableError as error:
+            complain("rosnode", error)
+            hung += 1
+    if hung < len(nodes):
+        print("killed")
+    return 1 if hung else 0
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
@@ -214,11 +292,15 @@ def _chosen(nodes: list[str]) -> str:
         print(f"ERROR: please enter a number from 1 to {len(nodes)} (ctrl-C to cancel)")
 
 
-def _cleanup(argv: Sequence[str]) -> int:
-    parser = Parser(
-        "rosnode cleanup", description="Take nodes that do not answer out of the master, after a question."
+def _cleanup_parser() -> Parser:
+    return Parser(
+        "rosnode cleanup",
+        "Unregister nodes that do not answer from the master, after confirmation.",
+        "rosnode cleanup",
     )
-    parser.parse_args(argv)
+
+
+def _cleanup() -> int:
     with Graph.open("rosnode") as graph:
         silent = unreachable_nodes(graph)
         if not silent:
@@ -241,16 +323,27 @@ def _cleanup(argv: Sequence[str]) -> int:
         return 0
 
 
-_FAMILY = Family(
+def _add_nodes(parser: Parser, nargs: str) -> None:
+    parser.add_argument(
+        "nodes", nargs=nargs, default=[], metavar="node", help="names of nodes", completer="nodes"
+    )
+
+
+FAMILY = Family(
     "rosnode",
     "rosnode is a command-line tool for printing information about ROS Nodes.",
     (
-        Verb("ping", "test connectivity to node", _ping),
-        Verb("list", "list active nodes", _list),
-        Verb("info", "print information about node", _info),
-        Verb("machine", "list nodes running on a particular machine or list machines", _machine),
-        Verb("kill", "kill a running node", _kill),
-        Verb("cleanup", "purge registration information of unreachable nodes", _cleanup),
+        Verb("ping", "test connectivity to node", _ping_parser, _ping),
+        Verb("list", "list active nodes", _list_parser, _list),
+        Verb("info", "print information about node", _info_parser, _info),
+        Verb(
+            "machine",
+            "list nodes running on a particular machine or list machines",
+            _machine_parser,
+            _machine,
+        ),
+        Verb("kill", "kill a running node", _kill_parser, _kill),
+        Verb("cleanup", "purge registration information of unreachable nodes", _cleanup_parser, _cleanup),
     ),
     "Type rosnode <command> -h for more detailed usage, e.g. 'rosnode ping -h'",
 )

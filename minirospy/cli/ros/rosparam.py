@@ -8,130 +8,210 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import NotFoundError, UsageError, ValueTextError
+from minirospy.errors import NotFoundError, ValueTextError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import format_pretty, format_value, parse_value
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
-def _set(argv: Sequence[str]) -> None:
-    parser = Parser(
-        "rosparam set", description="Set a parameter to a YAML value, or to the contents of a file."
+_NO_NAME = "invalid arguments. Please specify a parameter name"
+
+
+def _set_parser() -> Parser:
+    parser = _parser(
+        "set",
+        "Set a parameter to a YAML value, or to the contents of a file.",
+        "[options] parameter value",
+        missing=_NO_NAME,
     )
-    parser.add_argument("parameter", help="the parameter's name")
-    parser.add_argument("value", nargs="?", help="YAML: 5, 1.5, true, text, [1, 2], '{x: 1, y: 2}', deg(90)")
-    parser.add_argument("-t", "--textfile", metavar="TEXT_FILE", help="set it to the text of a file")
-    parser.add_argument("-b", "--binfile", metavar="BINARY_FILE", help="set it to the bytes of a file")
+    parser.add_argument("parameter", help="the parameter's name", completer="parameters")
+    parser.add_argument(
+        "value",
+        nargs="?",
+        help="YAML: 5, 1.5, true, text, [1, 2], '{x: 1, y: 2}', deg(90)",
+        completer="parameter_value",
+    )
+    parser.add_argument(
+        "-t",
+        "--textfile",
+        metavar="TEXT_FILE",
+        help="set parameters to contents of text file",
+        completer="files",
+    )
+    parser.add_argument(
+        "-b",
+        "--binfile",
+        metavar="BINARY_FILE",
+        help="set parameters to contents of binary file",
+        completer="files",
+    )
     _add_verbose(parser)
-    options = parser.parse_intermixed_args(argv)
-    if [options.value, options.textfile, options.binfile].count(None) != 2:
-        raise UsageError(
-            "please specify a value, or one of -t and -b (`rosparam set -h` shows what there is)"
-        )
-    if options.textfile is not None:
-        value: object = _read(options.textfile)
-    elif options.binfile is not None:
-        value = _read_bytes(options.binfile)
+    return parser
+
+
+def _set(parameter: str, value: str | None, textfile: str | None, binfile: str | None, verbose: bool) -> None:
+    if [value, textfile, binfile].count(None) != 2:
+        raise Misuse("please specify a value, or one of -t and -b", _ros_misuse(value, textfile, binfile))
+
+    new: object
+    if textfile is not None:
+        new = _read(textfile)
+    elif binfile is not None:
+        new = _read_bytes(binfile)
     else:
         # No text is the empty text to the shell's user; to YAML it would be null.
-        value = parse_value(options.value) if options.value else ""
+        new = parse_value(value) if value else ""
+
     with Graph.open("rosparam") as graph:
-        for name, single in parameters.set_parameter(graph, graph.resolve(options.parameter), value):
-            if options.verbose:
+        for name, single in parameters.set_parameter(graph, graph.resolve(parameter), new):
+            if verbose:
                 print(f"set parameter [{name}] to [{single}]")
 
 
-def _get(argv: Sequence[str]) -> None:
-    parser = Parser("rosparam get", description="Print the value of a parameter, or of all in a namespace.")
-    parser.add_argument("parameter", help="the parameter's name; / for all")
-    parser.add_argument("-p", dest="pretty", action="store_true", help="print it for people, not as YAML")
+def _ros_misuse(value: str | None, textfile: str | None, binfile: str | None) -> str:
+    if textfile is not None and binfile is not None:
+        return "you may only specify one of --textfile or --binfile"
+    return (
+        "too many arguments" if value is not None else "invalid arguments. Please specify a parameter value"
+    )
+
+
+def _get_parser() -> Parser:
+    parser = _parser(
+        "get",
+        "Print the value of a parameter, or of all in a namespace.",
+        "[options] parameter",
+        missing=_NO_NAME,
+    )
+    parser.add_argument("parameter", help="the parameter's name; / for all", completer="parameters")
+    parser.add_argument("-p", dest="pretty", action="store_true", help="pretty print. WARNING: not YAML-safe")
     _add_verbose(parser)
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _get(parameter: str, pretty: bool, verbose: bool) -> None:
     with Graph.open("rosparam") as graph:
-        name = graph.resolve(options.parameter)
-        if options.verbose:
+        name = graph.resolve(parameter)
+        if verbose:
             print(f"getting parameter [{name}]")
         value = parameters.get_parameter(graph, name)
-        print(format_pretty(value) if options.pretty else format_value(value))
+        print(format_pretty(value) if pretty else format_value(value))
 
 
-def _load(argv: Sequence[str]) -> None:
-    parser = Parser("rosparam load", description="Set parameters from a YAML file.")
-    parser.add_argument("file", help="the file; - for standard input")
-    parser.add_argument("namespace", nargs="?", default="", help="where they go")
+def _load_parser() -> Parser:
+    parser = _parser(
+        "load",
+        "Set parameters from a YAML file.",
+        "[options] file [namespace]",
+        missing="invalid arguments. Please specify a file name or - for stdin",
+    )
+    parser.add_argument("file", help="the file; - for standard input", completer="files")
+    _add_namespace(parser, default="", help="where they go")
     _add_verbose(parser)
-    options = parser.parse_args(argv)
+    return parser
+
+
+def _load(file: str, namespace: str, verbose: bool) -> None:
     with Graph.open("rosparam") as graph:
-        from_stdin = options.file == "-"
-        where = "standard input" if from_stdin else options.file
-        if options.verbose:
-            print(f"reading parameters from {'stdin' if from_stdin else f'[{options.file}]'}", flush=True)
-        text = sys.stdin.read() if from_stdin else _read(options.file)
-        files = parameters.parse_parameters(text, where, graph.resolve(options.namespace))
-        for file in files:
-            if options.verbose and file.own_namespace:
-                print(f"reading parameters into namespace [{file.namespace}]")
-        for file in files:
-            for name, value in parameters.set_parameter(graph, file.namespace, file.values):
-                if options.verbose:
+        from_stdin = file == "-"
+        where = "standard input" if from_stdin else file
+        if verbose:
+            print(f"reading parameters from {'stdin' if from_stdin else f'[{file}]'}", flush=True)
+        text = sys.stdin.read() if from_stdin else _read(file)
+
+        found = parameters.parse_parameters(text, where, graph.resolve(namespace))
+        for each in found:
+            if verbose and each.own_namespace:
+                print(f"reading parameters into namespace [{each.namespace}]")
+        for each in found:
+            for name, value in parameters.set_parameter(graph, each.namespace, each.values):
+                if verbose:
                     print(f"{name}={value}")
 
 
-def _dump(argv: Sequence[str]) -> None:
-    parser = Parser("rosparam dump", description="Write parameters to a YAML file, or to standard output.")
-    parser.add_argument("file", nargs="?", default="-", help="the file; - for standard output")
-    parser.add_argument("namespace", nargs="?", default="", help="only those below this name")
+def _dump_parser() -> Parser:
+    parser = _parser(
+        "dump", "Write parameters to a YAML file, or to standard output.", "[options] file [namespace]"
+    )
+    parser.add_argument(
+        "file", nargs="?", default="-", help="the file; - for standard output", completer="files"
+    )
+    _add_namespace(parser, default="", help="only those below this name")
     _add_verbose(parser)
-    options = parser.parse_args(argv)
-    with Graph.open("rosparam") as graph:
-        namespace = graph.resolve(options.namespace)
-        values = parameters.get_parameter(graph, namespace)
-        if options.file == "-":
-            sys.stdout.write(parameters.dump_parameters(values))
-            return
-        if options.verbose:
-            print(f"dumping namespace [{namespace}] to file [{options.file}]")
-            print("\n".join(f"{name}={value}" for name, value in parameters.flatten(namespace, values)))
-        try:
-            with open(options.file, "w", encoding="utf-8") as stream:
-                stream.write(parameters.dump_parameters(values))
-        except OSError as error:
-            raise ValueTextError(options.file, f"cannot be written: {error.strerror}") from error
+    return parser
 
 
-def _delete(argv: Sequence[str]) -> None:
-    parser = Parser("rosparam delete", description="Delete a parameter, or all in a namespace.")
-    parser.add_argument("parameter", help="the parameter's name")
-    _add_verbose(parser)
-    options = parser.parse_args(argv)
+def _dump(file: str, namespace: str, verbose: bool) -> None:
     with Graph.open("rosparam") as graph:
-        name = graph.resolve(options.parameter)
+        resolved = graph.resolve(namespace)
+        values = parameters.get_parameter(graph, resolved)
+
+    if file == "-":
+        sys.stdout.write(parameters.dump_parameters(values))
+        return
+    if verbose:
+        print(f"dumping namespace [{resolved}] to file [{file}]")
+        print("\n".join(f"{name}={value}" for name, value in parameters.flatten(resolved, values)))
+    try:
+        with open(file, "w", encoding="utf-8") as stream:
+            stream.write(parameters.dump_parameters(values))
+    except OSError as error:
+        raise ValueTextError(file, f"cannot be written: {error.strerror}") from error
+
+
+def _delete_parser() -> Parser:
+    parser = _parser(
+        "delete", "Delete a parameter, or all in a namespace.", "[options] parameter", missing=_NO_NAME
+    )
+    parser.add_argument("parameter", help="the parameter's name", completer="parameters")
+    _add_verbose(parser)
+    return parser
+
+
+def _delete(parameter: str, verbose: bool) -> None:
+    with Graph.open("rosparam") as graph:
+        name = graph.resolve(parameter)
         parameters.delete_parameter(graph, name)
-        if options.verbose:
+        if verbose:
             print(f"deleted parameter [{name}]")
 
 
-def _list(argv: Sequence[str]) -> None:
-    parser = Parser(
-        "rosparam list", description="List the names of the parameters, or of those in a namespace."
-    )
-    parser.add_argument("namespace", nargs="?", default="/", help="only those below this name")
-    options = parser.parse_args(argv)
+def _list_parser() -> Parser:
+    parser = _parser("list", "List the names of the parameters, or of those in a namespace.", "[namespace]")
+    _add_namespace(parser, default="/", help="only those below this name")
+    return parser
+
+
+def _list(namespace: str) -> None:
     with Graph.open("rosparam") as graph:
-        print("\n".join(parameters.list_parameters(graph, graph.resolve(options.namespace))))
+        print("\n".join(parameters.list_parameters(graph, graph.resolve(namespace))))
+
+
+def _parser(verb: str, description: str, ros_usage: str, missing: str = "") -> Parser:
+    return Parser(
+        f"rosparam {verb}",
+        description,
+        f"rosparam {verb} {ros_usage}",
+        missing=missing,
+        surplus="too many arguments",
+    )
+
+
+def _add_namespace(parser: Parser, default: str, help: str) -> None:
+    parser.add_argument("namespace", nargs="?", default=default, help=help, completer="parameters")
 
 
 def _add_verbose(parser: Parser) -> None:
-    parser.add_argument("-v", dest="verbose", action="store_true", help="say what is done")
+    parser.add_argument("-v", dest="verbose", action="store_true", help="turn on verbose output")
 
 
 def _read(file: str) -> str:
@@ -151,16 +231,16 @@ def _read_bytes(file: str) -> bytes:
         raise ValueTextError(file, f"cannot be read: {error.strerror}") from error
 
 
-_FAMILY = Family(
+FAMILY = Family(
     "rosparam",
     "rosparam is a command-line tool for getting, setting, and deleting parameters "
     "from the ROS Parameter Server.",
     (
-        Verb("set", "set parameter", _set),
-        Verb("get", "get parameter", _get),
-        Verb("load", "load parameters from file", _load),
-        Verb("dump", "dump parameters to file", _dump),
-        Verb("delete", "delete parameter", _delete),
-        Verb("list", "list parameter names", _list),
+        Verb("set", "set parameter", _set_parser, _set),
+        Verb("get", "get parameter", _get_parser, _get),
+        Verb("load", "load parameters from file", _load_parser, _load),
+        Verb("dump", "dump parameters to file", _dump_parser, _dump),
+        Verb("delete", "delete parameter", _delete_parser, _delete),
+        Verb("list", "list parameter names", _list_parser, _list),
     ),
 )

@@ -9,7 +9,8 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import Parser, complain, hint_near, one_argument, warn
+from minirospy.cli.command import complain, hint_near, warn
+from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
 from minirospy.introspect import services
@@ -18,89 +19,146 @@ from minirospy.introspect.graph import Graph
 if TYPE_CHECKING:
     from minirospy.names import Arguments
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
-def _args(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_service("args", "Print the names of the fields of a service's request.", argv)
+def _service_parser(verb: str, description: str, missing: str = "service must be specified") -> Parser:
+    """Return the parser of a verb that takes a service's name."""
+    parser = Parser(
+        f"rosservice {verb}",
+        description,
+        f"rosservice {verb} /service",
+        missing=missing,
+        surplus="you may only specify one input service",
+    )
+    parser.add_argument("service", help="the service's name", completer="services")
+    return parser
+
+
+def _args_parser() -> Parser:
+    return _service_parser("args", "Print the names of the fields of a service's request.")
+
+
+def _args(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        print(" ".join(services.service_arguments(services.service_type(graph, graph.resolve(name)))))
+        print(" ".join(services.service_arguments(services.service_type(graph, graph.resolve(service)))))
 
 
-def _info(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_service("info", "Print a service's node, URI, type and arguments.", argv)
+def _info_parser() -> Parser:
+    return _service_parser(
+        "info", "Print a service's node, URI, type and arguments.", "you must specify a service name"
+    )
+
+
+def _info(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        service = graph.resolve(name)
-        offer = services.service_offer(graph, service)
-        # What the master knows, before its node is asked, which may have ended.
+        name = graph.resolve(service)
+        offer = services.service_offer(graph, name)
+        # What the master knows, before its node is called, which may have ended.
         print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
-        type_ = services.service_type(graph, service)
+        type_ = services.service_type(graph, name)
     print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
 
 
-def _type(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_service("type", "Print a service's type.", argv)
+def _type_parser() -> Parser:
+    return _service_parser("type", "Print the type of a service.")
+
+
+def _type(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        print(services.service_type(graph, graph.resolve(name)))
+        print(services.service_type(graph, graph.resolve(service)))
 
 
-def _uri(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_service("uri", "Print where a service is called.", argv)
+def _uri_parser() -> Parser:
+    return _service_parser("uri", "Print the ROSRPC URI of a service.")
+
+
+def _uri(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        print(services.service_uri(graph, graph.resolve(name)))
+        print(services.service_uri(graph, graph.resolve(service)))
 
 
-def _find(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    help_ = "a service type, as std_srvs/SetBool"
-    type_ = one_argument("rosservice find", "Print the services of a type.", "type", help_, argv)
+def _find_parser() -> Parser:
+    parser = Parser(
+        "rosservice find",
+        "Print the services of a type.",
+        "rosservice find msg-type",
+        missing="please specify a message type",
+        surplus="you may only specify one message type",
+    )
+    parser.add_argument("type", help="a service type, as std_srvs/SetBool", completer="service_types")
+    return parser
+
+
+def _find(type: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        print("\n".join(services.find_services_of_type(graph, type_)))
+        print("\n".join(services.find_services_of_type(graph, type)))
 
 
-def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rosservice list", description="List the services, or those in a namespace.")
-    parser.add_argument("namespace", nargs="?", help="only services at or below this name")
-    parser.add_argument("-n", "--nodes", action="store_true", help="print the nodes that provide them, too")
-    options = parser.parse_args(argv)
+def _list_parser() -> Parser:
+    parser = Parser(
+        "rosservice list",
+        "List the services, or those in a namespace.",
+        "rosservice list [/namespace]",
+        surplus="you may only specify one input namespace",
+    )
+    parser.add_argument(
+        "namespace", nargs="?", help="only services at or below this name", completer="services"
+    )
+    parser.add_argument("-n", "--nodes", action="store_true", help="print nodes that provide service(s)")
+    return parser
+
+
+def _list(namespace: str | None, nodes: bool, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        for service in services.list_services(
-            graph, graph.resolve(options.namespace) if options.namespace else "/"
-        ):
-            print(f"{service.name} {','.join(service.nodes)}" if options.nodes else service.name)
+        for service in services.list_services(graph, graph.resolve(namespace) if namespace else "/"):
+            print(f"{service.name} {','.join(service.nodes)}" if nodes else service.name)
 
 
-def _call(argv: Sequence[str], arguments: Arguments | None = None) -> None:
+def _call_parser() -> Parser:
     parser = Parser(
         "rosservice call",
-        description="Call a service and print its response.",
+        "Call a service and print its response.",
+        "rosservice call /service [args...]",
+        missing="service must be specified",
         epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order.',
     )
-    parser.add_argument("service", help="the service's name")
+    parser.add_argument("service", help="the service's name", completer="services")
     parser.add_argument(
-        "args", nargs="*", default=[], help="the request's values; a terminal asks for missing ones"
+        "args",
+        nargs="*",
+        default=[],
+        help="the request's values; a terminal asks for missing ones",
+        completer="request_text",
     )
-    parser.add_argument("-v", dest="verbose", action="store_true", help="print the request, too")
-    parser.add_argument("--wait", action="store_true", help="wait until the service is there")
-    options = parser.parse_intermixed_args(argv)
+    parser.add_argument("-v", dest="verbose", action="store_true", help="print verbose output")
+    parser.add_argument("--wait", action="store_true", help="wait for service to be advertised")
+    return parser
+
+
+def _call(
+    service: str, args: Sequence[str], verbose: bool, wait: bool, arguments: Arguments | None = None
+) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
-        service = graph.resolve(options.service)
-        if options.wait:
+        name = graph.resolve(service)
+        if wait:
+            services.wait_for_service(graph, name, lambda: _warn_waiting(graph, name))
 
-            def say_so() -> None:
-                warn(f"service [{service}] is not there yet", service)
-                hint_near(service, graph.state().services)
-
-            services.wait_for_service(graph, service, say_so)
-        type_ = services.service_type(graph, service)
-        for request in _requests(type_, options.args):
-            if options.verbose:
+        type_ = services.service_type(graph, name)
+        for request in _requests(type_, args):
+            if verbose:
                 print(f"{request}\n---", flush=True)
-            print(services.call_service(graph, service, type_, request), flush=True)
+            print(services.call_service(graph, name, type_, request), flush=True)
+
+
+def _warn_waiting(graph: Graph, service: str) -> None:
+    warn(f"service [{service}] is not there yet", service)
+    hint_near(service, graph.state().services)
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
@@ -140,21 +198,17 @@ def _asked_for(request: Any, known: Sequence[str]) -> Any:
         raise UsageError("the input ended before all values were given") from None
 
 
-def _one_service(verb: str, description: str, argv: Sequence[str]) -> str:
-    return one_argument(f"rosservice {verb}", description, "service", "the service's name", argv)
-
-
-_FAMILY = Family(
+FAMILY = Family(
     "rosservice",
     "",
     (
-        Verb("args", "print service arguments", _args),
-        Verb("call", "call the service with the provided args", _call),
-        Verb("find", "find services by service type", _find),
-        Verb("info", "print information about service", _info),
-        Verb("list", "list active services", _list),
-        Verb("type", "print service type", _type),
-        Verb("uri", "print service ROSRPC uri", _uri),
+        Verb("args", "print service arguments", _args_parser, _args),
+        Verb("call", "call the service with the provided args", _call_parser, _call),
+        Verb("find", "find services by service type", _find_parser, _find),
+        Verb("info", "print information about service", _info_parser, _info),
+        Verb("list", "list active services", _list_parser, _list),
+        Verb("type", "print service type", _type_parser, _type),
+        Verb("uri", "print service ROSRPC uri", _uri_parser, _uri),
     ),
     "Type rosservice <command> -h for more detailed usage, e.g. 'rosservice call -h'",
     is_node=True,

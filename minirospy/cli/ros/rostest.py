@@ -10,64 +10,95 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from minirospy import private_files
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.testing.junit import Result, report
 from minirospy.testing.unit import begin_results, rostest_name_from_path
 from minirospy.workspace.packages import Packages, package_name
 
-__all__ = ["rostest", "rosunit"]
+__all__ = ["ROSTEST", "ROSUNIT", "rostest", "rosunit"]
 
 
 def rostest(argv: Sequence[str] | None = None) -> int:
-    """rostest; 0 all passed, 1 a test could not be run or did not say how it went, 2 a test failed."""
-    words = list(sys.argv[1:] if argv is None else argv)
-    return run("rostest", lambda: _rostest(words), interrupted=1)
+    """Run rostest; return 0 all passed, 1 a test could not be run or did not report its results, 2 a test failed."""
+    return ROSTEST.main(argv)
 
 
 def rosunit(argv: Sequence[str] | None = None) -> int:
-    """rosunit; 0 all passed, 1 the file could not be run or did not say how it went, 2 a test failed."""
-    words = list(sys.argv[1:] if argv is None else argv)
-    return run("rosunit", lambda: _rosunit(words), interrupted=1)
+    """Run rosunit; return 0 all passed, 1 the file could not be run or did not report its results, 2 a test failed."""
+    return ROSUNIT.main(argv)
 
 
-def _rostest(words: list[str]) -> int:
-    parser = Parser(
+class _RostestParser(Parser):
+    """Takes ``name:=value`` from among the words."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
+        options = super().parse([word for word in words if ":=" not in word])
+        options["args"] = dict(
+            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
+        )
+        return options
+
+
+def _rostest_parser() -> Parser:
+    parser = _RostestParser(
         prog="rostest",
         usage="rostest [options] PACKAGE FILE [arg:=value ...]\n       rostest [options] FILE [arg:=value ...]",
         description="Runs each <test> of a launch file, with the file's nodes and a master of its own on a free port.",
         epilog="Exit status: 0 all passed, 1 a test could not be run or wrote no results, 2 a test failed.",
     )
-    parser.add_argument("what", nargs="*", help="a package and a file in it, or a file")
-    parser.add_argument(
-        "-t", "--text", action="store_true", help="print everything, write no files of results"
+    add = parser.add_argument
+    add("what", nargs="*", help="a package and a file in it, or a file", completer="launch_words")
+    add("-t", "--text", action="store_true", help="print everything, write no files of results")
+    add(
+        "--results-filename",
+        metavar="NAME",
+        help="name of the file of results, instead of the test's",
+        completer="nothing",
     )
-    parser.add_argument(
-        "--results-filename", metavar="NAME", help="name of the file of results, instead of the test's"
+    add(
+        "--results-base-dir",
+        metavar="DIR",
+        help="folder of results, instead of ~/.ros/test_results",
+        completer="folders",
     )
-    parser.add_argument(
-        "--results-base-dir", metavar="DIR", help="folder of results, instead of ~/.ros/test_results"
+    add("-r", "--reuse-master", action="store_true", help="use the master that runs")
+    add("-c", "--clear", action="store_true", help="with --reuse-master: delete all its parameters first")
+    add(
+        "--package",
+        metavar="PKG",
+        help="name the results after this package, instead of the file's",
+        completer="package_names",
     )
-    parser.add_argument("-r", "--reuse-master", action="store_true", help="use the master that runs")
-    parser.add_argument(
-        "-c", "--clear", action="store_true", help="with --reuse-master: delete all its parameters first"
-    )
-    parser.add_argument(
-        "--package", metavar="PKG", help="name the results after this package, instead of the file's"
-    )
-    parser.add_argument("--pkgdir", metavar="DIR", help="the folder that the file's name is relative to")
-    options = parser.parse_args([word for word in words if ":=" not in word])
-    args = dict(word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__"))
-    if not options.what:
-        parser.error("You must supply a test file argument to rostest.")
-    if options.clear and not options.reuse_master:
-        parser.error("The --clear option is only valid with --reuse-master")
+    add("--pkgdir", metavar="DIR", help="the folder that the file's name is relative to", completer="folders")
+    return parser
+
+
+def _rostest(
+    what: list[str],
+    text: bool,
+    results_filename: str | None,
+    results_base_dir: str | None,
+    reuse_master: bool,
+    clear: bool,
+    package: str | None,
+    pkgdir: str | None,
+    args: dict[str, str],
+) -> int:
+    if not what:
+        raise Misuse("You must supply a test file argument to rostest.")
+    if clear and not reuse_master:
+        raise Misuse("The --clear option is only valid with --reuse-master")
+
     packages = Packages()
-    file = _file(options.what, packages)
-    package, folder = options.package, options.pkgdir
+    file = _file(what, packages)
+    folder = pkgdir
     if not (package and folder):
         found = _package_of(file, "rostest", "--package NAME --pkgdir FOLDER")
         package, folder = package or found[0], folder or str(found[1])
@@ -75,20 +106,20 @@ def _rostest(words: list[str]) -> int:
     from minirospy.launch.load import load_files
     from minirospy.testing.runner import RosTest
 
-    base = _base(options.results_base_dir)
+    base = _base(results_base_dir)
     test = RosTest(
         package=package,
         spec=load_files([str(file)], args, packages),
         environment=Environment.read(),
         packages=packages,
         results_dir=base,
-        text=options.text,
-        reuse_master=options.reuse_master,
-        clear=options.clear,
+        text=text,
+        reuse_master=reuse_master,
+        clear=clear,
     )
-    name = options.results_filename or rostest_name_from_path(os.path.abspath(folder), str(file))
+    name = results_filename or rostest_name_from_path(os.path.abspath(folder), str(file))
     output = base / package / f"rostest-{name.removesuffix('.xml')}.xml"
-    if options.text:
+    if text:
         test.run()
         return _told(test.own, test.results, "ROSTEST", None)
     log_file = test.environment.log_dir / f"{test.run_id}.log"
@@ -105,44 +136,60 @@ def _rostest(words: list[str]) -> int:
     return status
 
 
-def _rosunit(words: list[str]) -> int:
+def _rosunit_parser() -> Parser:
     parser = Parser(
         prog="rosunit",
         usage="rosunit [options] FILE [arguments of the test ...]",
         description="Runs a unit test's file, and reads the results that it writes.",
         epilog="Exit status: 0 all passed, 1 the file could not be run or wrote no results, 2 a test failed.",
     )
-    parser.add_argument("file", nargs="?", help="a Python file, or a program, that calls rosunit.unitrun")
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="what the file is given")
-    parser.add_argument(
-        "-t", "--text", action="store_true", help="print everything, write no files of results"
+    add = parser.add_argument
+    add(
+        "file",
+        nargs="?",
+        help="a Python file, or a program, that calls rosunit.unitrun",
+        completer="files",
     )
-    parser.add_argument("--time-limit", type=float, default=60.0, metavar="SECONDS", help="default: 60")
-    parser.add_argument("--name", help="the test's name in the results (default: the file's)")
-    parser.add_argument("--package", help="the package in the results (default: the one around the file)")
-    options = parser.parse_args(words)
-    if not options.file:
-        parser.error("You must supply a test file.")
-    file = Path(options.file)
-    if not file.is_file():
-        raise MinirospyError(f"there is no file {file} to test")
-    package = options.package or _package_of(file, "rosunit", "--package NAME")[0]
-    name = options.name or file.stem
+    add("arguments", nargs=argparse.REMAINDER, help="what the file is given", completer="files")
+    add("-t", "--text", action="store_true", help="print everything, write no files of results")
+    add("--time-limit", type=float, default=60.0, metavar="SECONDS", help="default: 60")
+    add("--name", help="the test's name in the results (default: the file's)", completer="nothing")
+    add(
+        "--package",
+        help="the package in the results (default: the one around the file)",
+        completer="package_names",
+    )
+    return parser
+
+
+def _rosunit(
+    file: str | None,
+    arguments: list[str],
+    text: bool,
+    time_limit: float,
+    name: str | None,
+    package: str | None,
+) -> int:
+    if not file:
+        raise Misuse("You must supply a test file.")
+    path = Path(file)
+    if not path.is_file():
+        raise MinirospyError(f"there is no file {path} to test")
+    package = package or _package_of(path, "rosunit", "--package NAME")[0]
+    name = name or path.stem
 
     from minirospy.testing.bare import run_bare
 
     base = _base(None)
     output = base / package / f"rostest-{name}.xml"
     results_file = base / package / f"rosunit-{name}.xml"
-    if not options.text:
+    if not text:
         begin_results(output)
-    results, case = run_bare(
-        file, options.arguments, results_file, package, name, seconds=options.time_limit, text=options.text
-    )
+    results, case = run_bare(path, arguments, results_file, package, name, seconds=time_limit, text=text)
     own = Result("unittest.suite.TestSuite")
     own.add_case(case)
     print(case.line)
-    return _told(own, results, "ROSUNIT", None if options.text else output)
+    return _told(own, results, "ROSUNIT", None if text else output)
 
 
 def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
@@ -186,6 +233,10 @@ def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
         if name:
             return name, folder
     raise MinirospyError(f"{file} is in no package (no package.xml above it): type {command} {options} FILE")
+
+
+ROSTEST = Command("rostest", _rostest_parser, _rostest, interrupted=1)
+ROSUNIT = Command("rosunit", _rosunit_parser, _rosunit, interrupted=1)
 
 
 if __name__ == "__main__":

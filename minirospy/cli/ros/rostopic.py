@@ -5,80 +5,102 @@ Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
 
 from __future__ import annotations
 
+import re
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import Parser, one_argument, refuse_bag, tool_node, warn_unpublished
+from minirospy.cli.command import refuse_bag, tool_node, warn_unpublished
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import NotFoundError
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Callable, Sequence
+    from typing import Any
 
     from minirospy.introspect.streams import Received, ToolNode
     from minirospy.names import Arguments
 
-__all__ = ["main"]
+__all__ = ["FAMILY", "main"]
 
 _CLEAR_SCREEN = "\033[2J\033[;H"
+_SHIELD = "\0"
+_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
-    return _FAMILY.main(argv)
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
 
 
 # --- what the master knows
 
 
-def _list(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rostopic list", description="List the topics, or those in a namespace.")
-    parser.add_argument("namespace", nargs="?", help="only topics at or below this name")
+def _list_parser() -> Parser:
+    parser = Parser(
+        "rostopic list",
+        "List the topics, or those in a namespace.",
+        "rostopic list [/namespace]",
+        surplus="you may only specify one input topic",
+    )
+    parser.add_argument("namespace", nargs="?", help="only topics at or below this name", completer="topics")
     _add_bag(parser, "list topics in .bag file")
     parser.add_argument("-v", "--verbose", action="store_true", help="list full details about each topic")
-    side = parser.add_mutually_exclusive_group()
-    side.add_argument("-p", dest="publishers", action="store_true", help="list only publishers")
-    side.add_argument("-s", dest="subscribers", action="store_true", help="list only subscribers")
+    parser.add_argument("-p", dest="publishers", action="store_true", help="list only publishers")
+    parser.add_argument("-s", dest="subscribers", action="store_true", help="list only subscribers")
     parser.add_argument("--host", action="store_true", help="group by host name")
-    options = parser.parse_args(argv)
-    if options.bag:
+    return parser
+
+
+def _list(
+    namespace: str | None,
+    bag: str | None,
+    verbose: bool,
+    publishers: bool,
+    subscribers: bool,
+    host: bool,
+    arguments: Arguments | None = None,
+) -> None:
+    if bag:
         refuse_bag("rostopic list")
+    if publishers and subscribers:
+        raise Misuse("argument -s: not allowed with argument -p", "you may only specify one of -p, -s")
+    show = partial(_print_topics, publishers=not subscribers, subscribers=not publishers, verbose=verbose)
     with Graph.open("rostopic", arguments=arguments) as graph:
-        namespace = graph.resolve(options.namespace) if options.namespace else "/"
-        if not options.verbose and not options.host:
-            print("\n".join(_names(graph, namespace, options)))
+        space = graph.resolve(namespace) if namespace else "/"
+        if not verbose and not host:
+            names = topics.topic_names(graph, space, published=not subscribers, subscribed=not publishers)
+            print("\n".join(names))
             return
-        found = topics.list_topics(graph, namespace)
-        if not options.host:
-            _print_topics(found, options, indent="")
+
+        found = topics.list_topics(graph, space)
+        if not host:
+            show(found)
             return
-        for host, on_host in topics.by_host(graph, found).items():
-            print(f"Host [{host}]:")
-            _print_topics(on_host, options, indent="  ")
+        for name, on_host in topics.by_host(graph, found).items():
+            print(f"Host [{name}]:")
+            show(on_host, indent="  ")
 
 
-def _names(graph: Graph, namespace: str, options: argparse.Namespace) -> list[str]:
-    return topics.topic_names(
-        graph, namespace, published=not options.subscribers, subscribed=not options.publishers
-    )
-
-
-def _print_topics(found: topics.TopicList, options: argparse.Namespace, indent: str) -> None:
-    published = [] if options.subscribers else found.published
-    subscribed = [] if options.publishers else found.subscribed
-    if not options.verbose:
+def _print_topics(
+    found: topics.TopicList, *, publishers: bool, subscribers: bool, verbose: bool, indent: str = ""
+) -> None:
+    published = found.published if publishers else []
+    subscribed = found.subscribed if subscribers else []
+    if not verbose:
         names = {topic.name for topic in (*published, *subscribed)}
         print("\n".join(indent + name for name in sorted(names)))
         return
-    print(indent if options.subscribers else "")
-    if not options.subscribers:
+
+    print("" if publishers else indent)
+    if publishers:
         print(f"{indent}Published topics:")
         _print_rows(published, "publisher", indent)
-        print(indent if not options.publishers else "")
-    if not options.publishers:
+        print(indent if subscribers else "")
+    if subscribers:
         print(f"{indent}Subscribed topics:")
         _print_rows(subscribed, "subscriber", indent)
         print()
@@ -90,77 +112,141 @@ def _print_rows(rows: list[topics.TopicNodes], word: str, indent: str) -> None:
         print(f"{indent} * {topic.name} [{topic.type}] {len(topic.nodes)} {word}{plural}")
 
 
-def _info(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_topic("info", "Print a topic's type, publishers and subscribers.", argv)
+def _info_parser() -> Parser:
+    parser = Parser(
+        "rostopic info",
+        "Print a topic's type, publishers and subscribers.",
+        "rostopic info /topic",
+        missing="you must specify a topic name",
+        surplus="you may only specify one topic name",
+    )
+    _add_topic(parser)
+    return parser
+
+
+def _info(topic: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
-        detail = topics.topic_detail(graph, graph.resolve(name))
+        detail = topics.topic_detail(graph, graph.resolve(topic))
+
     from minirospy.introspect.texts import topic_text
 
     print(topic_text(detail))
 
 
-def _type(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    name = _one_topic("type", "Print the type of a topic, or of a field of its messages.", argv)
+def _type_parser() -> Parser:
+    parser = Parser("rostopic type", "Print the type of a topic, or of a field of its messages.")
+    _add_topic(parser)
+    return parser
+
+
+def _type(topic: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
-        field = topics.require_topic(graph, graph.resolve(name))
+        field = topics.require_topic(graph, graph.resolve(topic))
     print(f"{field.type} {field.path} {topics.topic_field_type(field)}" if field.path else field.type)
 
 
-def _find(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    help_ = "a message type, as std_msgs/Bool"
-    type_ = one_argument("rostopic find", "List the topics of a type.", "type", help_, argv)
+def _find_parser() -> Parser:
+    parser = Parser(
+        "rostopic find",
+        "List the topics of a type.",
+        "rostopic find msg-type",
+        missing="please specify a message type",
+        surplus="you may only specify one message type",
+    )
+    parser.add_argument("type", help="a message type, as std_msgs/Bool", completer="message_types")
+    return parser
+
+
+def _find(type: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
-        print("\n".join(topics.find_topics_of_type(graph, type_)))
-
-
-def _one_topic(verb: str, description: str, argv: Sequence[str]) -> str:
-    return one_argument(f"rostopic {verb}", description, "topic", "the topic's name", argv)
+        print("\n".join(topics.find_topics_of_type(graph, type)))
 
 
 # --- what goes over a topic
 
 
-def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rostopic echo", description="Print the messages of a topic, or one field of them.")
+def _echo_parser() -> Parser:
+    parser = Parser(
+        "rostopic echo",
+        "Print the messages of a topic, or one field of them.",
+        "rostopic echo [options] /topic",
+        missing="topic must be specified",
+        surplus="you may only specify one input topic",
+    )
     add = parser.add_argument
-    add("topic", nargs="?", help="the topic, with a field's path behind it where wanted: /pose/position/x")
+    add(
+        "topic",
+        nargs="?",
+        help="the topic, followed by a field's path where wanted: /pose/position/x",
+        completer="topics",
+    )
     _add_bag(parser, "echo messages from .bag file")
     add("-p", dest="plot", action="store_true", help="echo in a plotting friendly format")
-    add("-w", dest="width", type=int, metavar="NUM_WIDTH", help="fixed width for numeric values, at least 2")
-    add("--filter", metavar="EXPRESSION", help="print only messages m for which this Python is true")
+    add("-w", dest="width", type=int, metavar="NUM_WIDTH", help="fixed width for numeric values")
+    add(
+        "--filter",
+        metavar="FILTER-EXPRESSION",
+        help="Python expression to filter messages that are printed. Expression can use Python builtins as well as "
+        "m (the message) and topic (the topic name).",
+        completer="nothing",
+    )
     add("--nostr", action="store_true", help="exclude string fields")
     add("--noarr", action="store_true", help="exclude arrays")
     add("-c", "--clear", action="store_true", help="clear screen before printing next message")
-    add("-a", "--all", action="store_true", help="display all messages of a bag, with -b only")
+    add("-a", "--all", action="store_true", help="display all message in bag, only valid with -b option")
     add("-n", dest="count", type=int, metavar="COUNT", help="number of messages to echo")
     add("--offset", action="store_true", help="display time as offsets from current time (in seconds)")
-    options = parser.parse_intermixed_args(argv)
-    if options.bag:
+    return parser
+
+
+def _echo(
+    topic: str | None,
+    bag: str | None,
+    plot: bool,
+    width: int | None,
+    filter: str | None,
+    nostr: bool,
+    noarr: bool,
+    clear: bool,
+    all: bool,
+    count: int | None,
+    offset: bool,
+    arguments: Arguments | None = None,
+) -> None:
+    if bag:
         refuse_bag("rostopic echo")
-    if options.topic is None:
-        parser.error("a topic is missing")
-    if options.all:
-        parser.error("-a displays all messages of a bag: it needs -b")
-    if options.width is not None and options.width < 2:
-        parser.error("-w: the fixed width of numbers is at least 2")
+    if topic is None:
+        raise Misuse("a topic is missing", "topic must be specified")
+    if all:
+        raise Misuse(
+            "-a displays all messages of a bag: it needs -b",
+            "Display all option is only valid when echoing from bag files",
+        )
+    if width is not None and width < 2:
+        raise Misuse(
+            "-w: the fixed width of numbers is at least 2",
+            "Fixed width for numeric values must be at least 2",
+        )
+
     from minirospy.introspect.echo import Echo, Filter
     from minirospy.introspect.streams import wait_for_topic
 
-    keep = Filter(options.filter) if options.filter else None
+    keep = Filter(filter) if filter else None
     with Graph.open("rostopic", arguments=arguments) as graph:
-        topic = graph.resolve(options.topic)
-        if options.count is not None and options.count <= 0:
+        name = graph.resolve(topic)
+        if count is not None and count <= 0:
             return
-        field = wait_for_topic(graph, topic, lambda: warn_unpublished(graph, topic))
+        field = wait_for_topic(graph, name, lambda: warn_unpublished(graph, name))
+
     printed = 0
     with tool_node("rostopic", arguments, ros_time=True) as node:
         echo = Echo(
             field,
-            plot=options.plot,
-            strings=not options.nostr,
-            arrays=not options.noarr,
-            width=options.width,
-            offset=options.offset,
+            plot=plot,
+            strings=not nostr,
+            arrays=not noarr,
+            width=width,
+            offset=offset,
             now=node.clock.now,
         )
         for received in node.inbox(field.topic):
@@ -172,99 +258,129 @@ def _echo(argv: Sequence[str], arguments: Arguments | None = None) -> None:
             except IndexError as error:
                 print(f"rostopic: {error}", file=sys.stderr)
                 continue
-            sys.stdout.write(_CLEAR_SCREEN + text if options.clear and not options.plot else text)
+
+            sys.stdout.write(_CLEAR_SCREEN + text if clear and not plot else text)
             sys.stdout.flush()
             printed += 1
-            if printed == options.count:
+            if printed == count:
                 return
 
 
-def _hz(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rostopic hz", description="Print the rate at which messages come, once a second.")
-    parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics")
+def _hz_parser() -> Parser:
+    parser = Parser(
+        "rostopic hz",
+        "Print the rate of messages once a second.",
+        "rostopic hz [options] /topic_0 [/topic_1 [topic_2 [..]]]",
+        missing="topic must be specified",
+    )
+    _add_topics(parser)
     _add_window(parser, default=0)
     parser.add_argument(
-        "--filter", metavar="EXPRESSION", help="only measure messages m for which this Python is true"
+        "--filter",
+        metavar="EXPR",
+        help="only measure messages matching the specified Python expression",
+        completer="nothing",
     )
     parser.add_argument(
         "--wall-time",
         action="store_true",
-        help="measure by the machine's clock, even where /clock tells another",
+        help="calculates rate using wall time which can be helpful when clock isn't published during simulation",
     )
-    parser.add_argument("--tcpnodelay", action="store_true", help="use the TCP_NODELAY transport hint")
-    options = parser.parse_intermixed_args(argv)
+    _add_tcp_nodelay(parser)
+    return parser
+
+
+def _hz(
+    topics: Sequence[str],
+    window: int,
+    filter: str | None,
+    wall_time: bool,
+    tcpnodelay: bool,
+    arguments: Arguments | None = None,
+) -> None:
     from minirospy.introspect.echo import Filter
     from minirospy.introspect.rates import RateWindow, rate_text
 
-    keep = Filter(options.filter) if options.filter else None
+    keep = Filter(filter) if filter else None
     windows: dict[str, RateWindow] = {}
-    with tool_node("rostopic", arguments, ros_time=not options.wall_time) as node:
-        for name in _published_topics(options.topics, arguments):
-            window = windows[name] = RateWindow(options.window)
+    with tool_node("rostopic", arguments, ros_time=not wall_time) as node:
+        for name in _published_topics(topics, arguments):
+            measured = windows[name] = RateWindow(window)
 
-            def count(received: Received, topic: str = name, window: RateWindow = window) -> None:
+            def count(received: Received, topic: str = name, measured: RateWindow = measured) -> None:
                 if keep is None or keep(node.classes.read(received), topic):
-                    window.add(received.time)
+                    measured.add(received.time)
 
-            _measure(node, name, count, options.tcpnodelay)
+            _measure(node, name, count, tcpnodelay)
         while not node.wait(1.0):
-            print(rate_text({name: window.report() for name, window in windows.items()}), flush=True)
+            print(rate_text({name: each.report() for name, each in windows.items()}), flush=True)
 
 
-def _bw(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    parser = Parser("rostopic bw", description="Print the bandwidth that topics take, once a second.")
-    parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics")
+def _bw_parser() -> Parser:
+    parser = Parser(
+        "rostopic bw",
+        "Print the bandwidth that topics use once a second.",
+        "rostopic bw /topic",
+        missing="topic must be specified",
+    )
+    _add_topics(parser)
     _add_window(parser, default=100)
-    options = parser.parse_intermixed_args(argv)
+    return parser
+
+
+def _bw(topics: Sequence[str], window: int, arguments: Arguments | None = None) -> None:
     import time
 
     from minirospy.introspect.rates import BandwidthWindow, bandwidth_text
 
     windows: dict[str, BandwidthWindow] = {}
     with tool_node("rostopic", arguments) as node:
-        for name in _published_topics(options.topics, arguments):
-            window = windows[name] = BandwidthWindow(options.window)
+        for name in _published_topics(topics, arguments):
+            measured = windows[name] = BandwidthWindow(window)
 
-            def add(received: Received, window: BandwidthWindow = window) -> None:
-                window.add(received.time, len(received.body))
+            def add(received: Received, measured: BandwidthWindow = measured) -> None:
+                measured.add(received.time, len(received.body))
 
             _measure(node, name, add)
         while not node.wait(1.0):
             now = time.time()
-            text = bandwidth_text({name: window.report(now) for name, window in windows.items()})
+            text = bandwidth_text({name: each.report(now) for name, each in windows.items()})
             if text:
                 print(text, flush=True)
 
 
-def _delay(argv: Sequence[str], arguments: Arguments | None = None) -> None:
+def _delay_parser() -> Parser:
     parser = Parser(
-        "rostopic delay", description="Print how late messages come after the stamps in their headers."
+        "rostopic delay", "Print the delay of messages, from the stamps in their headers to their arrival."
     )
-    parser.add_argument("topic", help="the topic's name")
+    _add_topic(parser)
     _add_window(parser, default=0)
-    parser.add_argument("--tcpnodelay", action="store_true", help="use the TCP_NODELAY transport hint")
-    options = parser.parse_args(argv)
+    _add_tcp_nodelay(parser)
+    return parser
+
+
+def _delay(topic: str, window: int, tcpnodelay: bool, arguments: Arguments | None = None) -> None:
     from minirospy.introspect.rates import DelayWindow, delay_text
 
-    window = DelayWindow(options.window)
+    measured = DelayWindow(window)
     with tool_node("rostopic", arguments, ros_time=True) as node:
-        (topic,) = _published_topics([options.topic], arguments)
+        (name,) = _published_topics([topic], arguments)
         unstamped: list[str] = []
 
         def add(received: Received) -> None:
             message = node.classes.read(received)
             if message._has_header:
-                window.add(received.time, message.header.stamp.to_sec())
+                measured.add(received.time, message.header.stamp.to_sec())
             else:
                 unstamped.append(message._type)
                 node.stop()
 
-        _measure(node, topic, add, options.tcpnodelay)
+        _measure(node, name, add, tcpnodelay)
         while not node.wait(1.0):
-            print(delay_text(window.report()), flush=True)
+            print(delay_text(measured.report()), flush=True)
         if unstamped:
             raise NotFoundError(
-                "header", topic, hint=f"messages of [{unstamped[0]}] have no stamp to measure by"
+                "header", name, hint=f"messages of [{unstamped[0]}] have no stamp to measure by"
             )
 
 
@@ -275,18 +391,8 @@ def _measure(
     print(f"subscribed to [{topic}]", flush=True)
 
 
-def _add_window(parser: Parser, default: int) -> None:
-    parser.add_argument(
-        "-w", "--window", type=int, default=default, help="window size, in # of messages, for calculating"
-    )
-
-
-def _add_bag(parser: Parser, what: str) -> None:
-    parser.add_argument("-b", "--bag", metavar="BAGFILE", help=f"{what} (not yet: bags come later)")
-
-
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """The global names of topics, also where a field of one is named; one that nobody publishes yet is warned of."""
+    """Return the global names of topics, also where a field of one is named; warn of one that nobody publishes yet."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):
@@ -297,25 +403,152 @@ def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list
     return list(dict.fromkeys(found))
 
 
-def _pub(argv: Sequence[str], arguments: Arguments | None = None) -> None:
-    from minirospy.cli.ros.rostopic_pub import publish
-
-    publish(argv, arguments)
+# --- publishing
 
 
-_FAMILY = Family(
+class _PubParser(Parser):
+    """Accepts negative numbers as values beside an option that is called `-1`."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name, with the negative numbers among the values."""
+        options = super().parse(
+            [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
+        )
+        options["args"] = [word.removeprefix(_SHIELD) for word in options["args"]]
+        return options
+
+
+def _pub_parser() -> Parser:
+    parser = _PubParser(
+        "rostopic pub",
+        "Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
+        "rostopic pub /topic type [args...]",
+        missing="/topic must be specified",
+        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
+        "Without arguments, messages are read from standard input, with --- between them.",
+    )
+    add = parser.add_argument
+    add("topic", help="the topic's name", completer="topics")
+    add("type", help="the message type, as std_msgs/Bool", completer="topic_type")
+    add(
+        "args",
+        nargs="*",
+        default=[],
+        help="the message's values; `now` is the time, header: auto is stamped",
+        completer="message_text",
+    )
+    add("-v", dest="verbose", action="store_true", help="print verbose output")
+    add(
+        "-r",
+        "--rate",
+        type=_positive,
+        metavar="RATE",
+        help="publishing rate (hz).  For -f and stdin input, this defaults to 10.  Otherwise it is not set.",
+    )
+    add("-1", "--once", action="store_true", help="publish one message and exit")
+    add("-f", "--file", metavar="FILE", help="read args from YAML file (Bagy)", completer="files")
+    add(
+        "-l",
+        "--latch",
+        action="store_true",
+        help="enable latching for -f, -r and piped input.  This latches the first message.",
+    )
+    add(
+        "-s",
+        "--substitute-keywords",
+        action="store_true",
+        help="When publishing with a rate, performs keyword ('now' or 'auto') substitution for each message",
+    )
+    add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
+    # Before Noetic, -s was called so.
+    parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
+    return parser
+
+
+def _pub(
+    topic: str,
+    type: str,
+    args: Sequence[str],
+    verbose: bool,
+    rate: float | None,
+    once: bool,
+    file: str | None,
+    latch: bool,
+    substitute_keywords: bool,
+    use_rostime: bool,
+    arguments: Arguments | None = None,
+) -> None:
+    if once and rate is not None:
+        raise Misuse("-1 and -r exclude each other", "You cannot select both -r and -1 (--once)")
+    if file is not None and args:
+        raise Misuse("-f and values on the command line exclude each other", "args conflict with -f setting")
+
+    from minirospy.cli.ros.rostopic_pub import Publishing, publish
+
+    publish(
+        Publishing(topic, type, args, verbose, rate, once, file, latch, substitute_keywords, use_rostime),
+        arguments,
+    )
+
+
+def _positive(text: str) -> float:
+    import argparse
+
+    try:
+        rate = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"rate must be a number, not {text}") from None
+    if not 0.0 < rate < 1e6:
+        raise argparse.ArgumentTypeError("rate must be greater than zero")
+    return rate
+
+
+# --- arguments that several verbs take
+
+
+def _add_topic(parser: Parser) -> None:
+    parser.add_argument("topic", help="the topic's name", completer="topics")
+
+
+def _add_topics(parser: Parser) -> None:
+    parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics", completer="topics")
+
+
+def _add_window(parser: Parser, default: int) -> None:
+    parser.add_argument(
+        "-w",
+        "--window",
+        type=int,
+        default=default,
+        help="window size, in # of messages, for calculating rate",
+    )
+
+
+def _add_tcp_nodelay(parser: Parser) -> None:
+    parser.add_argument(
+        "--tcpnodelay",
+        action="store_true",
+        help="use the TCP_NODELAY transport hint when subscribing to topics",
+    )
+
+
+def _add_bag(parser: Parser, help: str) -> None:
+    parser.add_argument("-b", "--bag", metavar="BAGFILE", help=help, completer="files")
+
+
+FAMILY = Family(
     "rostopic",
     "rostopic is a command-line tool for printing information about ROS Topics.",
     (
-        Verb("bw", "display bandwidth used by topic", _bw),
-        Verb("delay", "display delay of topic from timestamp in header", _delay),
-        Verb("echo", "print messages to screen", _echo),
-        Verb("find", "find topics by type", _find),
-        Verb("hz", "display publishing rate of topic    ", _hz),
-        Verb("info", "print information about active topic", _info),
-        Verb("list", "list active topics", _list),
-        Verb("pub", "publish data to topic", _pub),
-        Verb("type", "print topic or field type", _type),
+        Verb("bw", "display bandwidth used by topic", _bw_parser, _bw),
+        Verb("delay", "display delay of topic from timestamp in header", _delay_parser, _delay),
+        Verb("echo", "print messages to screen", _echo_parser, _echo),
+        Verb("find", "find topics by type", _find_parser, _find),
+        Verb("hz", "display publishing rate of topic    ", _hz_parser, _hz),
+        Verb("info", "print information about active topic", _info_parser, _info),
+        Verb("list", "list active topics", _list_parser, _list),
+        Verb("pub", "publish data to topic", _pub_parser, _pub),
+        Verb("type", "print topic or field type", _type_parser, _type),
     ),
     "Type rostopic <command> -h for more detailed usage, e.g. 'rostopic echo -h'",
     is_node=True,

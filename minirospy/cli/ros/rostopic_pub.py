@@ -6,9 +6,9 @@ Source: http://wiki.ros.org/rostopic#rostopic_pub. What is printed is what ROS p
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minirospy.cli.command import Parser, tool_node, warn
+from minirospy.cli.command import tool_node, warn
 from minirospy.errors import UsageError
 from minirospy.idl.load import message_class
 from minirospy.introspect.echo import fill_message
@@ -16,25 +16,37 @@ from minirospy.introspect.graph import Graph, why_illegal
 from minirospy.introspect.publishing import publish_all, values_to_publish
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Iterable, Sequence
 
     from minirospy.introspect.streams import ToolNode, TopicPublisher
     from minirospy.names import Arguments
 
-__all__ = ["publish"]
+__all__ = ["Publishing", "publish"]
 
 _LATCH_SECONDS = 3.0
 _FILE_RATE = 10.0
 _CONNECT_SECONDS = 0.5
 _REGISTERED_CONNECT_SECONDS = 2.0
 _CLOCK_SECONDS = 1.0
-_SHIELD = "\0"
 
 
-def publish(argv: Sequence[str], arguments: Arguments | None) -> None:
-    """The verb, with the remapping arguments that were among its words."""
-    options = _parse(argv)
+class Publishing(NamedTuple):
+    """What `rostopic pub` is given."""
+
+    topic: str
+    type: str
+    args: Sequence[str]
+    verbose: bool
+    rate: float | None
+    once: bool
+    file: str | None
+    latch: bool
+    substitute_keywords: bool
+    use_rostime: bool
+
+
+def publish(options: Publishing, arguments: Arguments | None) -> None:
+    """Publish, with the remapping arguments that were among the words of the command line."""
     cls = message_class(options.type)
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
@@ -85,7 +97,7 @@ def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
         warn(f"topic [{topic}] is of type [{other}] already, not [{type_}]")
 
 
-def _latch(node: ToolNode, publisher: TopicPublisher, message: Any, options: argparse.Namespace) -> None:
+def _latch(node: ToolNode, publisher: TopicPublisher, message: Any, options: Publishing) -> None:
     how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
     print(f"publishing and latching {shown}{how_long}", flush=True)
@@ -93,64 +105,3 @@ def _latch(node: ToolNode, publisher: TopicPublisher, message: Any, options: arg
     while not node.wait(_LATCH_SECONDS):
         if options.once:
             return
-
-
-def _parse(argv: Sequence[str]) -> argparse.Namespace:
-    parser = Parser(
-        "rostopic pub",
-        description="Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
-        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
-        "Without arguments, messages are read from standard input, with --- between them.",
-    )
-    add = parser.add_argument
-    add("topic", help="the topic's name")
-    add("type", help="the message type, as std_msgs/Bool")
-    add(
-        "args", nargs="*", default=[], help="the message's values; `now` is the time, header: auto is stamped"
-    )
-    add("-v", dest="verbose", action="store_true", help="print verbose output")
-    add(
-        "-r",
-        "--rate",
-        type=_positive,
-        metavar="RATE",
-        help="publishing rate (hz); 10 for messages from a file or standard input",
-    )
-    add("-1", "--once", action="store_true", help="publish one message and exit")
-    add("-f", "--file", metavar="FILE", help="read messages from a YAML file, with --- between them")
-    add("-l", "--latch", action="store_true", help="latch: whoever joins later gets the last message")
-    add(
-        "-s",
-        "-K",
-        "--substitute-keywords",
-        action="store_true",
-        help="with a rate: `now` and `auto` anew for each message",
-    )
-    add("--use-rostime", action="store_true", help="`now`, `auto` and the rate go by /clock where it is used")
-    options = parser.parse_intermixed_args([_shield(word) for word in argv])
-    options.args = [word.removeprefix(_SHIELD) for word in options.args]
-    if options.once and options.rate is not None:
-        parser.error("-1 and -r exclude each other")
-    if options.file is not None and options.args:
-        parser.error("-f and values on the command line exclude each other")
-    return options
-
-
-def _positive(text: str) -> float:
-    import argparse
-
-    try:
-        rate = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"rate must be a number, not {text}") from None
-    if not 0.0 < rate < 1e6:
-        raise argparse.ArgumentTypeError("rate must be greater than zero")
-    return rate
-
-
-def _shield(word: str) -> str:
-    """Negative numbers as values beside an option that is called `-1`."""
-    import re
-
-    negative = re.match(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", word, re.IGNORECASE)
-    return _SHIELD + word if word != "-1" and negative else word

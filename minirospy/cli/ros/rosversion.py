@@ -9,40 +9,49 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import Parser, run
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
 from minirospy.errors import UsageError
 from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
 
-__all__ = ["main"]
+__all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit status as in minirospy.cli.command."""
-    return run("rosversion", lambda: _rosversion(argv))
+    """Run the command; return the exit status as in minirospy.cli.command."""
+    return COMMAND.main(argv)
 
 
-def _rosversion(argv: Sequence[str] | None) -> None:
+def _parser() -> Parser:
     parser = Parser(
         "rosversion", description="Print the version of a package, or the name of the ROS distribution."
     )
-    parser.add_argument("package", nargs="?", help="the package's name, as rpi_feros")
+    parser.add_argument(
+        "package", nargs="?", help="the package's name, as rpi_feros", completer="package_names"
+    )
     parser.add_argument("-s", "--skip-newline", action="store_true", help="print no line feed at the end")
     parser.add_argument("-d", "--distro", action="store_true", help="print the name of the ROS distribution")
     parser.add_argument("-a", "--all", action="store_true", help="print every package and its version")
-    options = parser.parse_args(argv)
-    if (options.package is not None) + options.distro + options.all != 1:
+    return parser
+
+
+def _rosversion(package: str | None, skip_newline: bool, distro: bool, all: bool) -> None:
+    if (package is not None) + distro + all != 1:
         raise UsageError("name one package, or -d for the distribution, or -a for every package")
-    if options.distro:
+
+    if distro:
         text = distro_codename()
-    elif options.all:
+    elif all:
         folders = Packages().folders()
         text = "\n".join(f"{name}: {read_manifest(folders[name]).version}" for name in sorted(folders))
     else:
-        text = read_manifest(Packages().find(options.package)).version
-    sys.stdout.write(text if options.skip_newline else text + "\n")
+        text = read_manifest(Packages().find(str(package))).version
+    sys.stdout.write(text if skip_newline else text + "\n")
 
+
+COMMAND = Command("rosversion", _parser, _rosversion)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,0 +1,274 @@
+"""How a command reads its words: an argument parser whose usage, help and errors are printed as ROS prints them.
+
+Most of ROS's commands are built on optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own
+tests match these lines, so a :class:`Parser` that is given ROS's usage prints exactly them; what minirospy adds follows
+on lines of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from minirospy.errors import UsageError, did_you_mean
+
+if TYPE_CHECKING:
+    from re import Pattern
+
+__all__ = ["CommandLineError", "Misuse", "Parser", "attach_completer", "completer_of"]
+
+_COMPLETER = "minirospy_completer"
+_HELP_COLUMN = 24
+_OWN_OPTIONS = "Options of minirospy"
+
+
+class CommandLineError(UsageError):
+    """A command line that a parser refused; ``ros_text`` is what ROS prints about it, usage included."""
+
+    def __init__(self, text: str, ros_text: str = "") -> None:
+        super().__init__(text)
+        self.ros_text = ros_text
+
+
+class Misuse(UsageError):
+    """Arguments that parse, and do not suit each other; ``ros`` is ROS's text about it.
+
+    A command's function raises it; its parser adds the usage.
+    """
+
+    def __init__(self, text: str, ros: str = "") -> None:
+        super().__init__(text)
+        self.ros = ros
+
+
+class _Help(argparse.HelpFormatter):
+    """Help as wide as the terminal; argparse asks shutil for that, whose import costs more than its own."""
+
+    def __init__(self, prog: str, *args: Any, **kwargs: Any) -> None:
+        try:
+            width = os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
+        except (OSError, ValueError):
+            width = 80
+        super().__init__(prog, *args, **{"width": max(width, 40) - 2, **kwargs})
+
+
+class _Accepted(argparse.Action):
+    """An option that is accepted for compatibility and leaves nothing behind."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, nargs: Any = 0, **kwargs: Any) -> None:
+        super().__init__(option_strings, dest, nargs=nargs, **{**kwargs, "default": argparse.SUPPRESS})
+
+    def __call__(self, *_: object) -> None:
+        pass
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose error ends with what to type for help.
+
+    ``ros_usage`` is ROS's usage text; with it options and positional arguments may alternate, as with optparse, and
+    help and errors have optparse's form. ``missing`` and ``surplus`` are ROS's texts about an argument that is missing
+    or one too many; ``about`` is ROS's description.
+    """
+
+    def __init__(
+        self,
+        prog: str,
+        description: str = "",
+        ros_usage: str = "",
+        *,
+        missing: str = "",
+        surplus: str = "",
+        about: str = "",
+        intermixed: bool = False,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(prog, description=description, **{"formatter_class": _Help, **kwargs})
+        self.ros_usage = ros_usage
+        self._missing = missing
+        self._surplus = surplus
+        self._about = about
+        self._intermixed = intermixed or bool(ros_usage)
+        self.register("action", "accepted", _Accepted)
+
+    def add_argument(self, *names: Any, completer: str = "", **kwargs: Any) -> argparse.Action:
+        """Add an argument as argparse does.
+
+        ``completer`` is the name of a function of minirospy.cli.completion.completers, which is imported only when
+        Tab is pressed.
+        """
+        action = super().add_argument(*names, **kwargs)
+        if completer:
+            attach_completer(action, completer)
+        return action
+
+    def accept(
+        self,
+        *names: str,
+        help: str = "accepted, without effect",
+        completer: str = "nothing",
+        group: argparse._ArgumentGroup | None = None,
+        **kwargs: Any,
+    ) -> None:
+        """Add an option of ROS's that has no effect here; ``nargs`` is 0 unless given."""
+        action = (group or self).add_argument(*names, action="accepted", help=help, **kwargs)
+        if action.nargs != 0:
+            attach_completer(action, completer)
+
+    def own_options(self) -> argparse._ArgumentGroup:
+        """Return the group of the options that ROS's command does not have: they are printed after ROS's help."""
+        for group in self._action_groups:
+            if group.title == _OWN_OPTIONS:
+                return group
+        group = self.add_argument_group(_OWN_OPTIONS)
+        group.register("action", "accepted", _Accepted)
+        return group
+
+    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+        """Return the arguments by name, ready for the command's function. Raises CommandLineError."""
+        parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
+        return vars(parsed)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._check_options(args)
+        return super().parse_known_args(args, namespace)
+
+    def parse_known_intermixed_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self._check_options(args)
+        return super().parse_known_intermixed_args(args, namespace)
+
+    def error(self, message: str, ros: str = "") -> NoReturn:
+        """Raise the CommandLineError of ``message``; ``ros`` is ROS's text where it has one of its own."""
+        ros_text = ""
+        if self.ros_usage:
+            tool = self.prog.partition(" ")[0]
+            ros_text = f"{self._usage_line()}\n\n{tool}: error: {ros or self._ros_message(message)}"
+        raise CommandLineError(f"{message} (`{self.prog} -h` shows what there is)", ros_text)
+
+    def format_help(self) -> str:
+        return self._ros_help() if self.ros_usage else super().format_help()
+
+    def _usage_line(self) -> str:
+        return f"Usage: {self.ros_usage}"
+
+    def _check_options(self, args: Sequence[str] | None) -> None:
+        """Report a long option that does not exist before a missing argument: that may be what it has swallowed."""
+        if any(action.nargs == argparse.REMAINDER for action in self._actions):
+            return  # some of the options are another program's
+        for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
+            option = word.partition("=")[0]
+            if option.startswith("--") and not any(
+                known.startswith(option) for known in self._option_string_actions
+            ):
+                hint = did_you_mean(option, self._option_string_actions, 1)
+                self.error(f"unrecognized arguments: {word}{hint}", f"no such option: {option}")
+
+    def _ros_message(self, message: str) -> str:
+        """Return what optparse, or ROS's command, says where argparse says ``message``."""
+        import re
+
+        if match := re.match(r"unrecognized arguments: (-\S)", message):
+            return f"no such option: {match[1]}"
+        for prefix, text in (
+            ("unrecognized arguments", self._surplus),
+            ("the following arguments are required", self._missing),
+        ):
+            if message.startswith(prefix) and text:
+                return text
+        pattern: Pattern[str]
+        for pattern, text in (
+            (
+                re.compile(r"argument (\S+?)(/\S+)?: expected one argument"),
+                r"\1 option requires 1 argument",
+            ),
+            (
+                re.compile(r"argument (\S+?)(/\S+)?: invalid int value: (.*)"),
+                r"option \1: invalid integer value: \3",
+            ),
+            (
+                re.compile(r"argument (\S+?)(/\S+)?: invalid float value: (.*)"),
+                r"option \1: invalid floating-point value: \3",
+            ),
+        ):
+            if pattern.match(message):
+                return pattern.sub(text, message)
+        return re.sub(r"^argument \S+: ", "", message)
+
+    # --- help in optparse's form
+
+    def _ros_help(self) -> str:
+        """Return ROS's help, exactly; then what minirospy has besides."""
+        groups = [group for group in self._action_groups if group.title != _OWN_OPTIONS]
+        options = [action for group in groups for action in group._group_actions if action.option_strings]
+        parts = [f"{self._usage_line()}\n"]
+        if self._about:
+            parts.append(_filled(self._about))
+        parts.append(_ros_options("Options:", options))
+
+        own = next((group._group_actions for group in self._action_groups if group.title == _OWN_OPTIONS), [])
+        if own:
+            parts.append(_ros_options(f"{_OWN_OPTIONS}:", own))
+        arguments = [action for action in self._actions if not action.option_strings and action.help]
+        rows = [(action.metavar or action.dest, action.help or "") for action in arguments]
+        shown = [(str(name), text) for name, text in rows if text != argparse.SUPPRESS]
+        if shown:
+            parts.append(_rows("Arguments:", shown))
+        parts += [_filled(text) for text in (self.description, self.epilog) if text]
+        return "\n".join(parts)
+
+
+def attach_completer(action: argparse.Action, completer: str) -> None:
+    """Set what completes the values of an argument, by name: see :meth:`Parser.add_argument`."""
+    setattr(action, _COMPLETER, completer)
+
+
+def completer_of(action: argparse.Action) -> str:
+    """Return the name of the function that completes an argument; empty where nothing is attached."""
+    return str(getattr(action, _COMPLETER, ""))
+
+
+def _width() -> int:
+    """Return the width of optparse's help."""
+    columns = os.environ.get("COLUMNS", "")
+    return int(columns) - 2 if columns.isdecimal() else 78
+
+
+def _filled(text: str) -> str:
+    import textwrap
+
+    return textwrap.fill(text, _width()) + "\n"
+
+
+def _ros_options(title: str, actions: Iterable[argparse.Action]) -> str:
+    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help beside or below."""
+    rows = []
+    for action in actions:
+        if action.help == argparse.SUPPRESS:
+            continue
+        value = "" if action.nargs == 0 else str(action.metavar or action.dest.upper())
+        names = sorted(action.option_strings, key=lambda name: name.startswith("--"))
+        shown = [
+            (f"{name}={value}" if name.startswith("--") else f"{name} {value}") if value else name
+            for name in names
+        ]
+        rows.append((", ".join(shown), action.help or ""))
+    return _rows(title, rows)
+
+
+def _rows(title: str, rows: Sequence[tuple[str, str]]) -> str:
+    import textwrap
+
+    column = min(max(len(name) for name, _ in rows) + 4, _HELP_COLUMN)
+    lines = [title]
+    for name, text in rows:
+        wrapped = textwrap.wrap(text, max(_width() - column, 11)) or [""]
+        if len(name) > column - 4:
+            lines.append(f"  {name}")
+            lines += [" " * column + each for each in wrapped]
+        else:
+            lines.append(f"  {name:{column - 4}}  {wrapped[0]}".rstrip())
+            lines += [" " * column + each for each in wrapped[1:]]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,123 @@
+"""Every command, in one table: the console scripts, `minirospy VERB` and completion are read from it.
+
+A command's module is imported when the command is started, or completed.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from minirospy.cli.verbs import Command, Family
+
+__all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "find_script", "find_verb"]
+
+
+class Entry(NamedTuple):
+    """A command: where it is, and what it is called.
+
+    ``script`` is the console script, ``verb`` what follows `minirospy`; either may be empty. A verb without a summary
+    is not shown in the help. ``grammar`` is the Command or Family in ``module``; a command that reads its words by
+    hand has none, and names a function of minirospy.cli.completion.completers in ``completer`` instead.
+    """
+
+    module: str
+    function: str
+    grammar: str = ""
+    script: str = ""
+    verb: str = ""
+    summary: str = ""
+    completer: str = ""
+
+    @property
+    def target(self) -> str:
+        """What pyproject.toml names as the console script's function."""
+        return f"minirospy.cli.{self.module}:{self.function}"
+
+    def load_main(self) -> Callable[[Sequence[str] | None], int]:
+        """Import the module; return the function that runs the command."""
+        main: Callable[[Sequence[str] | None], int] = getattr(self._load_module(), self.function)
+        return main
+
+    def load_grammar(self) -> Command | Family | None:
+        """Import the module; return what the command's words are read by, None where that is code."""
+        grammar: Command | Family | None = (
+            getattr(self._load_module(), self.grammar) if self.grammar else None
+        )
+        return grammar
+
+    def _load_module(self) -> object:
+        return importlib.import_module(f"minirospy.cli.{self.module}")
+
+
+COMMANDS = (
+    Entry("main", "main", script="minirospy"),
+    Entry("demo", "main", "COMMAND", "", "demo", "the workshop's button lights its LED, on the virtual board"),
+    Entry("ros.master", "main", "MASTER", "", "master", "start the master in the foreground (as roscore)"),
+    Entry("board", "main", "FAMILY", "", "board", "see the virtual board, press its buttons"),
+    Entry("ros.rosrun", "main", "", "rosrun", "run", "run a package's program (as rosrun)", "rosrun_words"),
+    Entry("ros.roslaunch", "main", "COMMAND", "roslaunch", "launch", "run a launch file (as roslaunch)"),
+    Entry("ros.rostopic", "main", "FAMILY", "rostopic", "topic", "list, echo, publish topics (as rostopic)"),
+    Entry("ros.rosnode", "main", "FAMILY", "rosnode", "node", "list, ping, stop nodes (as rosnode)"),
+    Entry("ros.rosservice", "main", "FAMILY", "rosservice", "service", "list, call services (as rosservice)"),
+    Entry("ros.rosparam", "main", "FAMILY", "rosparam", "param", "get, set parameters (as rosparam)"),
+    Entry("ros.rosmsg", "main", "ROSMSG", "rosmsg", "msg", "show message types (as rosmsg)"),
+    Entry("ros.rosmsg", "main_srv", "ROSSRV", "rossrv", "srv", "show service types (as rossrv)"),
+    Entry("ros.rosconsole", "main", "FAMILY", "rosconsole", "console",
+          "levels of loggers, and what nodes log (as rosconsole)"),
+    Entry("ros.rosgraph", "main", "COMMAND", "rosgraph", "graph", "who sends to whom (as rosgraph)"),
+    Entry("ros.rosclean", "main", "FAMILY", "rosclean", "clean",
+          "how much log files take; remove them (as rosclean)"),
+    Entry("ros.rosversion", "main", "COMMAND", "rosversion", "version",
+          "the version of a package or of ROS (as rosversion)"),
+    Entry("ros.rospack", "main", "", "rospack", "pack", "find packages and their dependencies (as rospack)",
+          "rospack_words"),
+    Entry("ros.rostest", "rostest", "ROSTEST", "rostest", "test", "run the tests of nodes (as rostest)"),
+    Entry("catkin.make", "catkin_make", "MAKE", "catkin_make", "make", "build a workspace (as catkin_make)"),
+    Entry("doctor", "main", "DOCTOR", "", "doctor",
+          "what is wrong here, in the network, in the graph (as roswtf)"),
+    Entry("completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
+    # Called by shells, not by people.
+    Entry("completion.complete", "main", "", "", "complete"),
+    Entry("ros.master", "roscore", "ROSCORE", "roscore"),
+    Entry("ros.master", "rosmaster", "ROSMASTER", "rosmaster"),
+    Entry("ros.roslaunch_deps", "main", "COMMAND", "roslaunch-deps"),
+    Entry("ros.roslaunch_logs", "main", "COMMAND", "roslaunch-logs"),
+    Entry("ros.rospack", "rosstack", "", "rosstack", completer="rosstack_words"),
+    Entry("ros.rosdep", "main", "FAMILY", "rosdep"),
+    Entry("ros.rosmsg_proto", "main", "COMMAND", "rosmsg-proto"),
+    Entry("doctor", "roswtf", "ROSWTF", "roswtf"),
+    Entry("ros.rostest", "rosunit", "ROSUNIT", "rosunit"),
+    Entry("catkin.test_results", "main", "COMMAND", "catkin_test_results"),
+    Entry("catkin.make", "catkin_make_isolated", "MAKE_ISOLATED", "catkin_make_isolated"),
+    Entry("catkin.tool", "catkin", "CATKIN", "catkin"),
+    Entry("catkin.create", "catkin_create_pkg", "CREATE", "catkin_create_pkg"),
+    Entry("catkin.create", "catkin_init_workspace", "INIT_WORKSPACE", "catkin_init_workspace"),
+    Entry("catkin.find", "catkin_find", "FIND", "catkin_find"),
+    Entry("catkin.find", "catkin_find_pkg", "FIND_PKG", "catkin_find_pkg"),
+    Entry("catkin.find", "catkin_topological_order", "TOPOLOGICAL_ORDER", "catkin_topological_order"),
+)  # fmt: skip
+"""Verbs in the order of `minirospy -h`, then the commands that are console scripts alone."""
+
+SHELL_FUNCTIONS = {
+    "roscd": "package_folders",
+    "rospd": "package_folders",
+    "rosls": "package_folders",
+    "rosed": "package_file",
+    "roscat": "package_file",
+    "roscp": "package_file_and_target",
+    "rosmv": "package_file_and_target",
+}
+"""What `minirospy shell` defines: the function of minirospy.cli.completion.completers for each."""
+
+
+def find_script(name: str) -> Entry | None:
+    """Return the command whose console script is called ``name``."""
+    return next((entry for entry in COMMANDS if entry.script == name), None)
+
+
+def find_verb(name: str) -> Entry | None:
+    """Return the command of `minirospy NAME`."""
+    return next((entry for entry in COMMANDS if entry.verb == name), None)
