@@ -27,6 +27,7 @@ from minirospy.errors import (
     ServiceException,
     WireError,
 )
+from minirospy.idl.protocols import Message
 from minirospy.runtime.node import Node as RuntimeNode
 from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.topics import Publication
@@ -35,7 +36,8 @@ from minirospy.wire.tcpros import ANY
 
 __all__ = ["Node"]
 
-_M = TypeVar("_M")
+_M = TypeVar("_M", bound=Message)
+_T = TypeVar("_T")
 _Request = TypeVar("_Request")
 _Response = TypeVar("_Response")
 _POLL_SECONDS = 0.1
@@ -249,7 +251,7 @@ class Node:
                 on_link=lambda *_: state.links_changed() if state else None,
             )
             state = self._published[resolved] = PublishedTopic(self, publication, message_class)
-        elif state.publication.type.md5sum != message_class._md5sum:  # type: ignore[attr-defined]
+        elif state.publication.type.md5sum != message_class._md5sum:
             raise ValueError(f"{self.name} publishes {resolved} as {state.publication.type.name} already")
         state.publication.latch = state.publication.latch or latch
         return Publisher(self, state, message_class, waits=queue_size is None)
@@ -402,7 +404,7 @@ class Node:
         for published in self._published.values():
             published.links_changed()
 
-    def _spawn(self, work: Coroutine[Any, Any, _M]) -> asyncio.Task[_M]:
+    def _spawn(self, work: Coroutine[Any, Any, _T]) -> asyncio.Task[_T]:
         """A task of this node's own, cancelled when it closes."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)

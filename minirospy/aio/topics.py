@@ -18,6 +18,7 @@ from minirospy.errors import (
     RpcError,
 )
 from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.protocols import Message
 from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.topics import Publication
 from minirospy.runtime.topics import Subscription as RuntimeSubscription
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
 
-_M = TypeVar("_M")
+_M = TypeVar("_M", bound=Message)
 _JOIN_SECONDS = 1.0
 
 

@@ -8,12 +8,16 @@ Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import NamedTuple, TypeVar
 
 from minirospy.errors import MinirospyError
-from minirospy.idl.message import Message
+from minirospy.idl.message import Message as BaseMessage
+from minirospy.idl.protocols import Buffer, Message, Writer
 
 __all__ = ["NumpyMissingError", "arrays_from_bytes", "numpy_class"]
+
+_M = TypeVar("_M", bound=Message)
 
 _DTYPES = {
     "bool": "bool",
@@ -34,7 +38,7 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 
 @lru_cache(maxsize=256)
-def numpy_class(message_class: Any) -> Any:
+def numpy_class(message_class: type[_M]) -> type[_M]:
     """The class of a message whose arrays are numpy arrays: the same type to every peer.
 
     Raises NumpyMissingError.
@@ -47,10 +51,8 @@ def numpy_class(message_class: Any) -> Any:
         return message_class
 
     # What genpy generated writes with ndarray.tostring, which numpy 2.3 has no more.
-    if message_class.serialize_numpy is Message.serialize_numpy or not hasattr(numpy.ndarray, "tostring"):
-        methods = _own_methods(message_class, numpy)
-    else:
-        methods = _genpy_methods(numpy)
+    is_ours = getattr(message_class, "serialize_numpy", None) is BaseMessage.serialize_numpy
+    makes_methods = _own_methods if is_ours or not hasattr(numpy.ndarray, "tostring") else _genpy_methods
     fields = {
         name: getattr(message_class, name)
         for name in ("_slot_types", "_type", "_md5sum", "_full_text", "_has_header")
@@ -64,12 +66,12 @@ def numpy_class(message_class: Any) -> Any:
             "__doc__": f"{message_class._type} with numpy arrays",
             "__module__": "rospy.numpy_msg",
             "_takes_numpy": True,
-            **methods,
+            **makes_methods(message_class, numpy),
         },
     )
 
 
-def arrays_from_bytes(message: Any, numpy: Any) -> Any:
+def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
     """The message, just read from bytes, with each of its arrays of numbers as a numpy array."""
     raw = getattr(message, "_raw", {})
     for name, base, is_array in _fields(_class_of(message)):
@@ -91,8 +93,8 @@ def arrays_from_bytes(message: Any, numpy: Any) -> Any:
     return message
 
 
-def _own_methods(message_class: type[Any], numpy: Any) -> dict[str, Any]:
-    def deserialize(self: Any, data: Any) -> Any:
+def _own_methods(message_class: type[Message], numpy: ModuleType) -> dict[str, object]:
+    def deserialize(self: Message, data: Buffer) -> Message:
         message_class.deserialize(self, data)
         return arrays_from_bytes(self, numpy)
 
@@ -100,11 +102,11 @@ def _own_methods(message_class: type[Any], numpy: Any) -> dict[str, Any]:
     return {"deserialize": deserialize}
 
 
-def _genpy_methods(numpy: Any) -> dict[str, Any]:
-    def serialize(self: Any, buff: Any) -> None:
+def _genpy_methods(_: type[Message], numpy: ModuleType) -> dict[str, object]:
+    def serialize(self: BaseMessage, buff: Writer) -> None:
         self.serialize_numpy(buff, numpy)
 
-    def deserialize(self: Any, data: Any) -> Any:
+    def deserialize(self: BaseMessage, data: Buffer) -> BaseMessage:
         return self.deserialize_numpy(data, numpy)
 
     return {"serialize": serialize, "deserialize": deserialize}
@@ -117,7 +119,7 @@ class _Field(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def _fields(message_class: Any) -> tuple[_Field, ...]:
+def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
     """The fields of a class that are arrays of numbers, or messages."""
     found = []
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
@@ -127,7 +129,7 @@ def _fields(message_class: Any) -> tuple[_Field, ...]:
     return tuple(found)
 
 
-def _is_plain(message: Any) -> bool:
+def _is_plain(message: Message) -> bool:
     """Whether no message of this one's type can hold an array of numbers."""
     return all(
         field.base not in _DTYPES and not field.is_array and _is_plain(getattr(message, field.name))
@@ -135,5 +137,5 @@ def _is_plain(message: Any) -> bool:
     )
 
 
-def _class_of(message: Any) -> Any:
+def _class_of(message: Message) -> type[Message]:
     return type(message)

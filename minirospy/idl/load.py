@@ -26,6 +26,7 @@ from minirospy.idl.validate import MOST_TEXT, check_type_name, check_types, is_t
 
 if TYPE_CHECKING:
     from minirospy.idl.emit import ClassSource
+    from minirospy.idl.protocols import Message, ServiceClass
 
 __all__ = [
     "Catalogue",
@@ -184,26 +185,28 @@ def write_if_changed(path: Path, text: str) -> bool:
     return True
 
 
-def get_message_class(name: str) -> Any:
-    """The class of ``pkg/Name``, or None where no module defines it."""
-    return _imported(name, "msg")
+def get_message_class(name: str) -> type[Message] | None:
+    """Return the class of ``pkg/Name``, or None where no module defines it."""
+    found: type[Message] | None = _imported(name, "msg")
+    return found
 
 
-def get_service_class(name: str) -> Any:
-    """The class of the service ``pkg/Name``, or None where no module defines it."""
-    return _imported(name, "srv")
+def get_service_class(name: str) -> ServiceClass | None:
+    """Return the class of the service ``pkg/Name``, or None where no module defines it."""
+    found: ServiceClass | None = _imported(name, "srv")
+    return found
 
 
-def message_class(name: str) -> Any:
-    """The class of ``pkg/Name``. Raises NotFoundError with the nearest names."""
+def message_class(name: str) -> type[Message]:
+    """Return the class of ``pkg/Name``. Raise NotFoundError with similar names."""
     found = get_message_class(name)
     if found is None:
         raise NotFoundError("message type", name, _known("msg"), "types are written package/Type")
     return found
 
 
-def service_class(name: str) -> Any:
-    """The class of the service ``pkg/Name``. Raises NotFoundError with the nearest names."""
+def service_class(name: str) -> ServiceClass:
+    """Return the class of the service ``pkg/Name``. Raise NotFoundError with similar names."""
     found = get_service_class(name)
     if found is None:
         raise NotFoundError("service type", name, _known("srv"), "types are written package/Type")
@@ -229,17 +232,17 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     return specs
 
 
-def class_from_text(full_name: str, text: str) -> Any:
-    """A message class from a full text, as a publisher sends it, for a type that is not installed.
+def class_from_text(full_name: str, text: str) -> type[Message]:
+    """Return a message class from a full text, as a publisher sends it, for a type that is not installed.
 
-    Raises DefinitionError.
+    Raise DefinitionError.
     """
     return classes_from_text(full_name, text)[full_name]
 
 
 @lru_cache(maxsize=256)
-def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
-    """The class of a full text, and those of all types in it that it needs, by name. Raises DefinitionError."""
+def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
+    """Return the class of a full text and those of all types that it needs, by name. Raise DefinitionError."""
     from minirospy.idl.emit import emit_class
 
     specs = specs_of_text(full_name, text)
@@ -249,7 +252,7 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
             raise DefinitionError(full_name, 1, f"the full text lacks [{name}]")
         return specs[name]
 
-    made: dict[str, Any] = {}
+    made: dict[str, type[Message]] = {}
     for name in check_types(specs[full_name], lookup):
         made[name] = _run(emit_class(specs[name], lookup), name, made)
     # Sent on as it came, even where ours would be written otherwise.
@@ -257,7 +260,7 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, Any]:
     return types.MappingProxyType(made)
 
 
-def _run(emitted: ClassSource, name: str, made: dict[str, Any]) -> Any:
+def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
     """Execute the source of a class, in whose fields are classes made before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
@@ -271,7 +274,8 @@ def _run(emitted: ClassSource, name: str, made: dict[str, Any]) -> Any:
     except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
         # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
-    return module.__dict__[name.partition("/")[2]]
+    found: type[Message] = module.__dict__[name.partition("/")[2]]
+    return found
 
 
 def _imported(name: str, kind: str) -> Any:

@@ -6,15 +6,21 @@ The names and rules are genpy's, since user code relies on them: http://docs.ros
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import ModuleType
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, cast
 
 from minirospy.errors import (
     DeserializationError,
     MessageException,
     SerializationError,
 )
+from minirospy.idl.protocols import is_message
 from minirospy.times import Duration, Time, TVal
+
+if TYPE_CHECKING:
+    from minirospy.idl import protocols
+    from minirospy.idl.protocols import Buffer, Writer
 
 __all__ = [
     "DeserializationError",
@@ -28,6 +34,8 @@ __all__ = [
     "strify_message",
 ]
 
+_M = TypeVar("_M", bound="protocols.Message")
+
 _INTEGERS = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1)) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits) for bits in (8, 16, 32, 64)},
@@ -40,6 +48,15 @@ _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 _FOLDED = 76
 
 
+class _Options(NamedTuple):
+    """How :func:`strify_message` prints."""
+
+    time_offset: Time | None
+    current_time: object
+    field_filter: Callable[[protocols.Message], Sequence[str]] | None
+    width: int | None
+
+
 class Message:
     """The base of all messages. Subclasses have ``_type``, ``_md5sum``, ``_full_text``, ``_slot_types``."""
 
@@ -47,7 +64,7 @@ class Message:
     _slot_types: list[str] = []
     _connection_header: dict[str, str]
 
-    def __init__(self, *args: Any, **kwds: Any) -> None:
+    def __init__(self, *args: object, **kwds: object) -> None:
         """All fields in order, or some by name; None stands for a field's default.
 
         Raises TypeError on a wrong number of values, AttributeError on a name that is not a field.
@@ -67,29 +84,29 @@ class Message:
         for name in names:
             setattr(self, name, kwds.get(name))
 
-    def serialize(self, buff: Any) -> None:
+    def serialize(self, buff: Writer) -> None:
         """Write this message to ``buff``."""
 
-    def deserialize(self, data: Any) -> Message:
+    def deserialize(self, data: Buffer) -> Message:
         """Read this message from bytes."""
         return self
 
-    def serialize_numpy(self, buff: Any, numpy: Any) -> None:
+    def serialize_numpy(self, buff: Writer, numpy: ModuleType) -> None:
         """Write this message, whose arrays may be numpy arrays, to ``buff``."""
         self.serialize(buff)
 
-    def deserialize_numpy(self, data: Any, numpy: Any) -> Message:
+    def deserialize_numpy(self, data: Buffer, numpy: ModuleType) -> Message:
         """Read this message from bytes; arrays of numbers become numpy arrays."""
         from minirospy.idl.arrays import arrays_from_bytes
 
         self.deserialize(data)
-        arrays_from_bytes(self, numpy)
+        arrays_from_bytes(cast("protocols.Message", self), numpy)
         return self
 
-    def __getstate__(self) -> list[Any]:
+    def __getstate__(self) -> list[object]:
         return [getattr(self, name) for name in self.__slots__]
 
-    def __setstate__(self, state: list[Any]) -> None:
+    def __setstate__(self, state: list[object]) -> None:
         for name, value in zip(self.__slots__, state, strict=True):
             setattr(self, name, value)
 
@@ -116,13 +133,13 @@ class Message:
     __repr__ = __str__
 
 
-def check_type(field_name: str, field_type: str, field_val: Any) -> None:
+def check_type(field_name: str, field_type: str, field_val: object) -> None:
     """Raise SerializationError unless the value fits a field of this type (``int8``, ``string[]``, ``pkg/Name``)."""
     if field_type.endswith("]"):
         _check_array(field_name, field_type.partition("[")[0], field_val)
     elif field_type in _CHECKS:
         _CHECKS[field_type](field_name, field_type, field_val)
-    elif not hasattr(field_val, "_type") or not hasattr(field_val, "_check_types"):
+    elif not is_message(field_val) or not hasattr(field_val, "_check_types"):
         raise SerializationError(
             f"field {field_name} must be a [{field_type}] instance instead of a {type(field_val)}"
         )
@@ -133,10 +150,10 @@ def check_type(field_name: str, field_type: str, field_val: Any) -> None:
             check_type(f"{field_name}.{name}", type_, getattr(field_val, name))
 
 
-def args_kwds_to_message(data_class: type[Any], args: Sequence[Any], kwds: Mapping[str, Any]) -> Any:
-    """The message that publish() or a service call was given: itself, or made from field values.
+def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
+    """Return the message that publish() or a service call was given: itself, or made from field values.
 
-    Raises TypeError or AttributeError where they do not fit.
+    Raise TypeError or AttributeError where they do not fit.
     """
     if args and kwds:
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
@@ -147,7 +164,8 @@ def args_kwds_to_message(data_class: type[Any], args: Sequence[Any], kwds: Mappi
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            return only
+            # Of another generator, or made from another text: the bytes are the same.
+            return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")  # type: ignore[attr-defined]
         if isinstance(only, list | tuple) and len(data_class.__slots__) != 1:
@@ -155,13 +173,13 @@ def args_kwds_to_message(data_class: type[Any], args: Sequence[Any], kwds: Mappi
     return data_class(*args)
 
 
-def fill_message_args(msg: Any, msg_args: Any, keys: Mapping[str, Any] | None = None) -> None:
+def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
     """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
 
     ``keys`` are words that stand for values ("now", "auto"). Raises MessageException where a name or a number
     of values does not fit, ValueError on values that cannot be fields.
     """
-    if not hasattr(msg, "_slot_types"):
+    if not is_message(msg):
         raise ValueError(f"msg must be a Message instance: {msg}")
     words = keys or {}
     if msg_args is None:
@@ -178,14 +196,14 @@ def fill_message_args(msg: Any, msg_args: Any, keys: Mapping[str, Any] | None = 
         _fill(msg, list(msg_args), words, "")
 
 
-def get_printable_message_args(msg: Any, buff: Any = None, prefix: str = "") -> str:
+def get_printable_message_args(msg: protocols.Message, buff: object = None, prefix: str = "") -> str:
     """The names of a message's fields in order, nested ones with dots."""
     found: list[str] = []
 
-    def walk(current: Any, path: str) -> None:
+    def walk(current: protocols.Message, path: str) -> None:
         for name in current.__slots__:
             value = getattr(current, name)
-            if hasattr(value, "_slot_types") and not isinstance(value, TVal):
+            if is_message(value) and not isinstance(value, TVal):
                 walk(value, f"{path}{name}.")
             else:
                 found.append(path + name)
@@ -195,11 +213,11 @@ def get_printable_message_args(msg: Any, buff: Any = None, prefix: str = "") -> 
 
 
 def strify_message(
-    val: Any,
+    val: object,
     indent: str = "",
-    time_offset: Any = None,
-    current_time: Any = None,
-    field_filter: Callable[[Any], Sequence[str]] | None = None,
+    time_offset: Time | None = None,
+    current_time: object = None,
+    field_filter: Callable[[protocols.Message], Sequence[str]] | None = None,
     fixed_numeric_width: int | None = None,
 ) -> str:
     """The text of a value as `rostopic echo` prints it: YAML.
@@ -217,12 +235,12 @@ def strify_message(
         return _time_text(val, indent, time_offset, fixed_numeric_width)
     if isinstance(val, bytes | bytearray | memoryview):
         return str(val)
-    options = (time_offset, current_time, field_filter, fixed_numeric_width)
+    options = _Options(time_offset, current_time, field_filter, fixed_numeric_width)
     if isinstance(val, list | tuple):
         return _list_text(val, indent, options)
     if hasattr(val, "tolist"):
         return _list_text(val.tolist(), indent, options)
-    if hasattr(val, "_slot_types"):
+    if is_message(val):
         return _message_text(val, indent, options)
     return str(val)
 
@@ -230,8 +248,8 @@ def strify_message(
 # --- text
 
 
-def _message_text(message: Any, indent: str, options: tuple[Any, ...]) -> str:
-    field_filter = options[2]
+def _message_text(message: protocols.Message, indent: str, options: _Options) -> str:
+    field_filter = options.field_filter
     names = field_filter(message) if field_filter else message.__slots__
     types = dict(zip(message.__slots__, message._slot_types, strict=True))
     lines = []
@@ -246,28 +264,28 @@ def _message_text(message: Any, indent: str, options: tuple[Any, ...]) -> str:
     return "\n" + text if indent else text
 
 
-def _list_text(values: Sequence[Any], indent: str, options: tuple[Any, ...]) -> str:
+def _list_text(values: Sequence[object], indent: str, options: _Options) -> str:
     if not values:
         return "[]"
     first = values[0]
     if isinstance(first, int | float):
-        width = options[3]
+        width = options.width
         return "[" + ", ".join(_number(value, width) for value in values) + "]"
     if isinstance(first, str):
         return "".join(f"\n{indent}{line}" for line in _items(values))
-    if isinstance(first, TVal) or hasattr(first, "_slot_types"):
+    if isinstance(first, TVal) or is_message(first):
         inner = indent + "  "
         return "".join(f"\n{indent}- {strify_message(value, inner, *options)}" for value in values)
     return "".join(f"\n{indent}- {strify_message(value, '', *options)}" for value in values)
 
 
-def _time_text(value: TVal, indent: str, offset: Any, width: int | None) -> str:
+def _time_text(value: TVal, indent: str, offset: Time | None, width: int | None) -> str:
     if offset is not None and isinstance(value, Time):
         value = value - offset
     return f"\n{indent}secs: {value.secs:{width or 1}d}\n{indent}nsecs: {value.nsecs:{width or 9}d}"
 
 
-def _number(value: Any, width: int | None) -> str:
+def _number(value: object, width: int | None) -> str:
     if width is None or isinstance(value, bool):
         return str(value)
     if isinstance(value, float):
@@ -284,7 +302,7 @@ def _quoted(text: str) -> str:
     return str(yaml.dump(text, default_style='"')).rstrip("\n")
 
 
-def _items(texts: Sequence[Any]) -> list[str]:
+def _items(texts: Sequence[object]) -> list[str]:
     """The lines of a list of strings, as YAML writes it."""
     if all(
         isinstance(text, str) and _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN for text in texts
@@ -298,36 +316,36 @@ def _items(texts: Sequence[Any]) -> list[str]:
 # --- checks
 
 
-def _check_bool(name: str, type_: str, value: Any) -> None:
+def _check_bool(name: str, type_: str, value: object) -> None:
     if value not in (True, False, 0, 1):
         raise SerializationError(f"field {name} is not a bool")
 
 
-def _check_integer(name: str, type_: str, value: Any) -> None:
+def _check_integer(name: str, type_: str, value: object) -> None:
     low, high = _INTEGERS[type_]
-    if not hasattr(value, "__index__") or value < 0 <= low:
+    if not hasattr(value, "__index__") or int(value) < 0 <= low:
         kind = "unsigned" if low == 0 else "an"
         raise SerializationError(f"field {name} must be {kind} integer type")
-    if not low <= value < high:
+    if not low <= int(value) < high:
         raise SerializationError(f"field {name} exceeds specified width [{type_}]")
 
 
-def _check_float(name: str, type_: str, value: Any) -> None:
+def _check_float(name: str, type_: str, value: object) -> None:
     if not isinstance(value, int | float) and not hasattr(value, "__float__"):
         raise SerializationError(f"field {name} must be float type")
 
 
-def _check_string(name: str, type_: str, value: Any) -> None:
+def _check_string(name: str, type_: str, value: object) -> None:
     if not isinstance(value, str | bytes):
         raise SerializationError(f"field {name} must be of type bytes or an ascii string")
 
 
-def _check_time(name: str, type_: str, value: Any) -> None:
+def _check_time(name: str, type_: str, value: object) -> None:
     if not hasattr(value, "secs") or not hasattr(value, "nsecs"):
         raise SerializationError(f"field {name} must be of type {type_.capitalize()}")
 
 
-_CHECKS: dict[str, Callable[[str, str, Any], None]] = {
+_CHECKS: dict[str, Callable[[str, str, object], None]] = {
     "bool": _check_bool,
     "string": _check_string,
     "float32": _check_float,
@@ -338,7 +356,7 @@ _CHECKS: dict[str, Callable[[str, str, Any], None]] = {
 }
 
 
-def _check_array(name: str, base: str, value: Any) -> None:
+def _check_array(name: str, base: str, value: object) -> None:
     if isinstance(value, bytes | bytearray | memoryview) and base in ("uint8", "char"):
         return
     if isinstance(value, str | bytes):
@@ -349,18 +367,18 @@ def _check_array(name: str, base: str, value: Any) -> None:
         and not hasattr(value, "tolist")
     ):
         raise SerializationError(f"field {name} must be a list or tuple type")
-    for item in value:
+    for item in cast("Iterable[object]", value):
         check_type(f"{name}[]", base, item)
 
 
 # --- filling
 
 
-def _takes(data_class: type[Any], only: Any) -> bool:
+def _takes(data_class: type[protocols.Message], only: object) -> bool:
     return len(data_class.__slots__) == 1 and data_class._slot_types[0] == getattr(only, "_type", None)
 
 
-def _fill(message: Any, values: Any, words: Mapping[str, Any], path: str) -> None:
+def _fill(message: protocols.Message, values: object, words: Mapping[str, object], path: str) -> None:
     if isinstance(values, dict):
         types = dict(zip(message.__slots__, message._slot_types, strict=True))
         for name, value in values.items():
@@ -380,11 +398,13 @@ def _fill(message: Any, values: Any, words: Mapping[str, Any], path: str) -> Non
         _fill_field(message, name, type_, value, words, path)
 
 
-def _fill_field(message: Any, name: str, type_: str, value: Any, words: Mapping[str, Any], path: str) -> None:
+def _fill_field(
+    message: protocols.Message, name: str, type_: str, value: object, words: Mapping[str, object], path: str
+) -> None:
     current = getattr(message, name)
     if isinstance(current, TVal):
         setattr(message, name, _filled_time(current, value, words))
-    elif hasattr(current, "_slot_types"):
+    elif is_message(current):
         if isinstance(value, str):
             setattr(message, name, _word(value, words))
         else:
@@ -395,7 +415,7 @@ def _fill_field(message: Any, name: str, type_: str, value: Any, words: Mapping[
         setattr(message, name, value)
 
 
-def _filled_array(name: str, type_: str, values: Any, words: Mapping[str, Any], path: str) -> Any:
+def _filled_array(name: str, type_: str, values: object, words: Mapping[str, object], path: str) -> object:
     base, _, length = type_.removesuffix("]").partition("[")
     if isinstance(values, bytes) and base in ("uint8", "char"):
         return values
@@ -423,7 +443,7 @@ def _filled_array(name: str, type_: str, values: Any, words: Mapping[str, Any], 
     return filled
 
 
-def _filled_time(current: TVal, value: Any, words: Mapping[str, Any]) -> Any:
+def _filled_time(current: TVal, value: object, words: Mapping[str, object]) -> object:
     match value:
         case str():
             return _word(value, words)
@@ -431,9 +451,9 @@ def _filled_time(current: TVal, value: Any, words: Mapping[str, Any]) -> Any:
             return current
         case {"secs": int(secs), "nsecs": int(nsecs)}:
             return type(current)(secs, nsecs)
-        case {"secs": int(secs)} if len(value) == 1:
+        case {"secs": int(secs), **others} if not others:
             return type(current)(secs, current.nsecs)
-        case {"nsecs": int(nsecs)} if len(value) == 1:
+        case {"nsecs": int(nsecs), **others} if not others:
             return type(current)(current.secs, nsecs)
         case [int(secs), int(nsecs)]:
             return type(current)(secs, nsecs)
@@ -447,7 +467,7 @@ def _filled_time(current: TVal, value: Any, words: Mapping[str, Any]) -> Any:
     raise ValueError(f"invalid msg_args type: {value}")
 
 
-def _word(word: str, words: Mapping[str, Any]) -> Any:
+def _word(word: str, words: Mapping[str, object]) -> object:
     if word not in words:
         raise MessageException(f"No key named [{word}]")
     return words[word]

@@ -6,7 +6,7 @@ those made at run time. The names are genpy's (http://docs.ros.org/api/genpy/htm
 
 from __future__ import annotations
 
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, TypeGuard
 
 from minirospy.times import Time
 
@@ -23,6 +23,8 @@ __all__ = [
     "ServiceClass",
     "Stamped",
     "Writer",
+    "is_message",
+    "is_stamped",
 ]
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
@@ -157,3 +159,13 @@ class Action(Message, Protocol):
     @property
     def action_feedback(self) -> ActionFeedback:
         """A feedback."""
+
+
+def is_message(value: object) -> TypeGuard[Message]:
+    """Return whether a field's value, or what somebody gave us, is a message."""
+    return hasattr(value, "_slot_types")
+
+
+def is_stamped(value: object) -> TypeGuard[Stamped]:
+    """Return whether a value is a message that starts with a header."""
+    return bool(getattr(value, "_has_header", False))

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import cast
 
 from minirospy.errors import ServiceException
+from minirospy.idl.protocols import Message
 
 __all__ = ["to_response"]
 
 
-def to_response(response_class: type[Any], returned: Any) -> Any:
-    """A response of ``response_class`` from what a handler may return: a response, a dictionary of some of its
+def to_response(response_class: type[Message], returned: object) -> Message:
+    """Return a response of ``response_class`` from what a handler may return: a response, a dictionary of some of its
     fields, a list or tuple of all their values, or the value of its only field.
 
-    Raises ServiceException with rospy's words.
+    Raise ServiceException with rospy's words.
     """
     # A class of the same type may come from elsewhere: a reloaded module, a foreign generator.
     if getattr(type(returned), "_type", None) == response_class._type:
-        return returned
+        return cast("Message", returned)
     if returned is None:
         raise ServiceException("service handler returned None")
     try:

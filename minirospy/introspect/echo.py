@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from minirospy.errors import UsageError
+from minirospy.idl.protocols import is_message, is_stamped
 from minirospy.introspect.fields import field_type, field_value, parse_path
 from minirospy.introspect.messages import MessageClasses, fill, serialize
 from minirospy.introspect.plot import plot_header, plot_row
 from minirospy.times import Time
 
 if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import Received
     from minirospy.introspect.topics import TopicField
 
@@ -31,7 +33,7 @@ class Filter:
         except (SyntaxError, ValueError) as error:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
-    def __call__(self, message: Any, topic: str) -> bool:
+    def __call__(self, message: Message, topic: str) -> bool:
         """Whether the expression is true. Raises UsageError where it cannot be evaluated."""
         try:
             # The user's own code on the user's own machine, as in ROS: no input of others gets here.
@@ -69,10 +71,10 @@ class Echo:
         self._now = now
         self._type = ""
         self._classes = MessageClasses()
-        self._checked: type[Any] | None = None
+        self._checked: type[Message] | None = None
         self._header_written = False
 
-    def message(self, received: Received) -> Any:
+    def message(self, received: Received) -> Message:
         """The message in what was received. Raises NotFoundError where it has no such field."""
         from minirospy.idl.load import get_message_class
 
@@ -83,15 +85,14 @@ class Echo:
                 self._type = field_type(type(message), self._path)
         return message
 
-    def text(self, message: Any, received: Received) -> str:
+    def text(self, message: Message, received: Received) -> str:
         """What is printed of a message. Raises IndexError where the field's array is too short."""
         value = field_value(message, self._steps)
         return self._row(value, received) if self._plot else self._block(value)
 
-    def _row(self, value: Any, received: Received) -> str:
-        stamped = getattr(value, "_has_header", False)
+    def _row(self, value: object, received: Received) -> str:
         origin = self._now() if self._offset else 0
-        nanoseconds = (value.header.stamp.to_nsec() if stamped else received.nanoseconds) - origin
+        nanoseconds = (value.header.stamp.to_nsec() if is_stamped(value) else received.nanoseconds) - origin
         header = ""
         if not self._header_written:
             self._header_written = True
@@ -99,7 +100,7 @@ class Echo:
         row = plot_row(value, nanoseconds, strings=self._strings, arrays=self._arrays, origin=origin)
         return header + row + "\n"
 
-    def _block(self, value: Any) -> str:
+    def _block(self, value: object) -> str:
         from minirospy.idl.message import strify_message
 
         if isinstance(value, bytes):
@@ -110,7 +111,7 @@ class Echo:
         return strify_message(value, time_offset=now, fixed_numeric_width=self._width) + "\n---\n"
 
 
-def fill_message(cls: type[Any], values: Sequence[Any], nanoseconds: int | None = None) -> Any:
+def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
     """A message of YAML values; ``now`` is the time, ``auto`` a stamped header (``nanoseconds``: what time it is).
 
     Raises MessageException where they do not fit, with the names of the fields that there are.
@@ -118,7 +119,7 @@ def fill_message(cls: type[Any], values: Sequence[Any], nanoseconds: int | None 
     now = Time(*divmod(time.time_ns() if nanoseconds is None else nanoseconds, 10**9))
     from minirospy.idl.load import get_message_class
 
-    keys: dict[str, Any] = {"now": now}
+    keys: dict[str, object] = {"now": now}
     header = get_message_class("std_msgs/Header")
     if header is not None:
         keys["auto"] = header(stamp=now)
@@ -127,20 +128,21 @@ def fill_message(cls: type[Any], values: Sequence[Any], nanoseconds: int | None 
     return message
 
 
-def elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
+def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
     """``value`` (of ROS type ``type_``, "" where unknown) with a note in the place of strings or arrays."""
     if type_.endswith("]") or isinstance(value, list | tuple):
         element = type_.partition("[")[0]
+        values = cast("Sequence[object]", value)
         if not arrays or (element == "string" and not strings):
-            return f"<array type: {element}, length: {len(value)}>"
-        if len(value) and hasattr(value[0], "_slot_types"):
-            return [elided(each, element, strings, arrays) for each in value]
+            return f"<array type: {element}, length: {len(values)}>"
+        if len(values) and is_message(values[0]):
+            return [elided(each, element, strings, arrays) for each in values]
         return value
     if isinstance(value, str):
         return value if strings else f"<string length: {len(value)}>"
-    if not hasattr(value, "_slot_types"):
+    if not is_message(value):
         return value
-    cls: Any = type(value)
+    cls = type(value)
     fields = {
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
@@ -157,5 +159,5 @@ def elided(value: Any, type_: str, strings: bool, arrays: bool) -> Any:
 
 
 @lru_cache(maxsize=256)
-def _class_with_types(cls: Any, types: tuple[str, ...]) -> type[Any]:
+def _class_with_types(cls: type[Message], types: tuple[str, ...]) -> type[Message]:
     return type(cls.__name__, cls.__bases__, {"__slots__": cls.__slots__, "_slot_types": list(types)})

@@ -7,9 +7,12 @@ Source: http://wiki.ros.org/rostopic#rostopic_echo.
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import NotFoundError, UsageError
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
 
 __all__ = ["Step", "field_type", "field_value", "parse_path"]
 
@@ -35,12 +38,12 @@ def parse_path(path: str) -> tuple[Step, ...]:
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 
-def field_value(message: Any, steps: tuple[Step, ...]) -> Any:
+def field_value(message: object, steps: tuple[Step, ...]) -> object:
     """The value at a path; a slice of messages followed by a field gives a list of that field's values.
 
     Raises NotFoundError where a field is not there, IndexError where an array is too short.
     """
-    value: Any = message
+    value: object = message
     for at, (name, index) in enumerate(steps):
         if isinstance(value, list | tuple | bytes):
             raise _array_as_message(steps[at - 1].name, name)
@@ -49,17 +52,18 @@ def field_value(message: Any, steps: tuple[Step, ...]) -> Any:
             continue
         if not isinstance(value, list | tuple | bytes):
             raise NotFoundError("array", name, hint=f"the field is a single {_type_of(value)}")
+        rest = steps[at + 1 :]
+        if isinstance(index, slice) and rest:
+            return [field_value(element, rest) for element in value[index]]
+        size = len(value)
         try:
             value = value[index]
         except IndexError:
-            raise IndexError(f"{name}[{index}]: the array has {len(value)} elements") from None
-        rest = steps[at + 1 :]
-        if isinstance(index, slice) and rest:
-            return [field_value(element, rest) for element in value]
+            raise IndexError(f"{name}[{index}]: the array has {size} elements") from None
     return value
 
 
-def field_type(message_class: type[Any], path: str) -> str:
+def field_type(message_class: type[Message], path: str) -> str:
     """The ROS type of the field at a path of a message class.
 
     Raises NotFoundError where there is no such field or the class of an inner message is not installed.
@@ -101,7 +105,7 @@ def _parse_step(part: str, path: str) -> Step:
     return Step(name, slice(*numbers) if ":" in index else numbers[0])
 
 
-def _attribute(value: Any, name: str) -> Any:
+def _attribute(value: object, name: str) -> object:
     try:
         return getattr(value, name)
     except AttributeError:
@@ -113,11 +117,11 @@ def _array_as_message(array: str, name: str) -> NotFoundError:
     return NotFoundError("field", name, hint=hint)
 
 
-def _no_field(message_class: type[Any], name: str) -> NotFoundError:
+def _no_field(message_class: type[object], name: str) -> NotFoundError:
     fields = list(getattr(message_class, "__slots__", ()))
     hint = f"[{_type_of(message_class)}] has {' '.join(fields) or 'no fields'}"
     return NotFoundError("field", name, fields, hint)
 
 
-def _type_of(value: Any) -> str:
+def _type_of(value: object) -> str:
     return str(getattr(value, "_type", None) or type(value).__name__)

@@ -6,13 +6,16 @@ Source: http://wiki.ros.org/rosconsole (the services get_loggers and set_logger_
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.introspect.nodes import find_node
 from minirospy.introspect.services import call_service, fill_request
 
 if TYPE_CHECKING:
+    from roscpp.srv import GetLoggersResponse
+
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 
 __all__ = ["logger_level", "logger_levels", "set_logger_level"]
@@ -24,7 +27,7 @@ def logger_levels(graph: Graph, node: str) -> dict[str, str]:
     Raises NotFoundError, NodeUnreachableError, and MinirospyError where it tells nothing of its loggers.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
-    return {logger.name: logger.level for logger in response.loggers}
+    return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
@@ -42,7 +45,7 @@ def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
-def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Any:
+def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
     """The response of a node's own service."""
     name = find_node(graph, node).name
     try:

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import itertools
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.errors import MessageException, NotFoundError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import Received
 
 __all__ = ["MessageClasses", "check", "fill", "serialize"]
+
+_M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
@@ -30,9 +33,9 @@ class MessageClasses:
     """Message classes for what publishers send; each is looked up or made once."""
 
     def __init__(self) -> None:
-        self._classes: dict[tuple[str, str], type[Any]] = {}
+        self._classes: dict[tuple[str, str], type[Message]] = {}
 
-    def for_header(self, header: Mapping[str, str]) -> type[Any]:
+    def for_header(self, header: Mapping[str, str]) -> type[Message]:
         """The class for a publisher's connection header: the installed one where the md5sums agree.
 
         Raises NotFoundError where it is not installed and the publisher sent no definition, DefinitionError
@@ -43,7 +46,7 @@ class MessageClasses:
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
 
-    def read(self, received: Received) -> Any:
+    def read(self, received: Received) -> Message:
         """The message in what was received. Raises DeserializationError, and as :meth:`for_header`."""
         message = self.for_header(received.header)()
         message.deserialize(received.body)
@@ -51,21 +54,20 @@ class MessageClasses:
         return message
 
     @staticmethod
-    def _find(type_: str, md5sum: str, definition: str) -> type[Any]:
+    def _find(type_: str, md5sum: str, definition: str) -> type[Message]:
         from minirospy.idl.load import class_from_text, get_message_class
 
-        installed: type[Any] | None = get_message_class(type_)
+        installed = get_message_class(type_)
         if installed is not None and md5sum in ("*", installed._md5sum):
             return installed
         if definition or installed is not None:
-            made: type[Any] = class_from_text(type_, definition)
-            return made
+            return class_from_text(type_, definition)
         raise NotFoundError(
             "message type", type_, hint="it is not installed, and its publisher sent no definition"
         )
 
 
-def fill(message: Any, values: Sequence[Any], keys: Mapping[str, Any] | None = None) -> Any:
+def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
     """``message`` with YAML values in its fields: one dictionary, or a value for each field in order.
 
     ``keys`` are words that stand for a value, as ``now`` for a time. Raises MessageException.
@@ -80,12 +82,12 @@ def fill(message: Any, values: Sequence[Any], keys: Mapping[str, Any] | None = N
     return message
 
 
-def check(message: Any) -> None:
+def check(message: Message) -> None:
     """Raise MessageException with the field's name where a value does not fit the definition."""
     serialize(message)
 
 
-def serialize(message: Any) -> bytes:
+def serialize(message: Message) -> bytes:
     """The bytes of a message. Raises MessageException where a value does not fit its field."""
     buffer = BytesIO()
     try:
@@ -95,7 +97,7 @@ def serialize(message: Any) -> bytes:
     return buffer.getvalue()
 
 
-def _does_not_fit(message: Any, error: Exception, values: Sequence[Any] = ()) -> MessageException:
+def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
     """What is wrong with the ``values`` that were typed, on one line, and what the fields are."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"

@@ -7,7 +7,7 @@ Source: http://wiki.ros.org/rostopic#rostopic_echo (-p).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 __all__ = ["plot_header", "plot_row"]
 
@@ -17,19 +17,19 @@ class _Cell(NamedTuple):
     text: str
 
 
-def plot_header(value: Any, *, strings: bool = True, arrays: bool = True) -> str:
+def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> str:
     """The line of column names for messages like ``value``."""
     return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays, 0))
 
 
 def plot_row(
-    value: Any, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
+    value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
     """The line of values, with the message's time in front; ``origin`` (nanoseconds) is taken off times inside."""
     return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays, origin))
 
 
-def _cells(name: str, value: Any, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
+def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
     # Plain ``if``s, most frequent first: this runs for every value of every message.
     if isinstance(value, bool):
         yield _Cell(name, str(int(value)))

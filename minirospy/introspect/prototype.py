@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy.idl.load import Catalogue
 from minirospy.idl.spec import FieldType, MessageSpec
@@ -34,12 +34,12 @@ class _Defaults(NamedTuple):
     without: Collection[str]
     empty_arrays: bool
 
-    def of(self, spec: MessageSpec) -> dict[str, Any]:
+    def of(self, spec: MessageSpec) -> dict[str, object]:
         """The values of a message's fields."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
-    def _value(self, type_: FieldType) -> Any:
+    def _value(self, type_: FieldType) -> object:
         if type_.is_array:
             if type_.length is None and type_.base in ("uint8", "char"):
                 return b""
@@ -62,7 +62,7 @@ class _Yaml:
     def __init__(self) -> None:
         self._tight = False
 
-    def lines(self, value: Any) -> list[str]:
+    def lines(self, value: object) -> list[str]:
         """The lines of a value, those of what it holds indented."""
         inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
         if isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE:
@@ -70,7 +70,7 @@ class _Yaml:
         if not inner or (self._tight and not any(isinstance(each, dict | list) for each in inner)):
             return [_flow(value)]
         lines: list[str] = []
-        for key, child in value.items() if isinstance(value, dict) else enumerate(value):
+        for key, child in value.items() if isinstance(value, dict) else enumerate(inner):
             first, *rest = self.lines(child)
             if isinstance(value, list):
                 lines += [f"- {first}", *(f"  {line}" for line in rest)]
@@ -82,7 +82,7 @@ class _Yaml:
         return lines
 
 
-def _flow(value: Any) -> str:
+def _flow(value: object) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):
@@ -113,5 +113,5 @@ def _wrapped(line: str) -> str:
     return "".join(text)
 
 
-def _length(value: Any) -> int:
+def _length(value: object) -> int:
     return len(value) if isinstance(value, list) else 0

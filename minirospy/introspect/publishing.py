@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/rostopic#rostopic_pub.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.errors import NotFoundError, ROSTimeMovedBackwardsException, UsageError
 from minirospy.introspect.values import message_values, parse_arguments, parse_documents, parse_lines
@@ -14,6 +14,7 @@ from minirospy.introspect.values import message_values, parse_arguments, parse_d
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
 
 __all__ = ["publish_all", "values_to_publish"]
@@ -21,7 +22,7 @@ __all__ = ["publish_all", "values_to_publish"]
 
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
-) -> Iterator[list[Any]]:
+) -> Iterator[list[object]]:
     """The YAML values of each message with ``fields``; at least one.
 
     ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raises
@@ -48,9 +49,9 @@ def values_to_publish(
 def publish_all(
     node: ToolNode,
     publisher: TopicPublisher,
-    messages: Iterable[Any],
+    messages: Iterable[Message],
     rate: float,
-    on_message: Callable[[Any], object],
+    on_message: Callable[[Message], object],
 ) -> None:
     """Publish ``rate`` messages a second by the node's clock until they end or the node is asked to stop.
 

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/rosservice, http://wiki.ros.org/ROS/TCPROS ("Service
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import (
     CallFailed,
@@ -21,6 +21,7 @@ from minirospy.introspect.graph import Graph, in_namespace, unknown_service
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from minirospy.idl.protocols import Message
     from minirospy.runtime.service_client import ServiceClient
     from minirospy.wire.header import Header
 
@@ -113,7 +114,7 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
         time.sleep(_POLL_SECONDS)
 
 
-def fill_request(type_: str, arguments: Sequence[Any]) -> Any:
+def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """A request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
     Raises NotFoundError where the type is not installed, MessageException where the values do not fit.
@@ -124,7 +125,7 @@ def fill_request(type_: str, arguments: Sequence[Any]) -> Any:
     return fill(service_class(type_)._request_class(), arguments)
 
 
-def call_service(graph: Graph, service: str, type_: str, request: Any) -> Any:
+def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """The response to a filled request. Raises NotFoundError, ServiceException with the handler's text."""
     from minirospy.idl.load import service_class
     from minirospy.introspect.messages import check, serialize

@@ -12,10 +12,11 @@ import struct
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.clock import Clock, SimulatedClock, WallClock
 from minirospy.errors import MessageException, MinirospyError, RpcRefused
+from minirospy.idl.protocols import is_stamped
 from minirospy.introspect.messages import MessageClasses, serialize
 from minirospy.introspect.topics import TopicField, find_topic
 from minirospy.runtime.loop import LoopThread
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from minirospy.environment import Environment
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
@@ -160,13 +162,13 @@ class ToolNode:
         return inbox
 
     def publisher(
-        self, topic: str, message_class: type[Any], *, latch: bool, queue_size: int = 100
+        self, topic: str, message_class: type[Message], *, latch: bool, queue_size: int = 100
     ) -> TopicPublisher:
         """Publish a topic of an installed message class from now on."""
         type_ = InterfaceType(message_class._type, message_class._md5sum, message_class._full_text)
         publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
         self._loop.run(self._node.advertise(publication))
-        return TopicPublisher(publication, bool(message_class._has_header))
+        return TopicPublisher(publication)
 
     def _follow_clock(self, master_uri: str) -> None:
         master = MasterProxy(master_uri, self.name)
@@ -266,9 +268,8 @@ class Inbox:
 class TopicPublisher:
     """Publishes messages on one topic, from one thread."""
 
-    def __init__(self, publication: Publication, has_header: bool) -> None:
+    def __init__(self, publication: Publication) -> None:
         self._publication = publication
-        self._has_header = has_header
         self._sequence = 0
 
     @property
@@ -282,9 +283,9 @@ class TopicPublisher:
         while not self.connections and time.monotonic() < end and not wait(0.02):
             pass
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: Message) -> None:
         """Send a message; its header is numbered. Raises MessageException where a value does not fit."""
-        if self._has_header:
+        if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
         body = serialize(message)

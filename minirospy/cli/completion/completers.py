@@ -11,9 +11,11 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 if TYPE_CHECKING:
+    from roscpp.srv import GetLoggersResponse
+
     from minirospy.cli.ros.rospack import _Verb as PackVerb
     from minirospy.idl.load import Catalogue
     from minirospy.idl.spec import MessageSpec
@@ -367,9 +369,8 @@ def loggers(place: Place) -> Iterable[str]:
 
     def ask(graph: Graph) -> list[str]:
         service = graph.resolve(place.given[0]) + "/get_loggers"
-        return sorted(
-            each.name for each in call_service(graph, service, type_, fill_request(type_, [])).loggers
-        )
+        response = call_service(graph, service, type_, fill_request(type_, []))
+        return sorted(each.name for each in cast("GetLoggersResponse", response).loggers)
 
     return _live(ask)
 

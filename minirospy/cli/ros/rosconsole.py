@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 from minirospy.cli.command import tool_node, warn, warn_unpublished
 from minirospy.cli.parser import Parser
@@ -20,6 +20,8 @@ from minirospy.introspect.nodes import list_nodes
 from minirospy.introspect.topics import find_topic
 
 if TYPE_CHECKING:
+    from rosgraph_msgs.msg import Log
+
     from minirospy.names import Arguments
 
 __all__ = ["FAMILY", "main"]
@@ -124,9 +126,10 @@ def _echo(
 
     with tool_node("rosconsole", arguments) as node:
         for received in node.inbox(name):
-            log = node.classes.read(received)
-            if log._type != "rosgraph_msgs/Log":
-                raise MinirospyError(f"[{topic}] carries {log._type}, not rosgraph_msgs/Log")
+            message = node.classes.read(received)
+            if message._type != "rosgraph_msgs/Log":
+                raise MinirospyError(f"[{topic}] carries {message._type}, not rosgraph_msgs/Log")
+            log = cast("Log", message)
             if log.level < _LEVELS[level] or not wanted.match(log.name):
                 continue
 
@@ -144,7 +147,7 @@ def _add_logger(parser: Parser) -> None:
     parser.add_argument("logger", help="the logger, as rosout", completer="loggers")
 
 
-def _shown(log: Any, *, colour: bool, verbose: bool) -> str:
+def _shown(log: Log, *, colour: bool, verbose: bool) -> str:
     name = next((name for name, level in _LEVELS.items() if level == log.level), str(log.level))
     label = f"{name.upper():5}"
     if colour:

@@ -14,6 +14,7 @@ from minirospy.cli.command import refuse_bag, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import NotFoundError
+from minirospy.idl.protocols import is_stamped
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 
@@ -369,7 +370,7 @@ def _delay(topic: str, window: int, tcpnodelay: bool, arguments: Arguments | Non
 
         def add(received: Received) -> None:
             message = node.classes.read(received)
-            if message._has_header:
+            if is_stamped(message):
                 measured.add(received.time, message.header.stamp.to_sec())
             else:
                 unstamped.append(message._type)

@@ -134,4 +134,4 @@ def _call(uri: str, service: str, caller_id: str) -> str:
         response.deserialize(client.call(b""))
     finally:
         client.close()
-    return str(response.message)
+    return str(getattr(response, "message"))  # noqa: B009 - a field that the Protocol lacks
