@@ -319,11 +319,11 @@ def _log_to_file(node: NodeProcess, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
     from minirospy.runtime.log_file import LogFileHandler
 
-    class LogFile(_DeferringHandler, LogFileHandler):
-        pass
+    class RotatingFileHandler(_DeferringHandler, LogFileHandler):
+        """Of the name that programs find among the root logger's handlers with rospy."""
 
     try:
-        file = LogFile(path, _FILE_BYTES, _FILE_BACKUPS)
+        file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
     except OSError as error:
         if path.parent.is_dir():
             _warn(f"cannot write the log file [{path}]: {error.strerror}")

@@ -289,8 +289,8 @@ class NodeProcess(Identity, Lifecycle):
         The name, the time and log lines go on; topics of the parent's connect nobody here; the child may become a
         node of its own by init_node. Locks that another thread held are free, sockets are not shared.
         """
-        for publication in self.node.publications.values() if self.node else ():
-            publication.links = ()
+        for published in self.published.values():
+            published.forget_subscribers()
         self._is_forked = True
         self._forget_node()
         self._installs_signals_in_fork = self.signals.is_installed

@@ -221,6 +221,11 @@ class Published(Shared):
             self._was_heard = True
             self._tell_unheard()
 
+    def forget_subscribers(self) -> None:
+        """Publish to nobody from now on: this process is a fork, and the subscribers are its parent's."""
+        self.publication.links = ()
+        self._was_heard = True
+
     def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
         """See :meth:`Publisher.wait_for_subscribers`."""
         self.check_initialized()
