@@ -59,9 +59,16 @@ def refuse_bag(command: str) -> NoReturn:
     raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
-def run(name: str, body: Callable[[], int | None], interrupted: int = 0) -> int:
-    """The exit status of ``body`` (at Ctrl-C ``interrupted``); a named error becomes ``name: ERROR: text`` on stderr."""
+def run(
+    name: str, body: Callable[[], int | None], interrupted: int = 0, *, heeds_interrupts: bool = True
+) -> int:
+    """Run ``body`` and return the exit status, at Ctrl-C ``interrupted``; print a named error as ``name: ERROR: text``.
+
+    ``heeds_interrupts``: whether SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
+    """
     _open_streams()
+    if heeds_interrupts and not interrupted:
+        _heed_interrupts()
     try:
         status = body() or 0
         sys.stdout.flush()
@@ -85,6 +92,21 @@ def run(name: str, body: Callable[[], int | None], interrupted: int = 0) -> int:
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
         return interrupted
+
+
+def _heed_interrupts() -> None:
+    """End at SIGINT also where a script has started the command with `&`: the shell has it ignored there.
+
+    As in ROS, whose commands are nodes and install their own handlers. A build keeps what its shell says.
+    """
+    import signal
+    import threading
+
+    if (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    ):
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _open_streams() -> None:

@@ -28,7 +28,8 @@ PROGRAM is a file's name, wherever in PACKAGE it lies, or its path from there.
 def main(argv: Sequence[str] | None = None) -> int:
     """The command: the exit status is the program's, or as in minirospy.cli.command where it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return run("rosrun", lambda: _rosrun(words))
+    # What the program ignores is for it to say.
+    return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
