@@ -25,6 +25,7 @@
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit where it goes
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
+    |   +-- ThreadLimitError            the system lets this process start no more threads
     |   +-- ROSSerializationException
     |   +-- ROSInterruptException
     |   |   +-- ROSTimeMovedBackwardsException
@@ -70,6 +71,7 @@ __all__ = [
     "SerializationError",
     "ServiceException",
     "SourceError",
+    "ThreadLimitError",
     "TransportException",
     "TransportInitError",
     "TransportTerminated",
@@ -113,13 +115,16 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master answers at ``uri``."""
+    """No master answers at ``uri``; ``why``: what keeps this process from calling it."""
 
-    def __init__(self, uri: str) -> None:
-        super().__init__(uri)
+    def __init__(self, uri: str, why: str = "") -> None:
+        super().__init__(uri, why)
         self.uri = uri
+        self.why = why
 
     def __str__(self) -> str:
+        if self.why:
+            return f"the master at {self.uri} cannot be called: {self.why}"
         return (
             f"no ROS master answers at {self.uri}: start one with `roscore`, "
             "or set ROS_MASTER_URI to the machine where it runs"
@@ -264,6 +269,22 @@ class ROSException(Exception):
 
 class ROSInitException(ROSException):
     """A node could not be initialised."""
+
+
+class ThreadLimitError(ROSException):
+    """The system lets this process start no more threads; ``limits`` are those that are known."""
+
+    def __init__(self, threads: int, limits: list[str]) -> None:
+        super().__init__(threads, limits)
+        self.threads = threads
+        self.limits = limits
+
+    def __str__(self) -> str:
+        known = f" (limits: {', '.join(self.limits)})" if self.limits else ""
+        return (
+            f"the system starts no more threads for this process, which has {self.threads}{known}: raise the limit, or "
+            "use fewer subscribers, services and timers in one process"
+        )
 
 
 class ROSSerializationException(ROSException):

@@ -27,6 +27,7 @@ from minirospy.actionlib.statuses import StatusList
 from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
+from minirospy.runtime.limits import naming_thread_limit
 
 __all__ = ["ActionServer", "nop_cb"]
 
@@ -299,7 +300,8 @@ class _Teller:
         self._due = time.monotonic() + period
         self._stopped = False
         self._wake = SignalSafeEvent()
-        threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
+        with naming_thread_limit():
+            threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:
         """Call in so many seconds, where it was not to be called before that anyway."""

@@ -16,6 +16,7 @@ from minirospy import client as rospy
 from minirospy.actionlib.handle import ServerGoalHandle
 from minirospy.actionlib.server import ActionServer
 from minirospy.client.process import process
+from minirospy.runtime.limits import naming_thread_limit
 
 __all__ = ["SimpleActionServer"]
 
@@ -62,7 +63,8 @@ class SimpleActionServer:
         self.execute_condition = threading.Condition(self.lock)
         if execute_cb:
             self.execute_thread = threading.Thread(target=self.executeLoop, name="minirospy-action")
-            self.execute_thread.start()
+            with naming_thread_limit():
+                self.execute_thread.start()
         if auto_start:
             self.action_server.warn_of_auto_start()
             self.start()
@@ -209,7 +211,8 @@ class SimpleActionServer:
 
     def _wake_soon(self) -> None:
         """Have the loop look again; in a thread, since a callback that blocks may hold the lock."""
-        threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
+        with naming_thread_limit():
+            threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 
     def _wake(self) -> None:
         with self.execute_condition:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from minirospy.client.process import process
 from minirospy.client.topic import Shared, Topic, interface_type, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
-from minirospy.errors import MasterUnreachableError, ROSException, RpcError
+from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.runtime.complaints import Complaints
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
@@ -74,7 +74,11 @@ class Subscriber(Topic[_M]):
             # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
             links = state.connections
         self.impl = state
-        process.when_ready(state.register)
+        try:
+            process.when_ready(state.register)
+        except ThreadLimitError:
+            self.unregister()
+            raise
         if callback is not None:
             state.replay(data_class, _Callback(callback, callback_args), links)
 
@@ -210,9 +214,11 @@ class Subscribed(Shared):
                 tcp_nodelay=self._tcp_nodelay,
             )
             wait = process.begin(node.subscribe(self.subscription))
-        if self.resolved_name not in _WITHOUT_STATISTICS:
-            node.workers.start(self._look_for_statistics)
-        register_with_master("subscription", self.resolved_name, wait)
+        try:
+            if self.resolved_name not in _WITHOUT_STATISTICS:
+                node.workers.start(self._look_for_statistics)
+        finally:
+            register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
         """How many messages to keep: as many as the Subscriber that asks for most."""

@@ -15,6 +15,7 @@ from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent, SimulatedClock
 from minirospy.errors import ROSInitException
+from minirospy.runtime.limits import naming_thread_limit
 
 __all__ = [
     "Duration",
@@ -184,7 +185,8 @@ class Timer(threading.Thread):
         self._oneshot = oneshot
         self._reset = reset
         self._ended = SignalSafeEvent()
-        self.start()
+        with naming_thread_limit():
+            self.start()
 
     @property
     def _shutdown(self) -> bool:

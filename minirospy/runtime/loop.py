@@ -10,6 +10,8 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
+from minirospy.runtime.limits import naming_thread_limit
+
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
@@ -25,7 +27,7 @@ class LoopClosedError(RuntimeError):
 
 
 class LoopThread:
-    """An event loop in a daemon thread. Closing is idempotent."""
+    """An event loop in a daemon thread. Closing is idempotent. Raise ThreadLimitError."""
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
@@ -33,7 +35,12 @@ class LoopThread:
         self._lock = threading.RLock()
         self._is_ending = False
         self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
-        self._thread.start()
+        try:
+            with naming_thread_limit():
+                self._thread.start()
+        except BaseException:
+            self.loop.close()
+            raise
 
     def run(self, coroutine: Coroutine[Any, Any, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.

@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from minirospy.errors import MasterUnreachableError, RpcRefused, RpcUnreachable
+from minirospy.runtime.limits import is_file_limit
 from minirospy.runtime.rpc_client import RpcClient
 
-__all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "unwrap"]
+__all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_unreachable", "unwrap"]
 
 
 class SystemState(NamedTuple):
@@ -45,6 +46,11 @@ def unwrap(method: str, answer: Any) -> Any:
             raise RpcRefused(method, -1, f"answered {answer!r}")
 
 
+def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
+    """Return the error of a master that cannot be called: it does not answer, or this process has no socket left."""
+    return MasterUnreachableError(error.uri, error.why if is_file_limit(error.__cause__) else "")
+
+
 class MasterProxy:
     """The master at ``uri``, called as the node ``caller_id``.
 
@@ -64,7 +70,7 @@ class MasterProxy:
         try:
             return unwrap(method, self._client.call(method, self.caller_id, *args))
         except RpcUnreachable as error:
-            raise MasterUnreachableError(self.uri) from error
+            raise master_unreachable(error) from error
 
     def close(self) -> None:
         """Close the connections. Idempotent."""

@@ -27,7 +27,7 @@ from minirospy.errors import (
 from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.links import Readers
-from minirospy.runtime.master_proxy import unwrap
+from minirospy.runtime.master_proxy import master_unreachable, unwrap
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.services import Handler, ServiceServer
@@ -227,7 +227,7 @@ class Node:
             answer = await self._rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
             self._is_master_silent = True
-            raise MasterUnreachableError(uri) from error
+            raise master_unreachable(error) from error
         self._is_master_silent = False
         return answer
 

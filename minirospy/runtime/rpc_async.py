@@ -14,6 +14,7 @@ from typing import Any
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.runtime import local, tcp
 from minirospy.runtime.deadlines import Deadlines
+from minirospy.runtime.limits import explain
 from minirospy.runtime.rpc_client import parse_http_uri
 from minirospy.wire.http import (
     MAX_BODY,
@@ -278,7 +279,7 @@ class Call:
         if isinstance(error, TimeoutError | asyncio.TimeoutError):
             why = f"timed out after {self._timeout:g} s"
         else:
-            why = str(error) or "the connection was closed"
+            why = explain(error) or "the connection was closed"
         unreachable = RpcUnreachable(self._uri, why)
         unreachable.__cause__ = error
         self._finish(error if isinstance(error, RpcError) else unreachable)

@@ -10,6 +10,7 @@ from typing import Any
 from minirospy.environment import split_uri
 from minirospy.errors import RpcProtocolError, RpcUnreachable
 from minirospy.runtime import local, sockets
+from minirospy.runtime.limits import explain, is_file_limit
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
 
@@ -71,7 +72,8 @@ class RpcClient:
         except TimeoutError as error:
             raise self._late(self._timeout) from error
         except (OSError, EOFError) as error:
-            why = getattr(error, "strerror", None) or str(error) or "the connection was closed"
+            why = explain(error) if is_file_limit(error) else getattr(error, "strerror", None) or str(error)
+            why = why or "the connection was closed"
             raise RpcUnreachable(self.uri, why) from error
 
     def _connect(self) -> socket.socket:

@@ -26,6 +26,7 @@ from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.deadlines import Deadlines
+from minirospy.runtime.limits import explain
 from minirospy.runtime.turns import Turns
 from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import (
@@ -142,6 +143,7 @@ class RpcServer:
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
         self._complaints = Complaints(_log)
         self._strangers = Complaints(_log, 10)
+        self._unaccepted = Complaints(_log)
 
     @property
     def clients(self) -> int:
@@ -192,6 +194,7 @@ class RpcServer:
         self.deadlines.close()
         self._complaints.close()
         self._strangers.close()
+        self._unaccepted.close()
 
     def _watch(self, sock: socket.socket) -> None:
         self._listening.append(sock)
@@ -210,7 +213,7 @@ class RpcServer:
                 return
             except OSError as error:
                 # Out of file descriptors: the longest silent one makes room, a moment later.
-                _log.warning("a connection could not be accepted: %s", error)
+                self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)
                 loop.call_later(0.05, self._watch_again, sock)

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
-from minirospy.errors import CallFailed, ServiceException, WireError
+from minirospy.errors import CallFailed, ServiceException, ThreadLimitError, WireError
 from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.service_client import (
     ANSWER,
@@ -86,8 +86,25 @@ class ServiceServer:
         connection = _Connection(sock)
         with self._lock:
             self._open.add(connection)
-        self._start(connection, fields)
+        try:
+            self._start(connection, fields)
+        except ThreadLimitError as error:
+            _log.error("service %s: a call is refused: %s", self.name, error)
+            with self._lock:
+                self._open.discard(connection)
+            await self._refuse_call(sock, error)
         return None
+
+    async def _refuse_call(self, sock: socket.socket, error: Exception) -> None:
+        """Answer a client's call with the reason why it is not served: its header has been answered already."""
+        try:
+            length = await asyncio.wait_for(_receive_length(sock), sockets.HANDSHAKE_SECONDS)
+            await asyncio.wait_for(_receive(sock, length), sockets.HANDSHAKE_SECONDS)
+            await asyncio.get_running_loop().sock_sendall(sock, _refusal(error))
+        except (OSError, WireError, asyncio.TimeoutError):
+            _log.debug("service %s: a client that cannot be served has not called", self.name)
+        finally:
+            sock.close()
 
     def close(self) -> None:
         """Serve no more: clients that wait for an answer get it, the others are hung up on."""
@@ -173,9 +190,9 @@ class LoopServiceServer(ServiceServer):
         persistent = _is_persistent(fields)
         try:
             while not self._closed:
-                (length,) = LENGTH.unpack(await _receive(sock, 4))
+                length = await _receive_length(sock)
                 connection.busy = True
-                request = await _receive(sock, checked(length))
+                request = await _receive(sock, length)
                 try:
                     body = await self._async_handler(request, fields)
                     answer = ANSWER.pack(1, len(body)) + body
@@ -259,13 +276,19 @@ def _is_persistent(fields: Header) -> bool:
     return fields.get("persistent", "").lower() in ("1", "true")
 
 
-def _refusal(error: ServiceException) -> bytes:
+def _refusal(error: Exception) -> bytes:
     text = str(error).encode()
     return ANSWER.pack(0, len(text)) + text
 
 
 def _never_called(_: memoryview, __: Header) -> bytes:
     raise AssertionError("a service on the loop has no worker")
+
+
+async def _receive_length(sock: socket.socket) -> int:
+    """Return the length of the request that follows. Raise WireError."""
+    (length,) = LENGTH.unpack(await _receive(sock, LENGTH.size))
+    return checked(length)
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:

@@ -19,6 +19,7 @@ from typing import Any
 from minirospy.errors import WireError
 from minirospy.runtime import sockets
 from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.limits import explain, is_file_limit
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [
@@ -163,8 +164,8 @@ class Listener:
             return
         except OSError as error:
             # Out of file descriptors, or the peer has gone already: the next one may do, a moment later.
-            self.tell_refusal(f"a connection could not be accepted: {error}")
-            if error.errno in (errno.EMFILE, errno.ENFILE):
+            self.tell_refusal(f"a connection could not be accepted: {explain(error)}")
+            if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")
             loop = asyncio.get_running_loop()
             loop.remove_reader(sock)

@@ -15,10 +15,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from minirospy.environment import split_uri
-from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, WireError
+from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadLimitError, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.limits import explain, is_file_limit
 from minirospy.runtime.links import OutLink, Readers, read_frames, watch_frames
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
@@ -330,8 +331,6 @@ class Subscription:
                 link.sock.close()
                 return
             self._links[uri] = link
-            for tell in self.on_connected:
-                tell()
             if self._on_loop:
                 watch_frames(
                     asyncio.get_running_loop(),
@@ -340,7 +339,16 @@ class Subscription:
                     lambda: self._link_ended(link),
                 )
             else:
-                self._workers.start(self._read, link, asyncio.get_running_loop())
+                try:
+                    self._workers.start(self._read, link, asyncio.get_running_loop())
+                except ThreadLimitError as error:
+                    del self._links[uri]
+                    link.sock.close()
+                    self._complaints.error("messages of %s are not received: %s", self.topic, error)
+                    self._retry(uri, error)
+                    return
+            for tell in self.on_connected:
+                tell()
 
     async def _open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
@@ -426,6 +434,12 @@ class Subscription:
             return
         _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
         cause = error.__cause__ or error
+        if isinstance(error, ThreadLimitError) or is_file_limit(cause):
+            # A limit of this process, and no fault of the publisher.
+            if is_file_limit(cause):
+                self._complaints.error("no connection for %s: %s", self.topic, explain(cause))
+            self._start_connecting(action)
+            return
         nameless = isinstance(cause, socket.gaierror)
         # Who just leaves refuses, or hangs up; silence or a closed way is the address's fault, or a firewall's.
         at_once = "timed out" in str(error) or (

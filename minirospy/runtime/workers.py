@@ -8,6 +8,9 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
+from minirospy.errors import ThreadLimitError
+from minirospy.runtime.limits import naming_thread_limit
+
 __all__ = ["InOrder", "Workers"]
 
 _IDLE_SECONDS = 10.0
@@ -28,16 +31,17 @@ class Workers:
         self._idle = 0
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` in a worker; an exception that it lets out is logged."""
+        """Run ``function(*args)`` in a worker; an exception that it lets out is logged. Raise ThreadLimitError."""
         with self._lock:
             if self._idle:
                 # A claimed worker surely takes an entry: it leaves only when it can withdraw itself.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
-        threading.Thread(
-            target=self._run, args=(function, args), name="minirospy-worker", daemon=True
-        ).start()
+        with naming_thread_limit():
+            threading.Thread(
+                target=self._run, args=(function, args), name="minirospy-worker", daemon=True
+            ).start()
 
     def _run(self, function: Callable[..., object], args: tuple[object, ...]) -> None:
         while True:
@@ -75,7 +79,13 @@ class InOrder:
             if self._is_running:
                 return
             self._is_running = True
-        self._workers.start(self._run)
+        try:
+            self._workers.start(self._run)
+        except ThreadLimitError as error:
+            # The functions wait for the next start.
+            with self._lock:
+                self._is_running = False
+            _log.error("a callback is late: %s", error)
 
     def _run(self) -> None:
         while True:

@@ -1,0 +1,65 @@
+"""The system's limits on threads and open files, named where this process meets one."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+from minirospy.errors import ThreadLimitError
+
+__all__ = ["explain", "is_file_limit", "naming_thread_limit"]
+
+_CGROUP = Path("/sys/fs/cgroup")
+
+
+@contextlib.contextmanager
+def naming_thread_limit() -> Iterator[None]:
+    """Start threads in the block. Raise ThreadLimitError where the system allows no more, instead of RuntimeError."""
+    try:
+        yield
+    except RuntimeError as error:
+        # Of a Python that is exiting; from 3.13 on it has its own error.
+        if sys.is_finalizing() or type(error) is not RuntimeError:
+            raise
+        raise ThreadLimitError(threading.active_count(), _thread_limits()) from error
+
+
+def is_file_limit(error: BaseException | None) -> bool:
+    """Return whether an error says that this process, or this machine, can open no more files and sockets."""
+    return isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE)
+
+
+def explain(error: BaseException) -> str:
+    """Return an error's text; of a file limit: which one it is, and what to do."""
+    if not is_file_limit(error):
+        return str(error)
+    assert isinstance(error, OSError)
+    if error.errno == errno.ENFILE:
+        return "this machine has no file descriptor left (sysctl fs.file-max)"
+    limit = ""
+    if sys.platform != "win32":
+        import resource
+
+        limit = f" of its {resource.getrlimit(resource.RLIMIT_NOFILE)[0]}"
+    return f"this process has no file descriptor left{limit}: raise the limit (ulimit -n), or connect to less"
+
+
+def _thread_limits() -> list[str]:
+    limits = []
+    if sys.platform != "win32":
+        import resource
+
+        if (most := resource.getrlimit(resource.RLIMIT_NPROC)[0]) != resource.RLIM_INFINITY:
+            limits.append(f"ulimit -u: {most}")
+        if (most := resource.getrlimit(resource.RLIMIT_AS)[0]) != resource.RLIM_INFINITY:
+            limits.append(f"ulimit -v: {most // 1024} KiB")
+    with contextlib.suppress(OSError, IndexError):
+        group = Path("/proc/self/cgroup").read_text(encoding="utf-8").strip().rpartition("::")[2]
+        most_tasks = (_CGROUP / group.lstrip("/") / "pids.max").read_text(encoding="utf-8").strip()
+        if most_tasks != "max":
+            limits.append(f"pids.max of {group}: {most_tasks}")
+    return limits
