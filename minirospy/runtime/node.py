@@ -132,6 +132,8 @@ class Node:
         """Where topics are served to processes of this machine; "" where they are not."""
         self._watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
+        self._answered = 0.0
+        """When the master answered last, in seconds of the loop's clock."""
         self._closed = False
 
     @property
@@ -219,21 +221,25 @@ class Node:
         """
         return unwrap(method, await self._call_master(method, self.name, *args))
 
-    async def _call_master(self, method: str, *args: Any, timeout: float = _CALL_SECONDS) -> Any:
+    async def _call_master(self, method: str, *args: Any) -> Any:
         """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self.environment.master_uri
-        seconds = self._patience() if self._closed else timeout
         try:
-            answer = await self._rpc.call(uri, method, *args, timeout=seconds)
+            answer = await self._rpc.call(uri, method, *args, timeout=_CALL_SECONDS)
         except RpcUnreachable as error:
             self._is_master_silent = True
             raise master_unreachable(error) from error
         self._is_master_silent = False
+        self._answered = asyncio.get_running_loop().time()
         return answer
 
-    def _patience(self) -> float:
-        """Return how many seconds a closing node waits for one answer of the master."""
-        return _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
+    async def _look(self, method: str, name: str) -> None:
+        """Ask the master about this node. Raises MasterUnreachableError, RpcError."""
+        try:
+            await asyncio.wait_for(self.master(method, name), _LOOK_SECONDS)
+        except asyncio.TimeoutError as error:
+            self._is_master_silent = True
+            raise MasterUnreachableError(self.environment.master_uri) from error
 
     async def advertise(self, publication: Publication) -> None:
         """Publish a topic from now on. One publication a topic: a second is a ValueError."""
@@ -406,7 +412,14 @@ class Node:
         One call after the other for each name, and what is on its way is not taken back: a registration could overtake
         the end of the one before, which would undo it, or the end of the node could overtake a registration.
         """
-        await asyncio.shield(self._start_telling(key, again=again))
+        task = self._start_telling(key, again=again)
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            if not task.cancelled():
+                raise
+            # close() has given up.
+            raise MasterUnreachableError(self.environment.master_uri) from error
 
     def _start_telling(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
         task = asyncio.ensure_future(self._tell_in_turn(key, again=again))
@@ -484,12 +497,10 @@ class Node:
             asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
             has_forgotten = False
             try:
-                method, name = (
-                    ("lookupService", asked[1])
-                    if asked and asked[0] == "Service"
-                    else ("lookupNode", self.name)
-                )
-                unwrap(method, await self._call_master(method, self.name, name, timeout=_LOOK_SECONDS))
+                if asked and asked[0] == "Service":
+                    await self._look("lookupService", asked[1])
+                else:
+                    await self._look("lookupNode", self.name)
             except MasterUnreachableError as error:
                 failures += 1
                 if failures == 2:
@@ -533,26 +544,30 @@ class Node:
         for key in self._known.keys() - under_way:
             del self._known[key]
 
-        notice = asyncio.get_running_loop().call_later(_NOTICE_SECONDS, self._log_waiting)
         tasks = [asyncio.ensure_future(self._call_all(calls))]
         tasks += [asyncio.ensure_future(self._tell(key)) for key in under_way]
         try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
-            for task in done:
-                if isinstance(error := task.exception(), MasterUnreachableError):
-                    _log.debug("leaving without the master: %s", error)
+            await self._wait_for_answers(tasks)
         finally:
-            notice.cancel()
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _log_waiting(self) -> None:
-        _log.warning(
-            "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s",
-            self.environment.master_uri,
-            self._patience(),
-        )
+    async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]]) -> None:
+        """Wait for the last calls of the master, for as long as it answers one after the other."""
+        loop = asyncio.get_running_loop()
+        patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
+        self._answered = loop.time()
+        uri = self.environment.master_uri
+        text = "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s"
+        notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience)
+
+        pending = set(tasks)
+        while pending and (left := self._answered + patience - loop.time()) > 0:
+            done, pending = await asyncio.wait(pending, timeout=left, return_when=asyncio.FIRST_EXCEPTION)
+            if any(isinstance(task.exception(), MasterUnreachableError) for task in done):
+                break
+        notice.cancel()
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, whatever is answered; many in one where the master has system.multicall (not all masters do).
