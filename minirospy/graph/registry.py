@@ -250,16 +250,36 @@ class Registry:
         ]
 
     def publishers(self) -> dict[str, list[str]]:
-        """Topic -> nodes that publish it."""
-        return {topic: list(nodes) for topic, nodes in self._publishers.items()}
+        """Return the nodes that publish each topic."""
+        return dict(self.publisher_rows())
 
     def subscribers(self) -> dict[str, list[str]]:
-        """Topic -> nodes that subscribe to it."""
-        return {topic: list(nodes) for topic, nodes in self._subscribers.items()}
+        """Return the nodes that subscribe to each topic."""
+        return dict(self.subscriber_rows())
 
     def services(self) -> dict[str, list[str]]:
-        """Service -> the node that offers it."""
-        return {service: [entry.node] for service, entry in self._services.items()}
+        """Return the node that offers each service, in a list."""
+        return dict(self.service_rows())
+
+    def publisher_rows(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield each topic and the nodes that publish it. The table may change meanwhile."""
+        return _rows(self._publishers)
+
+    def subscriber_rows(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield each topic and the nodes that subscribe to it. The table may change meanwhile."""
+        return _rows(self._subscribers)
+
+    def service_rows(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield each service and the node that offers it, in a list. The table may change meanwhile."""
+        return ((service, [entry.node]) for service, entry in list(self._services.items()))
+
+    def count_topics(self) -> int:
+        """Return how many topics are published or subscribed to."""
+        return len(self._publishers.keys() | self._subscribers.keys())
+
+    def count_services(self) -> int:
+        """Return how many services are offered."""
+        return len(self._services)
 
     def publications(self) -> Iterator[tuple[str, str]]:
         """(node, topic) of each publication, in the order of the tables."""
@@ -348,6 +368,10 @@ class Registry:
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)
+
+
+def _rows(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, list[str]]]:
+    return ((topic, list(nodes)) for topic, nodes in list(table.items()) if nodes)
 
 
 def _row(table: dict[str, dict[str, str]], topic: str) -> dict[str, str]:

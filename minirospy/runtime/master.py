@@ -6,6 +6,7 @@ What it answers is in ``runtime/master_api.py``.
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import os
 import re
@@ -49,6 +50,10 @@ _LOCK_PAUSE = 0.02
 _RESTART_SECONDS = 600.0
 """A master that starts so soon after the last sign of the one that was killed takes its session up."""
 
+_COLLECT_SECONDS = 60.0
+_COLLECT = (5000, 10, 1_000_000_000)
+"""The garbage collector's thresholds: the oldest generation is not collected by itself."""
+
 _OWN_NODE = "/rosout"
 
 
@@ -67,11 +72,12 @@ class Master(MasterApi):
         timeout: float = 3.0,
         most_clients: int = 4000,
         nearby: bool = True,
+        owns_process: bool = False,
     ) -> None:
         """``journal``: the file that keeps what it knows (None: no file); ``fresh``: what stands there is dropped.
 
         ``timeout``: seconds that a node has to take a call. ``nearby``: processes of this machine may come, and are
-        called, by Unix sockets.
+        called, by Unix sockets. ``owns_process``: nothing else runs in it, so the garbage collector is the master's.
         """
         super().__init__()
         self.host = host
@@ -84,6 +90,7 @@ class Master(MasterApi):
         # Large values whose parts were found in the journal.
         self._parts: dict[int, list[bytes]] = {}
         self._nearby = nearby
+        self._owns_process = owns_process
         self._server = RpcServer(
             self.serve,
             bind_host=bind_host,
@@ -96,6 +103,7 @@ class Master(MasterApi):
         self._replaced = Complaints(_log, 10)
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
+        self._collecting: asyncio.TimerHandle | None = None
         self.stopped = asyncio.Event()
         """Set when somebody asked the master to stop."""
 
@@ -134,6 +142,8 @@ class Master(MasterApi):
             if self._journal:
                 self._journal.close()
             raise
+        if self._owns_process:
+            self._collect()
         if nodes:
             self._checking = asyncio.ensure_future(self._check(nodes))
 
@@ -145,8 +155,9 @@ class Master(MasterApi):
         if self._checking:
             self._checking.cancel()
             await asyncio.gather(self._checking, return_exceptions=True)
-        if self._touching:
-            self._touching.cancel()
+        for timer in (self._touching, self._collecting):
+            if timer:
+                timer.cancel()
         await self._server.close()
         await self._notifier.close()
         self._replaced.close()
@@ -207,9 +218,9 @@ class Master(MasterApi):
                 "uptime": time.monotonic() - self._started,
                 "time": time.time(),
                 "nodes": len(self.registry.nodes()),
-                "topics": len(self.registry.publishers().keys() | self.registry.subscribers().keys()),
+                "topics": self.registry.count_topics(),
                 "types": len(types),
-                "services": len(self.registry.services()),
+                "services": self.registry.count_services(),
                 "parameters": len(parameters),
                 "calls": min(self.calls, 2**31 - 1),
                 "clients": self._server.clients,
@@ -351,6 +362,16 @@ class Master(MasterApi):
             (["+par", node, key, uri] for node, uri, key in parameters),
             (["set", "/", tree],),
         )
+
+    def _collect(self) -> None:
+        """Have the garbage collector look at the youngest objects only, and at all of them now and then if they are few.
+
+        A master of many registrations would stand still while it looks at them, and hardly ever has garbage in cycles.
+        """
+        gc.set_threshold(*_COLLECT)
+        if self.registry.is_small and self.parameters.is_small:
+            gc.collect()
+        self._collecting = asyncio.get_running_loop().call_later(_COLLECT_SECONDS, self._collect)
 
     def _touch(self) -> None:
         self._journal.touch()

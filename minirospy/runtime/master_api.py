@@ -36,6 +36,9 @@ _MAX_NAME = 4096
 _FEW = 200
 """Nodes that may be notified in one step."""
 
+_ROWS = 500
+"""Of a table that are collected in one step."""
+
 Answer = list[Any]
 
 
@@ -192,15 +195,27 @@ class MasterApi(ABC):
         uri = self.registry.service_uri(_name(service, "service", caller_id))
         return [_SUCCESS, f"rosrpc URI: [{uri}]", uri] if uri else [_ERROR, "no provider", ""]
 
-    def get_system_state(self, caller_id: str) -> Answer:
+    def get_system_state(self, caller_id: str) -> Answer | Steps[Answer]:
         """Publishers, subscribers and services, each as [name, nodes]."""
-        tables = (self.registry.publishers(), self.registry.subscribers(), self.registry.services())
-        return [_SUCCESS, "current system state", [_rows(table) for table in tables]]
+        steps = self._collect_state()
+        return finish(steps) if self.registry.is_small else steps
+
+    def _collect_state(self) -> Steps[Answer]:
+        state: list[list[list[Any]]] = []
+        registry = self.registry
+        for rows in (registry.publisher_rows(), registry.subscriber_rows(), registry.service_rows()):
+            table: list[list[Any]] = []
+            state.append(table)
+            while found := [list(row) for row in islice(rows, _ROWS)]:
+                table += found
+                yield None
+        return [_SUCCESS, "current system state", state]
 
     def _write_state(self, caller_id: str) -> Steps[Serialized]:
         """Return the same as it is sent: of a large graph it takes long to write, and tools request it all the time."""
         changes = self.registry.changes
-        pieces = yield from serialize_response_in_steps(self.get_system_state(caller_id), MAX_BODY)
+        answer = yield from self._collect_state()
+        pieces = yield from serialize_response_in_steps(answer, MAX_BODY)
         state = Serialized(b"".join(pieces))
         if changes == self.registry.changes:
             self._state = (changes, state)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -33,7 +34,9 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
-_CALLS_IN_ONE_TURN = 50
+_SECONDS_PER_TURN = 0.003
+"""Of the loop, for starting calls."""
+
 _MOST_PARAMETERS = 32
 """Parameters of which a node is still to be notified; beyond that, those that it has subscribed to are one each."""
 
@@ -182,12 +185,13 @@ class Notifier:
 
     def _start(self) -> None:
         self._starts_soon = False
+        end = time.perf_counter() + _SECONDS_PER_TURN
         for line in (self._line, self._suspect_line):
-            for _ in range(_CALLS_IN_ONE_TURN):
-                if line.waiting and line.under_way < line.most and not self._closed:
-                    self._call(line.waiting.popleft(), line)
-            if line.waiting and line.under_way < line.most and not self._closed:
-                self._start_soon()
+            while line.waiting and line.under_way < line.most and not self._closed:
+                if time.perf_counter() > end:
+                    self._start_soon()
+                    return
+                self._call(line.waiting.popleft(), line)
 
     def _call(self, node: _Node, line: _Line) -> None:
         """Send a node the first notice that need not wait."""

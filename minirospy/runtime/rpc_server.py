@@ -74,10 +74,18 @@ _RECEIVE = 16384
 """Bytes at a time: what one client pipelines is taken apart before the next one has its turn."""
 
 _END_OF_HEAD = b"\r\n\r\n"
-_BACKLOG = 1000
-_ACCEPTS_AT_ONCE = 32
+_BACKLOG = 4096
+"""Connections that wait to be accepted: a client that finds no room tries again after a whole second."""
+
+_ACCEPTS_AT_ONCE = 200
+_READS_AT_ONCE = 16
+"""Connections in one turn of the loop, and how many of them are read from immediately."""
+
 _ANSWERS_AT_ONCE = 4
 """Of requests that came together, before others have their turn."""
+
+_MUCH = 65536
+"""A client that has sent so many bytes of one request is read from in steps, as one that was refused."""
 
 
 Dispatch = Callable[[str, Sequence[Any]], Any]
@@ -206,7 +214,7 @@ class RpcServer:
 
     def _accept(self, sock: socket.socket) -> None:
         loop = asyncio.get_running_loop()
-        for _ in range(_ACCEPTS_AT_ONCE):
+        for number in range(_ACCEPTS_AT_ONCE):
             try:
                 peer, address = sock.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -219,11 +227,11 @@ class RpcServer:
                 loop.call_later(0.05, self._watch_again, sock)
                 return
             if peer.family not in sockets.FAMILIES or self._allows(peer, address[0]):
-                self._serve(peer, loop)
+                self._serve(peer, loop, reads=number < _READS_AT_ONCE)
             else:
                 peer.close()
 
-    def _serve(self, peer: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
+    def _serve(self, peer: socket.socket, loop: asyncio.AbstractEventLoop, *, reads: bool) -> None:
         try:
             peer.setblocking(False)
         except OSError:
@@ -234,8 +242,9 @@ class RpcServer:
             self._end_longest_silent()
         connection = _Connection(self, peer, loop)
         self.connections[connection] = None
-        # Who connects has something to say: mostly its first request is there by now.
-        connection.readable()
+        if reads:
+            # Mostly the first request is there by now.
+            connection.readable()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
         """Log that a request was refused; a flood of them is summed up."""
@@ -293,6 +302,7 @@ class _Connection:
         "_must_finish",
         "_out",
         "_reader",
+        "_reading",
         "_server",
         "_sock",
         "_state",
@@ -324,6 +334,8 @@ class _Connection:
         # It changes something: it is brought to its end, whether or not the client waits for it.
         self._must_finish = False
         self._held = 0
+        # Set while it is read from in steps.
+        self._reading: object | None = None
         loop.add_reader(self._fd, self.readable)
 
     @property
@@ -345,7 +357,7 @@ class _Connection:
         if self._state is _ENDED:
             return
         self._state = _ENDED
-        self._loop.remove_reader(self._fd)
+        self._stop_reading()
         if self._out:
             self._loop.remove_writer(self._fd)
         self._sock.close()
@@ -386,8 +398,35 @@ class _Connection:
             return b""
 
     def readable(self) -> None:
-        """There may be something to read."""
-        data = self._receive()
+        """Read what there is, from a client that sends much in steps."""
+        if self._held <= _MUCH and self._state is not _REFUSED:
+            self._take(self._receive())
+            return
+        self._stop_reading()
+        reading = self._reading = object()
+        self._server.turns.start(self._read_much(reading))
+
+    def _read_much(self, reading: object) -> Steps[None]:
+        """Read until nothing more is there, or until something else has stopped or started reading."""
+        while self._reading is reading:
+            data = self._receive()
+            if data is None:
+                self._start_reading()
+                return
+            self._take(data)
+            yield None
+
+    def _stop_reading(self) -> None:
+        """Read nothing for now. Idempotent."""
+        self._loop.remove_reader(self._fd)
+        self._reading = None
+
+    def _start_reading(self) -> None:
+        self._reading = None
+        self._loop.add_reader(self._fd, self.readable)
+
+    def _take(self, data: bytes | None) -> None:
+        """Take what has come: b"" is the end, None is nothing."""
         if data is None:
             return
         if self._state is _REFUSED:
@@ -404,7 +443,7 @@ class _Connection:
         elif self._out and self._state is _OPEN:
             # It asks no more, but waits for what it asked.
             self._state = _CLOSING
-            self._loop.remove_reader(self._fd)
+            self._stop_reading()
         else:
             self.end()
 
@@ -414,15 +453,21 @@ class _Connection:
             if self._is_answering or not left:
                 self._pause()
                 if not self._is_answering:
-                    self._loop.call_soon(self._go_on)
+                    self._start(self._answer_rest())
                 return
             left -= 1
             self._answer(self._waiting.pop(0))
 
+    def _answer_rest(self) -> Steps[None]:
+        """Answer many requests that came together, or rather those of them that come next."""
+        yield None
+        self._work = None
+        self._go_on()
+
     def _go_on(self) -> None:
         if self._state is _BUSY:
             self._state = _OPEN
-            self._loop.add_reader(self._fd, self.readable)
+            self._start_reading()
             self._answer_waiting()
             self._set_deadline()
 
@@ -430,7 +475,7 @@ class _Connection:
         """Read nothing until the present requests are answered."""
         if self._state is _OPEN:
             self._state = _BUSY
-            self._loop.remove_reader(self._fd)
+            self._stop_reading()
 
     def _answer(self, message: HttpMessage) -> None:
         """Answer immediately, or start a task or work in steps for what takes longer."""
@@ -566,7 +611,7 @@ class _Connection:
         self.log_refusal(text)
         self._write(serialize_error(status, text))
         if self._state in (_FULL, _BUSY):
-            self._loop.add_reader(self._fd, self.readable)
+            self._start_reading()
         if self._state in (_OPEN, _BUSY, _FULL):
             self._state = _REFUSED
             if not self._out:
@@ -580,7 +625,7 @@ class _Connection:
             self.end()
         elif self._state in (_OPEN, _BUSY, _FULL):
             if self._state is _OPEN:
-                self._loop.remove_reader(self._fd)
+                self._stop_reading()
             self._state = _CLOSING
 
     def _write(self, *pieces: bytes) -> None:
@@ -609,7 +654,7 @@ class _Connection:
         if self._state is _OPEN and self._unread > _MOST_UNREAD:
             # The client does not read its answers: it gets no more of them, and is not read from.
             self._state = _FULL
-            self._loop.remove_reader(self._fd)
+            self._stop_reading()
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
@@ -655,7 +700,7 @@ class _Connection:
         else:
             if self._state is _FULL:
                 self._state = _OPEN
-                self._loop.add_reader(self._fd, self.readable)
+                self._start_reading()
             self._answer_waiting()
             self._set_deadline()
 

@@ -76,11 +76,24 @@ def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
 
 
 def _pack_long(value: str | bytes, packer: Any) -> Iterator[bytes]:
-    data = value.encode() if isinstance(value, str) else value
     yield _taken(packer)
-    yield (_TEXT_32 if isinstance(value, str) else _BINARY_32) + struct.pack(">I", len(data))
-    for at in range(0, len(data), _STEP_BYTES):
-        yield data[at : at + _STEP_BYTES]
+    size = len(value)
+    if isinstance(value, str) and not value.isascii():
+        size = 0
+        for piece in _slices(value):
+            size += len(_encoded(piece))
+            yield b""
+    yield (_TEXT_32 if isinstance(value, str) else _BINARY_32) + struct.pack(">I", size)
+    for piece in _slices(value):
+        yield _encoded(piece)
+
+
+def _slices(value: str | bytes) -> Iterator[str | bytes]:
+    return (value[at : at + _STEP_BYTES] for at in range(0, len(value), _STEP_BYTES))
+
+
+def _encoded(value: str | bytes) -> bytes:
+    return value.encode() if isinstance(value, str) else value
 
 
 def _taken(packer: Any) -> bytes:

@@ -12,6 +12,7 @@ import pytest
 
 from minirospy.runtime import rpc_server
 from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.turns import Turns
 from minirospy.wire.http import serialize_request
 from minirospy.wire.xmlrpc import serialize_call
 
@@ -69,6 +70,7 @@ def test_who_is_hung_up_on_amid_its_requests_gets_no_more_answers() -> None:
 
     async def scene() -> int:
         server = RpcServer(dispatch)
+        server.turns = Turns(seconds=0.0)
         await server.start()
         with connect(server) as greedy:
             greedy.sendall(call("more") * 50)

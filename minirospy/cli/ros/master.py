@@ -235,6 +235,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         timeout=options.timeout,
         most_clients=_most_clients(),
         nearby=environment.nearby,
+        owns_process=True,
     )
     stop = _stop_event()
     try:
