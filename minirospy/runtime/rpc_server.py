@@ -15,6 +15,7 @@ import contextlib
 import errno
 import logging
 import socket
+import time
 from collections import OrderedDict, deque
 from collections.abc import Awaitable, Callable, Generator, Iterable, Sequence
 from enum import Enum
@@ -70,22 +71,21 @@ _PROGRESS = 65536
 _MOST_UNREAD = 256 * 1024
 """Bytes of answers that wait for a client to read them, before it gets no more."""
 
-_RECEIVE = 16384
-"""Bytes at a time: what one client pipelines is taken apart before the next one has its turn."""
+_RECEIVE = 4096
+_RECEIVE_MORE = 16384
+"""Bytes at a time, of a new request and of the rest of a long one: what one client pipelines is taken apart before
+the next one has its turn."""
 
 _END_OF_HEAD = b"\r\n\r\n"
 _BACKLOG = 4096
 """Connections that wait to be accepted: a client that finds no room tries again after a whole second."""
 
-_ACCEPTS_AT_ONCE = 200
-_READS_AT_ONCE = 16
-"""Connections in one turn of the loop, and how many of them are read from immediately."""
+_ACCEPTS_AT_ONCE = 64
+_READ_SECONDS = 0.003
+"""Connections in one turn of the loop, and how long they are read from immediately."""
 
-_ANSWERS_AT_ONCE = 4
-"""Of requests that came together, before others have their turn."""
-
-_MUCH = 65536
-"""A client that has sent so many bytes of one request is read from in steps, as one that was refused."""
+_ANSWERS_AT_ONCE = 1
+"""Of requests that came together; the others are answered in steps."""
 
 
 Dispatch = Callable[[str, Sequence[Any]], Any]
@@ -214,7 +214,8 @@ class RpcServer:
 
     def _accept(self, sock: socket.socket) -> None:
         loop = asyncio.get_running_loop()
-        for number in range(_ACCEPTS_AT_ONCE):
+        end = time.perf_counter() + _READ_SECONDS
+        for _ in range(_ACCEPTS_AT_ONCE):
             try:
                 peer, address = sock.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -227,7 +228,7 @@ class RpcServer:
                 loop.call_later(0.05, self._watch_again, sock)
                 return
             if peer.family not in sockets.FAMILIES or self._allows(peer, address[0]):
-                self._serve(peer, loop, reads=number < _READS_AT_ONCE)
+                self._serve(peer, loop, reads=time.perf_counter() < end)
             else:
                 peer.close()
 
@@ -388,18 +389,18 @@ class _Connection:
         self._answer_waiting()
         self._set_deadline()
 
-    def _receive(self) -> bytes | None:
+    def _receive(self, most: int = _RECEIVE) -> bytes | None:
         """What has come; b"" at the end, None where nothing has."""
         try:
-            return self._sock.recv(_RECEIVE)
+            return self._sock.recv(most)
         except (BlockingIOError, InterruptedError):
             return None
         except OSError:
             return b""
 
     def readable(self) -> None:
-        """Read what there is, from a client that sends much in steps."""
-        if self._held <= _MUCH and self._state is not _REFUSED:
+        """Read what there is: the rest of a long request in steps, as what a client sends that was refused."""
+        if not self._held and self._state is not _REFUSED:
             self._take(self._receive())
             return
         self._stop_reading()
@@ -409,7 +410,7 @@ class _Connection:
     def _read_much(self, reading: object) -> Steps[None]:
         """Read until nothing more is there, or until something else has stopped or started reading."""
         while self._reading is reading:
-            data = self._receive()
+            data = self._receive(_RECEIVE_MORE)
             if data is None:
                 self._start_reading()
                 return

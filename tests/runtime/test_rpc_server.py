@@ -42,6 +42,7 @@ def test_who_asks_much_at_once_keeps_nobody_waiting_and_gets_all_its_answers_in_
 
     async def scene() -> bytes:
         server = RpcServer(dispatch)
+        server.turns = Turns(seconds=0.0)
         await server.start()
         with connect(server) as greedy, connect(server) as modest:
             greedy.sendall(b"".join(call(f"greedy{number}") for number in range(50)))
