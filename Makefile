@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 endif
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test interop lint guard bench fuzz clean help
+.PHONY: demo test interop lint guard bench fuzz mutants clean help
 
 help:
 	@echo "make demo     the workshop's button lights its LED, on the virtual board"
@@ -18,6 +18,7 @@ help:
 	@echo "make guard    whether it has become slower"
 	@echo "make bench    the benchmarks"
 	@echo "make fuzz     ten minutes of anything at all, sent to a master"
+	@echo "make mutants  small faults in graph/, wire/ and the journal: which ones no test notices"
 	@echo "make clean    remove what the above made"
 
 demo: $(STAMP)
@@ -44,6 +45,9 @@ lint: $(STAMP)
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m ruff format --check .
 	@$(BIN)/python -m mypy
+
+mutants: $(STAMP)
+	@$(BIN)/python tests/mutants.py
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 from pathlib import Path
 from typing import IO
 
@@ -16,8 +17,6 @@ __all__ = ["create_file", "open_file", "open_text", "read_file"]
 
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
-    | getattr(os, "O_CLOEXEC", 0)
-    | getattr(os, "O_NOINHERIT", 0)
     | getattr(os, "O_NOFOLLOW", 0)
     # A FIFO at the name would block the process until somebody opens its other end.
     | getattr(os, "O_NONBLOCK", 0)
@@ -45,7 +44,7 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
 
         if flags & os.O_TRUNC and stat.S_ISREG(found.st_mode):
             os.ftruncate(file, 0)
-        if os.name != "nt":
+        if sys.platform != "win32":
             os.set_blocking(file, True)
     except BaseException:
         os.close(file)

@@ -77,6 +77,31 @@ def test_open_file_does_not_wait_for_the_other_end_of_a_fifo(tmp_path: Path) -> 
         private_files.open_text(tmp_path / "name", "a")
 
 
+def test_open_text_empties_or_appends(tmp_path: Path) -> None:
+    path = tmp_path / "name"
+    for mode, text in (("w", "a longer one"), ("w", "short"), ("a", " and more")):
+        with private_files.open_text(path, mode) as file:
+            assert os.get_blocking(file.fileno())
+            file.write(text)
+    assert path.read_text() == "short and more"
+
+
+def test_read_file_reads_what_has_another_name_too(tmp_path: Path, mine: Path) -> None:
+    """Backups are made by hard links; reading one does no harm."""
+    os.link(mine, tmp_path / "name")
+    assert private_files.read_file(tmp_path / "name") == (b"precious", mine.stat().st_mtime)
+
+
+def test_refused_file_is_closed(tmp_path: Path, mine: Path) -> None:
+    os.link(mine, tmp_path / "name")
+    with mine.open("rb") as probe:
+        number = probe.fileno()
+    with pytest.raises(OSError, match="hard link"):
+        private_files.open_file(tmp_path / "name", os.O_RDWR)
+    with mine.open("rb") as probe:
+        assert probe.fileno() == number
+
+
 def test_open_text_writes_to_a_device_that_the_user_named() -> None:
     with private_files.open_text(Path("/dev/null"), "w") as file:
         file.write("anything")

@@ -37,8 +37,6 @@ RETRY_SECONDS = 30.0
 _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
 """What locking a file raises that another process has locked; the last two on Windows."""
 
-_ENCODED_PID = 20
-
 
 class JournalBusyError(Exception):
     """Another master holds the journal; ``pid`` is its process, 0 where that is not known."""
@@ -83,11 +81,11 @@ class Journal:
         self._start_steps = start_steps
         self._snapshot = snapshot
         self._clock = clock
-        self._file = -1
-        self._lock = -1
+        self._file: int | None = None
+        self._lock: int | None = None
         self._size = 0
-        self._compact_at = 0
-        self._failed_at = 0.0
+        self._compact_at: int
+        self._failed_at: float
         self.trouble = ""
         """Why nothing is written at present."""
         # The numbers of large values that are being stored, and the last number.
@@ -95,7 +93,9 @@ class Journal:
         self._number = 0
         # While the journal is rewritten in steps: what was appended since, and then the new file.
         self._since: list[bytes] | None = None
-        self._second = -1
+        self._second: int | None = None
+        # Each rewrite in steps that ended or was given up counts: the one that finds another number is that one.
+        self._rewrites = 0
 
     @property
     def size(self) -> int:
@@ -104,7 +104,7 @@ class Journal:
 
     def lock(self) -> None:
         """Make this process the only one that writes the journal. Raises OSError or JournalBusyError."""
-        if self._lock < 0:
+        if self._lock is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
 
@@ -115,7 +115,7 @@ class Journal:
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            damage = f"it cannot be read: {error.strerror or error}"
+            damage = f"it cannot be read: {_reason(error)}"
             return Left(Recovered([], 0, damage), 0.0, same_boot=True, copy=self._set_aside())
         recovered = parse_journal(data)
         same_boot = recovered.records[:1] == [["boot", boot_id()]]
@@ -126,7 +126,7 @@ class Journal:
     def discard(self) -> None:
         """Drop what another master has left."""
         with contextlib.suppress(OSError):
-            self.path.unlink(missing_ok=True)
+            self.path.unlink()
 
     def start(self) -> None:
         """Write the present state, and each change from here on. Never raises: see ``trouble``."""
@@ -146,30 +146,21 @@ class Journal:
         try:
             _write_all(file, data)
             os.fsync(file)
-
-            # Windows replaces no file that is open.
-            self._close_file()
-            if sys.platform == "win32":
-                os.close(file)
-                file = -1
-                os.replace(new, self.path)
-                file = private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
-            else:
-                os.replace(new, self.path)
+            file = self._put_in_place(file)
         except BaseException:
-            if file >= 0:
-                with contextlib.suppress(OSError):
-                    os.close(file)
+            # Windows has closed it already.
+            with contextlib.suppress(OSError):
+                os.close(file)
             # On a full disk it takes the room that the old one may need.
             with contextlib.suppress(OSError):
-                new.unlink(missing_ok=True)
+                new.unlink()
             raise
 
         self._switch_to(file, len(data))
 
     def append(self, *record: Any) -> None:
         """Write one change. Never raises."""
-        if self._file < 0:
+        if self._file is None:
             self.retry()
             return
         try:
@@ -179,12 +170,13 @@ class Journal:
                     self.rewrite()
                     return
                 self._stored.discard(record[2])
-            self._write(serialize_record(list(record)))
+            self._write(self._file, serialize_record(list(record)))
             if self._size > self._compact_at and not self._stored and not self._is_rewriting:
                 self._since = []
-                self._start_steps(self._rewrite_in_steps())
+                self._start_steps(self._rewrite_in_steps(self._rewrites))
         except (OSError, ValueError, TypeError) as error:
             self._fail(error)
+            self._log_trouble()
 
     def store(self, value: Any) -> Steps[int]:
         """Write a large value in parts; return the number by which a record "put" refers to it. Never raises."""
@@ -196,12 +188,13 @@ class Journal:
         is_whole = False
         try:
             for piece in pack_in_steps(value):
-                if self._file >= 0 and number in self._stored:
-                    self._write(serialize_record(["part", number, piece]))
+                if self._file is not None and number in self._stored:
+                    self._write(self._file, serialize_record(["part", number, piece]))
                 yield None
             is_whole = True
         except (OSError, ValueError, TypeError) as error:
             self._fail(error)
+            self._log_trouble()
         finally:
             if not is_whole:
                 self._stored.discard(number)
@@ -209,14 +202,14 @@ class Journal:
 
     @property
     def _is_rewriting(self) -> bool:
-        return self._since is not None or self._second >= 0
+        return self._since is not None or self._second is not None
 
-    def _write(self, data: bytes) -> None:
-        _write_all(self._file, data)
+    def _write(self, file: int, data: bytes) -> None:
+        _write_all(file, data)
         self._size += len(data)
         if self._since is not None:
             self._since.append(data)
-        elif self._second >= 0:
+        elif self._second is not None:
             try:
                 _write_all(self._second, data)
             except OSError:
@@ -224,48 +217,58 @@ class Journal:
                 self._compact_at = 2 * self._size
                 self._abandon()
 
-    def _rewrite_in_steps(self) -> Steps[None]:
+    def _rewrite_in_steps(self, number: int) -> Steps[None]:
         """Do the same as :meth:`rewrite`, while others append."""
-        new, size = self._new_path, 0
+        size = 0
         try:
+            if number != self._rewrites:
+                return
             records = self._snapshot()
-            self._second = private_files.create_file(new)
+            self._second = private_files.create_file(self._new_path)
             for piece in _pieces_of(records):
                 _write_all(self._second, piece)
                 size += len(piece)
                 yield None
+                if number != self._rewrites:
+                    return
             since, self._since = self._since or [], None
             for piece in since:
                 _write_all(self._second, piece)
                 size += len(piece)
 
             # The disk may take long.
-            syncing = threading.Thread(target=_sync, args=(self._second,), daemon=True)
+            syncing = _Sync(self._second)
             before = self._size
             syncing.start()
             while syncing.is_alive():
                 yield PAUSE
-            self._replace(size + self._size - before)
+                if number != self._rewrites:
+                    return
+            if syncing.error:
+                raise syncing.error
+            file, self._second = self._put_in_place(self._second), None
+            self._switch_to(file, size + self._size - before)
         except (OSError, ValueError, TypeError) as error:
             _log.warning("the journal %s could not be rewritten, it goes on growing: %s", self.path, error)
             self._compact_at = 2 * self._size
+            if self._file is None:
+                # On Windows the old file is closed by then.
+                self._fail(error)
         finally:
-            self._abandon()
+            if number == self._rewrites:
+                self._abandon()
 
-    def _replace(self, size: int) -> None:
-        """Put the new file in the place of the old one. Raises OSError."""
-        if self._second < 0:
-            # It was given up meanwhile.
-            return
-        file, self._second = self._second, -1
-        self._close_file()
+    def _put_in_place(self, file: int) -> int:
+        """Give the new file, which is synced, the journal's name; return it, open. Raises OSError."""
         if sys.platform == "win32":
+            # Windows replaces no file that is open, and with none that is.
+            self._close_file()
             os.close(file)
             os.replace(self._new_path, self.path)
-            file = private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
-        else:
-            os.replace(self._new_path, self.path)
-        self._switch_to(file, size)
+            return private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
+        os.replace(self._new_path, self.path)
+        self._close_file()
+        return file
 
     def _switch_to(self, file: int, size: int) -> None:
         self._file = file
@@ -276,16 +279,18 @@ class Journal:
 
     def _abandon(self) -> None:
         """Give up a rewrite in steps. Idempotent."""
+        self._rewrites += 1
         self._since = None
-        if self._second >= 0:
-            os.close(self._second)
-            self._second = -1
+        if self._second is not None:
             with contextlib.suppress(OSError):
-                self._new_path.unlink(missing_ok=True)
+                os.close(self._second)
+            self._second = None
+            with contextlib.suppress(OSError):
+                self._new_path.unlink()
 
     def retry(self) -> None:
         """Write the present state where nothing could be written half a minute ago. Never raises."""
-        if self._file < 0 and self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
+        if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:
                 _log.warning("the journal %s is written again", self.path)
@@ -298,7 +303,7 @@ class Journal:
     def remove(self) -> None:
         """Shut down cleanly: nothing is left to recover. Idempotent."""
         self._close_file()
-        if self._lock >= 0:
+        if self._lock is not None:
             self.discard()
         self.close()
 
@@ -307,14 +312,14 @@ class Journal:
         self._abandon()
         self._close_file()
         self.trouble = ""
-        if self._lock >= 0:
+        if self._lock is not None:
             os.close(self._lock)
-            self._lock = -1
+            self._lock = None
 
     def _close_file(self) -> None:
-        if self._file >= 0:
+        if self._file is not None:
             os.close(self._file)
-            self._file = -1
+            self._file = None
 
     @property
     def _new_path(self) -> Path:
@@ -345,13 +350,13 @@ class Journal:
             os.close(file)
         return copy
 
+    def _log_trouble(self) -> None:
+        _log.error(
+            "the journal %s cannot be written, a crash would lose the graph: %s", self.path, self.trouble
+        )
+
     def _fail(self, error: Exception) -> None:
-        trouble = (isinstance(error, OSError) and error.strerror) or str(error)
-        if trouble != self.trouble:
-            _log.error(
-                "the journal %s cannot be written, a crash would lose the graph: %s", self.path, trouble
-            )
-        self.trouble = trouble
+        self.trouble = _reason(error)
         self._failed_at = self._clock()
         self._abandon()
         self._close_file()
@@ -375,9 +380,23 @@ def _pieces_of(records: Iterable[list[Any]]) -> Iterator[bytes]:
     yield b"".join(written)
 
 
-def _sync(file: int) -> None:
-    with contextlib.suppress(OSError):
-        os.fsync(file)
+class _Sync(threading.Thread):
+    """Syncs a file, which may take long; ``error`` is what the disk reported."""
+
+    def __init__(self, file: int) -> None:
+        super().__init__(name="minirospy-journal-sync", daemon=True)
+        self._file = file
+        self.error: OSError | None = None
+
+    def run(self) -> None:
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            self.error = error
+
+
+def _reason(error: Exception) -> str:
+    return (isinstance(error, OSError) and error.strerror) or str(error)
 
 
 def _write_all(file: int, data: bytes) -> None:
@@ -395,20 +414,20 @@ def _locked(path: Path, journal: Path) -> int:
 
             # Beyond the pid, which others have to read.
             os.lseek(file, 64, os.SEEK_SET)
-            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-            os.lseek(file, 0, os.SEEK_SET)
+            try:
+                msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+            finally:
+                os.lseek(file, 0, os.SEEK_SET)
         else:
             import fcntl
 
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in _BUSY:
-            os.lseek(file, 0, os.SEEK_SET)
-            text = os.read(file, _ENCODED_PID).strip()
+            text = os.read(file, 20).strip()
             os.close(file)
             raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
-        # A file system without locks: the port that this master has is the only one.
-        os.lseek(file, 0, os.SEEK_SET)
+        # A file system without locks: nobody else has the port of this master, at least.
 
     # On a full disk the lock holds all the same.
     with contextlib.suppress(OSError):

@@ -37,6 +37,10 @@ from minirospy.runtime.rpc_server import is_address_in_use
 __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
+
+_RECOVERY_SECONDS = 15.0
+"""Within this a master that was just started answers, also on a busy machine with much to recover."""
+
 _LEVELS = {
     "debug": logging.DEBUG,
     "info": logging.INFO,
@@ -422,7 +426,8 @@ def _port_error(name: str, host: str, port: int, error: OSError) -> MinirospyErr
         return MinirospyError(f"cannot listen on port {port}: {error.strerror or error}")
     uri = f"http://{host}:{port}"
     try:
-        RpcClient(f"http://127.0.0.1:{port}", timeout=2.0).call("getPid", "/roscore")
+        # It may be reading its journal.
+        RpcClient(f"http://127.0.0.1:{port}", timeout=_RECOVERY_SECONDS).call("getPid", "/roscore")
     except (RpcUnreachable, RpcError):
         return MinirospyError(f"port {port} is taken by another program: choose one with `{name} -p PORT`")
     return MinirospyError(
