@@ -1,7 +1,7 @@
-"""Build hook: compiles ``msgs/`` into Python modules, and lays out what the wheel carries beside the package.
+"""Build hook: compiles ``msgs/`` into Python modules, and adds the files that the wheel has in addition to the package.
 
 An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
-checkout, where everything else lies already.
+checkout, where everything else already is.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CompileDefinitions(BuildHookInterface[BuilderConfig]):
-    """Runs before each build of a wheel."""
+    """Compiles the definitions before each build of a wheel."""
 
     PLUGIN_NAME = "custom"
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Write the generated modules; name what goes into the wheel."""
+        """Write the generated modules; list the additional files of the wheel."""
         if self.target_name != "wheel":
             return
         root = Path(self.root)

@@ -88,12 +88,12 @@ class Workspace(NamedTuple):
 
     @classmethod
     def at(cls, root: Path) -> Workspace:
-        """The workspace whose folder is ``root``, with folders of the usual names."""
+        """Return the workspace whose folder is ``root``, with folders of the usual names."""
         return cls(root, *(root / name for name in ("src", "build", "devel", "install")))
 
 
 def find_workspace(start: Path) -> Path:
-    """The workspace that ``start`` lies in: where it was built before, or where the folder src is.
+    """Return the workspace that contains ``start``: where it was built before, or where the folder src is.
 
     Raises BuildError.
     """
@@ -108,7 +108,7 @@ def find_workspace(start: Path) -> Path:
 
 
 def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
-    """The plans of all packages below a folder, in the order to build them in.
+    """Return the plans of all packages below a folder, in the order to build them in.
 
     ``variables`` as in read_plan; CATKIN_BLACKLIST_PACKAGES names those that are not read.
     Raises BuildError (two packages of one name, a cycle), ManifestError, DefinitionError.
@@ -131,7 +131,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Each package after those that it is built from. Raises BuildError on a cycle."""
+    """Return each package after those that it is built from. Raises BuildError on a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
@@ -145,7 +145,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """What was done for a package. ``made``: what was generated, in words; empty where nothing had changed."""
+    """What was done for a package. ``made``: what was generated, as text; empty where nothing had changed."""
 
     plan: Plan
     made: str
@@ -160,7 +160,7 @@ def build(
     chosen: Collection[str] | None = None,
     report: Callable[[Report], None] = lambda each: None,
 ) -> None:
-    """Build the packages (``chosen`` of them, or all) into the devel folder; ``report`` hears of each.
+    """Build the packages (``chosen`` of them, or all) into the devel folder; ``report`` is called with each.
 
     ``outside`` is where the packages of other workspaces and of minirospy are found.
     Raises BuildError, DefinitionError.
@@ -174,7 +174,7 @@ def build(
 
 
 def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
-    """What this installation of minirospy puts into setup files."""
+    """Return what this installation of minirospy puts into setup files."""
     return SetUp(
         prefix=prefix,
         sources=sources,
@@ -192,7 +192,7 @@ def write_set_up(
 
     Where none is sourced, those of the last time stay.
     """
-    # A workspace that is built from its own terminal does not stand on itself.
+    # A workspace that is built from its own terminal does not extend itself.
     own = {
         prefix,
         *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
@@ -219,7 +219,7 @@ class _Builder:
         self._stamps = workspace.build / "minirospy"
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
-        # What generated code depends on: definitions, what CMake is told of them, and the compiler.
+        # What generated code depends on: definitions, what CMakeLists.txt says of them, and the compiler.
         compiler = (Path(__file__).parents[1] / "idl").glob("*.py")
         made_of = [path for plan in plans for path in (*plan.definitions, plan.cmake_lists)]
         self._key = _key([*made_of, *compiler])
@@ -259,7 +259,7 @@ class _Builder:
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """The generated modules of a package: file -> text. Raises DefinitionError, BuildError."""
+        """Return the generated modules of a package: file -> text. Raises DefinitionError, BuildError."""
         folder = self._modules / plan.name
         try:
             texts = compile_package(self._catalogue, plan.name)
@@ -275,7 +275,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """What the messages of other workspaces are, by their files: a workspace below this one may be built again."""
+        """Return a fingerprint of the messages of other workspaces: a workspace that this one extends may be rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -285,7 +285,7 @@ class _Builder:
         )
 
     def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
-        """Note what was made; take away what was made before and is not any more."""
+        """Record what was made; remove what was made before and is not any more."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
         note = {
@@ -313,7 +313,7 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Packages that find_package names and nobody has: an error where it looks like a typing error."""
+        """Return warnings of packages that find_package names and that do not exist; raise where it looks like a typing error."""
         warnings = []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
@@ -333,7 +333,7 @@ class _Builder:
             )
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Every type in a package's definitions is there, and its package is named where catkin wants it named."""
+        """Check that every type in a package's definitions exists, and that its package is named where catkin wants it."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -383,7 +383,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """The packages whose messages are within reach of those of ``names``."""
+        """Return the packages whose messages those of ``names`` may use."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -404,7 +404,7 @@ class _Builder:
 
 
 def _key(files: Iterable[Path]) -> str:
-    """What files are, by their names, times and sizes."""
+    """Return a fingerprint of files: their names, times and sizes."""
     import hashlib
 
     marks = []
@@ -423,7 +423,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 
 
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """The programs in devel that stand for those in source folders: file -> text.
+    """Return the programs in devel that run those in source folders: file -> text.
 
     So a program that setup.py names is found on PATH, and real ROS finds one that is not executable itself.
     """
@@ -441,7 +441,7 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """The modules in devel that stand for those in source folders: file -> text."""
+    """Return the modules in devel that load those in source folders: file -> text."""
     if setup is None:
         return {}
     modules = devel / DIST_PACKAGES
@@ -458,7 +458,7 @@ def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
 
 
 def _counts(plan: Plan, setup: PythonSetup | None) -> str:
-    """``2 messages, 1 service, package foo``."""
+    """Return ``2 messages, 1 service, package foo``."""
     words = []
     for suffix, word in _KINDS.items():
         count = sum(path.suffix == suffix for path in plan.definitions)
@@ -471,7 +471,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """The line of a file in which a word stands first; 1 where it does not."""
+    """Return the first line of a file that contains a word; 1 where none does."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

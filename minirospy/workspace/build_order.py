@@ -50,7 +50,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """The packages that one is built from, and all that those need to run: each with the one that names it."""
+    """Return the packages that one is built from, and all that those need to run: each with the one that names it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -62,7 +62,7 @@ def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str])
 
 
 def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[str, str]]) -> set[str]:
-    """The packages that export a message generator, and all that those are built from."""
+    """Return the packages that export a message generator, and all that those are built from."""
     waiting = {
         name
         for name, manifest in manifests.items()
@@ -77,7 +77,7 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 
 
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """The names of a cycle, each before one that it needs, from the first by name back to itself.
+    """Return the names of a cycle, each before one that it needs, from the first by name back to itself.
 
     graphlib has each of ``nodes`` before one that needs it, and the first of them twice.
     """

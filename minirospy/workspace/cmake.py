@@ -1,6 +1,6 @@
 """The text of a CMakeLists.txt -> the commands in it, as they are written. Pure.
 
-Words, quotes, brackets, comments, and which commands stand inside which ``if``, ``foreach`` or ``macro``; what they
+Words, quotes, brackets, comments, and which commands are inside which ``if``, ``foreach`` or ``macro``; what they
 come to is said by cmake_run.py. Source: https://cmake.org/cmake/help/latest/manual/cmake-language.7.html.
 """
 
@@ -38,9 +38,9 @@ class Word(NamedTuple):
 
 
 class Node(NamedTuple):
-    """A command: its name in lower case, its arguments, the line where it begins, and what stands in it.
+    """A command: its name in lower case, its arguments, the line where it starts, and its content.
 
-    ``body`` holds what stands before the ``endif()`` or ``endforeach()`` that closes it; ``else()`` is one of them.
+    ``body`` holds what is before the ``endif()`` or ``endforeach()`` that closes it; ``else()`` is one of them.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Node(NamedTuple):
 
 
 def parse_cmake(text: str, where: str) -> tuple[Node, ...]:
-    """The commands of a CMakeLists.txt; ``where`` names the file in errors.
+    """Return the commands of a CMakeLists.txt; ``where`` names the file in errors.
 
     Raises BuildError where a quote, a bracket, an ``if`` or a loop does not close.
     """
@@ -58,7 +58,7 @@ def parse_cmake(text: str, where: str) -> tuple[Node, ...]:
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
-    """Arguments by the keyword that they follow; those before any keyword are under ``""``."""
+    """Return arguments by the keyword that they follow; those before any keyword are under ``""``."""
     found: dict[str, list[str]] = {"": []}
     current = ""
     for word in arguments:
@@ -71,13 +71,13 @@ def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> d
 
 
 def _nested(commands: Iterator[Node], where: str, opener: Node | None) -> tuple[Node, ...]:
-    """The commands up to the one that closes ``opener``, each with what stands in it."""
+    """Return the commands up to the one that closes ``opener``, each with its content."""
     nodes: list[Node] = []
     for node in commands:
         if opener and node.name == _ENDS[opener.name]:
             return tuple(nodes)
         if node.name in _OPENERS:
-            # Reported where it stands, unless something else is open: then that is what is wrong.
+            # Reported where it is, unless something else is open: then that is what is wrong.
             line, missing = (opener.line, _ENDS[opener.name]) if opener else (node.line, _OPENERS[node.name])
             raise BuildError(where, line, f"{(opener or node).name}() without {missing}()")
         nodes.append(node._replace(body=_nested(commands, where, node)) if node.name in _ENDS else node)
@@ -120,7 +120,7 @@ def _commands(text: str, where: str) -> Iterator[Node]:
 
 
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
-    """Each token and its line."""
+    """Yield each token and its line."""
     position, line = 0, 1
     while position < len(text):
         match = _TOKEN.match(text, position)
@@ -133,7 +133,7 @@ def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
 
 
 def _shown(text: str) -> str:
-    """The first words of a text, for an error."""
+    """Return the first words of a text, for an error."""
     return " ".join(text[:40].split())
 
 

@@ -1,7 +1,7 @@
 """What a CMakeLists.txt comes to: its commands in, those that CMake would run out, with variables filled in.
 
 ``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are followed, and the
-commands that set variables; all other commands are passed on. What nobody set is empty, and false, as in CMake.
+commands that set variables; all other commands are passed on. An unset variable is empty, and false, as in CMake.
 Source: https://cmake.org/cmake/help/latest/manual/cmake-commands.7.html.
 """
 
@@ -24,11 +24,11 @@ _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*\.?\d*)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """What packages of Python look for, and go on without: it is there."""
 _DEEPEST = 40
-"""Files and macros that may stand in one another; more is a file that includes itself."""
+"""The depth of nested files and macros; more is a file that includes itself."""
 
 
 class Command(NamedTuple):
-    """One command: its name in lower case, its arguments, and where it stands: the line, the file, its folder."""
+    """One command: its name in lower case, its arguments, and its place: the line, the file, its folder."""
 
     name: str
     arguments: tuple[str, ...]
@@ -50,7 +50,7 @@ class _Leave(Exception):
 
 
 def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
-    """The commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is one of the environment.
+    """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is one of the environment.
 
     Raises BuildError: no such file, a bracket that does not close, a condition or a pattern that does not parse.
     """
@@ -92,17 +92,17 @@ class _Run:
         }
 
     def file(self, file: Path) -> Iterator[Command]:
-        """The commands of a file. Raises BuildError."""
+        """Yield the commands of a file. Raises BuildError."""
         try:
             text = file.read_text(encoding="utf-8", errors="replace")
         except OSError as error:
             raise BuildError(str(file), 0, error.strerror or str(error)) from error
         if "\0" in text:
-            raise BuildError(str(file), 1, "is no text in UTF-8")
+            raise BuildError(str(file), 1, "is not UTF-8 text")
         yield from self._body(parse_cmake(text, str(file)), file)
 
     def _body(self, nodes: Sequence[Node], file: Path) -> Iterator[Command]:
-        """A file's or a macro's commands, up to its ``return()``."""
+        """Yield a file's or a macro's commands, up to its ``return()``."""
         self._depth += 1
         if self._depth > _DEEPEST:
             raise BuildError(str(file), nodes[0].line if nodes else 0, "includes or calls itself")
@@ -129,7 +129,7 @@ class _Run:
                 yield Command(node.name, tuple(arguments), node.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
-        """Words with variables filled in; a list in one without quotes falls apart into words."""
+        """Return words with variables expanded; a list in one without quotes becomes several words."""
         found: list[str] = []
         for word in words:
             text = self._filled(word.text)
@@ -137,7 +137,7 @@ class _Run:
         return found
 
     def _filled(self, text: str) -> str:
-        """Variables are filled in from the innermost outwards, as in ``${${NAME}_SOURCE_DIR}``."""
+        """Expand variables from the innermost outwards, as in ``${${NAME}_SOURCE_DIR}``."""
 
         def value(match: re.Match[str]) -> str:
             name = f"ENV{{{match[2]}}}" if match[1] else match[2]
@@ -179,7 +179,7 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """What a loop runs over: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
+        """Return what a loop runs over: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``."""
         if words[:1] == ["RANGE"]:
             numbers = [int(word) for word in words[1:] if word.isdigit()]
             start, stop, step = (0, *numbers, 1) if len(numbers) == 1 else (*numbers, 1, 1, 1)[:3]
@@ -213,7 +213,7 @@ class _Run:
         self._known.update(before)
 
     def _include(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
-        """A file of the package; a module of CMake's own is left out."""
+        """Yield a file of the package; a module of CMake's own is left out."""
         for name in arguments[:1]:
             folders = [self._folder, *map(Path, _items(self._known.get("CMAKE_MODULE_PATH", "")))]
             paths = [folder / f"{name}{ending}" for folder in folders for ending in ("", ".cmake")]
@@ -283,7 +283,7 @@ class _Run:
             self._known[words[0]] = self._known.get(words[0], "") + "".join(words[1:])
 
     def _file(self, arguments: list[str]) -> None:
-        """``file(GLOB NAME pattern ...)``, ``GLOB_RECURSE``."""
+        """Run ``file(GLOB NAME pattern ...)``, ``GLOB_RECURSE``."""
         if len(arguments) < 2 or arguments[0] not in ("GLOB", "GLOB_RECURSE"):
             return
         words = [word for word in arguments[2:] if word != "CONFIGURE_DEPENDS"]
@@ -302,18 +302,18 @@ class _Run:
             if arguments[0] == "GLOB":
                 found += top.glob("/".join([*folders, last]))
             elif top == self._folder:
-                # Below what nobody set, `${NOBODY}/*`, lies the whole disk.
+                # With an unset variable, `${UNSET}/*` is the whole disk.
                 found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
         names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """What a package asks for without a way out counts as found: who builds it is told what is missing."""
+        """Count required packages as found: the build reports those that are missing."""
         if "REQUIRED" in arguments or _HERE & {*arguments[:1]}:
             self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
 
     def _filename(self, arguments: list[str]) -> None:
-        """``get_filename_component(NAME file what)``."""
+        """Run ``get_filename_component(NAME file what)``."""
         if len(arguments) > 2:
             path = self._folder / arguments[1]
             parts = {
@@ -327,7 +327,7 @@ class _Run:
 
 
 def _filtered(items: list[str], words: list[str]) -> list[str]:
-    """``list(FILTER items INCLUDE|EXCLUDE REGEX pattern)``."""
+    """Run ``list(FILTER items INCLUDE|EXCLUDE REGEX pattern)``."""
     keep = words[:1] == ["INCLUDE"]
     return [item for item in items if bool(re.search(words[-1], item)) is keep] if words else items
 
@@ -438,11 +438,11 @@ class _Condition:
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 
     def _value(self, word: Word) -> str:
-        """A word without quotes may be the name of a variable."""
+        """Return the value of the variable that a word without quotes may name."""
         return word.text if word.quoted else self._known.get(word.text, word.text)
 
     def _word(self) -> Word:
-        # What is empty leaves no word: `if(${NOBODY} STREQUAL "x")`.
+        # An empty variable leaves no word: `if(${UNSET} STREQUAL "x")`.
         if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
             return Word("", True)
         self._next += 1

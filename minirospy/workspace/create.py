@@ -36,13 +36,13 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     """Make the package's folder below ``parent``; the files and folders made. Raises UsageError."""
     if not _NAME.match(package.name):
         raise UsageError(
-            f"[{package.name}] is no name for a package: lower-case letters, digits and underscores, a letter first"
+            f"[{package.name}] is not a name for a package: lower-case letters, digits and underscores, a letter first"
         )
     for depend in package.depends:
         if not _NAME.match(depend):
-            raise UsageError(f"[{depend}] is no name of a package to depend on")
+            raise UsageError(f"[{depend}] is not the name of a package to depend on")
     if not re.match(r"^\d+\.\d+\.\d+$", package.version):
-        raise UsageError(f"[{package.version}] is no version: three numbers, as in 0.1.0")
+        raise UsageError(f"[{package.version}] is not a version: three numbers, as in 0.1.0")
     folder = parent / package.name
     if (folder / "package.xml").exists() or (folder / "CMakeLists.txt").exists():
         raise UsageError(f"{folder} is a package already")
@@ -64,7 +64,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
 
 
 def _person(tag: str, person: str, user: str) -> str:
-    """The tag of a person, given as a name or as ``Name <mail>``; a maintainer must have an address."""
+    """Return the tag of a person, given as a name or as ``Name <mail>``; a maintainer must have an address."""
     match = re.match(r"^(.*?)\s*<([^<>]+)>$", person)
     name, mail = (match[1], match[2]) if match else (person, "")
     if not mail and tag == "maintainer":
@@ -88,7 +88,7 @@ def _package_xml(package: NewPackage) -> str:
         *(f"  <license>{escape(license_)}</license>" for license_ in package.licenses or ["TODO"]),
         "",
         *(_person("author", person, package.user) for person in package.authors),
-        "  <!-- Which packages this one needs. <depend> stands for all three of build_depend,",
+        "  <!-- Which packages this one needs. <depend> means all three of build_depend,",
         "       build_export_depend and exec_depend.",
         "       A package with messages, services or actions of its own needs also:",
         "         <build_depend>message_generation</build_depend>",

@@ -23,7 +23,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Packages need each other; ``circle`` begins and ends with the same one."""
+    """Packages need each other; ``circle`` starts and ends with the same one."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -36,10 +36,10 @@ class CircularDependencyError(MinirospyError):
 
 
 class Dependencies:
-    """The dependencies between packages; manifests are read when they are asked for, once.
+    """The dependencies between packages; manifests are read once, on first use.
 
-    Metapackages are no packages here, as they are none to rospack; ``with_metapackages`` they are, as to rosstack.
-    ``complain`` hears of manifests that do not read, where all are searched.
+    Metapackages are left out, as by rospack, unless ``with_metapackages``, as by rosstack. ``complain`` is called with
+    the error of each manifest that cannot be read, where all are searched.
     """
 
     def __init__(
@@ -75,30 +75,30 @@ class Dependencies:
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """The folder of a package. Raises NotFoundError, with the nearest names."""
+        """Return the folder of a package. Raises NotFoundError, with the nearest names."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
         return folder
 
     def manifest(self, name: str) -> Manifest:
-        """The manifest of a package or metapackage. Raises NotFoundError, ManifestError."""
+        """Return the manifest of a package or metapackage. Raises NotFoundError, ManifestError."""
         if name not in self._manifests:
-            # `rospack find` goes without.
+            # Not imported above, as `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """The packages that a package names, by kind of tag. Raises NotFoundError, ManifestError."""
+        """Return the packages that a package names, by kind of tag. Raises NotFoundError, ManifestError."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
         return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """What a package needs, directly or not; each stands after what it needs itself.
+        """Return what a package needs, directly or not; each after what it needs itself.
 
         Raises CircularDependencyError and as :meth:`direct`.
         """
@@ -116,29 +116,29 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Each dependency below what names it, with its depth from 0; repeated where it is named again.
+        """Yield each dependency below the package that names it, with its depth from 0; repeated where it is named again.
 
         Raises as :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Each way from a package to another that it needs. Raises as :meth:`all`."""
+        """Return each path from a package to another that it needs. Raises as :meth:`all`."""
         found = []
-        way: list[str] = [name]
+        path: list[str] = [name]
         for depth, each in self.tree(name):
-            way[depth + 1 :] = [each]
+            path[depth + 1 :] = [each]
             if each == target:
-                found.append(tuple(way))
+                found.append(tuple(path))
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """The packages that name this one, sorted. Raises NotFoundError."""
+        """Return the packages that name this one, sorted. Raises NotFoundError."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """The packages that need this one, directly or not, sorted. Raises NotFoundError."""
+        """Return the packages that need this one, directly or not, sorted. Raises NotFoundError."""
         found: dict[str, None] = {}
         waiting = [name]
         while waiting:
@@ -149,7 +149,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Every name that a package asks for, of whatever kind, sorted. Raises NotFoundError, ManifestError."""
+        """Return every name that a package depends on, of any kind, sorted. Raises NotFoundError, ManifestError."""
         self.folder(name)
         return sorted(self.manifest(name).depends())
 
@@ -172,7 +172,7 @@ class Dependencies:
 
 
 def is_metapackage(folder: Path) -> bool:
-    """Whether the package in a folder is one that only names others."""
+    """Return whether the package in a folder is one that only names others."""
     try:
         # A text that lacks the word needs no parser.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():

@@ -19,11 +19,11 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy what one package installs; the number of files. Raises BuildError."""
+    """Copy what one package installs; return the number of files. Raises BuildError."""
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():
-            raise BuildError(str(target), 0, "is in the way of a file to install")
+            raise BuildError(str(target), 0, "is where a file is to be installed")
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
         if program:
@@ -32,7 +32,7 @@ def install(workspace: Workspace, plan: Plan) -> int:
 
 
 def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
-    """What goes where: target -> source, and whether it becomes executable."""
+    """Yield target and (source, whether it becomes executable) of each file that is installed."""
     share = workspace.install / "share" / plan.name
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)
@@ -69,10 +69,10 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)
-            # What is left out may be a folder on the way.
-            ways = [f"/{each.as_posix()}" for each in (below, *below.parents)]
-            left_out = any(re.search(pattern, way) for pattern in rule.excluded for way in ways)
-            if not left_out and (not rule.chosen or any(re.search(each, ways[0]) for each in rule.chosen)):
+            # What is left out may be a folder above the file.
+            parents = [f"/{each.as_posix()}" for each in (below, *below.parents)]
+            left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
+            if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):
                 yield target / below, (path, _is_script(path))
 
 

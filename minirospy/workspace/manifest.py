@@ -93,7 +93,7 @@ class Problem(NamedTuple):
 class Manifest(NamedTuple):
     """A package.xml. Conditions are evaluated: what they leave out is not here.
 
-    ``dependencies`` stand in the order of the file; :meth:`depends` chooses their names.
+    ``dependencies`` are in the order of the file; :meth:`depends` chooses their names.
     """
 
     path: Path
@@ -110,7 +110,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """The names of the dependencies of these kinds (none: of all), each once, in the order of the file."""
+        """Return the names of the dependencies of these kinds (none: of all), each once, in the order of the file."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -125,7 +125,7 @@ class Manifest(NamedTuple):
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """The manifest in a file, or in the package.xml of a folder; conditions see ``variables`` above VARIABLES.
+    """Return the manifest in a file, or in the package.xml of a folder; conditions see ``variables`` above VARIABLES.
 
     Raises ManifestError: no such file, not XML, not a package, no name, a condition that does not parse.
     """
@@ -139,7 +139,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """The manifest of a text; ``path`` is for the errors. Raises ManifestError as read_manifest does."""
+    """Return the manifest of a text; ``path`` is for the errors. Raises ManifestError as read_manifest does."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -147,7 +147,7 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
 
 
 def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
-    """Whether ``$ROS_VERSION == 1 and ...`` holds; what is compared is text, and an unknown variable is empty.
+    """Return whether ``$ROS_VERSION == 1 and ...`` holds; what is compared is text, and an unknown variable is empty.
 
     Raises ValueError with what is wrong.
     """

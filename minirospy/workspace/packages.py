@@ -1,6 +1,6 @@
-"""Where ROS packages lie, and what can be run in them.
+"""Where ROS packages are, and what can be run in them.
 
-ROS_PACKAGE_PATH comes first, then what minirospy brings along: so a workspace's package hides ours of the same
+ROS_PACKAGE_PATH comes first, then minirospy's own packages: so a workspace's package hides ours of the same
 name. Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
 """
 
@@ -60,14 +60,14 @@ class Packages:
 
     @classmethod
     def below(cls, *roots: Path) -> Packages:
-        """The packages in these folders alone."""
+        """Return the packages in these folders alone."""
         packages = cls.__new__(cls)
         packages.roots = roots
         packages._crawls = {}
         return packages
 
     def find(self, name: str) -> Path:
-        """The folder of a package. Raises NotFoundError with the nearest names."""
+        """Return the folder of a package. Raises NotFoundError with the nearest names."""
         for root in self.roots:
             # Where a folder is named as its package, nothing else need be read.
             if package_name(root / name) == name:
@@ -81,15 +81,15 @@ class Packages:
         raise NotFoundError("package", name, self.folders(), hint)
 
     def names(self) -> list[str]:
-        """The names of all packages, sorted."""
+        """Return the names of all packages, sorted."""
         return sorted(self.folders())
 
     def folders(self) -> dict[str, Path]:
-        """Every package and its folder."""
+        """Return every package and its folder."""
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Every package and each folder that holds one of its name; the first is the one that counts."""
+        """Return every package and each folder that holds one of its name; the first is the one that counts."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -97,12 +97,12 @@ class Packages:
         return {name: list(folders) for name, folders in found.items()}
 
     def executables(self, package: str) -> list[str]:
-        """The names that `rosrun package` can run, sorted."""
+        """Return the names that `rosrun package` can run, sorted."""
         folder = self.find(package)
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """The command that runs a package's program; of several programs of a name, the first.
+        """Return the command that runs a package's program; of several programs of a name, the first.
 
         Python runs in this interpreter, whatever ``env`` finds. Raises NotFoundError with the nearest names,
         NotExecutableError.
@@ -110,7 +110,7 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Each command that a name, or a path in the package, may mean: more than one where folders share a name.
+        """Return each command that a name, or a path in the package, may mean: more than one where folders share a name.
 
         Raises as :meth:`find_executable`.
         """
@@ -123,7 +123,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # What a build has put beside a script of the package is that script again.
+            # A build puts a copy of a script next to it: the same program.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -133,7 +133,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """A launch file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
+        """Return a launch file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
         folder = self.find(package)
         if (folder / name).is_file():
             return folder / name
@@ -159,17 +159,17 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """The search of a folder and of each below it that is no package."""
+    """Return the result of searching a folder and each below it that is not a package."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
         if (folder / _MANIFEST).is_file():
             return True
-        begun = time.perf_counter()
+        started = time.perf_counter()
         has_package = False
         for below in _subfolders(folder):
             has_package |= visit(below)
-        found.append(CrawlTime(folder, time.perf_counter() - begun, has_package))
+        found.append(CrawlTime(folder, time.perf_counter() - started, has_package))
         return has_package
 
     visit(root)
@@ -177,14 +177,14 @@ def crawl_times(root: Path) -> list[CrawlTime]:
 
 
 def built_in_roots() -> tuple[Path, ...]:
-    """What minirospy brings along: beside the package in a checkout, in its ``share`` when installed."""
+    """Return the folders of minirospy's own packages: next to the package in a checkout, in its ``share`` when installed."""
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
     return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros_packages")
 
 
 def crawl(root: Path) -> Iterator[Path]:
-    """The package folders at or below ``root``, as rospack searches: not inside a package, not in hidden folders."""
+    """Yield the package folders at or below ``root``, as rospack searches: not inside a package, not in hidden folders."""
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root
@@ -194,7 +194,7 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    """The folders in one that may hold packages, sorted; none where a file says that it is to be ignored."""
+    """Return the folders in one that may hold packages, sorted; none where a file says that it is to be ignored."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -209,12 +209,12 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Whether a folder is a link to one that it lies in: a search would never end."""
+    """Return whether a folder is a link to one that contains it: a search would never end."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """The name in the package.xml of a folder (the folder's where it says none); None where no such file is."""
+    """Return the name in the package.xml of a folder (the folder's where it says none); None where no such file is."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
@@ -224,7 +224,7 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """The files of a package: its own folder first, then where its programs are put when it is built or installed."""
+    """Yield the files of a package: its own folder first, then where its programs are put when it is built or installed."""
     for path, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name != "__pycache__")
         for name in sorted(names):
@@ -250,7 +250,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Whether a file is a program for Python, by its name or by its first line."""
+    """Return whether a file is a program for Python, by its name or by its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""What a package asks of its build: package.xml and CMakeLists.txt in, a :class:`Plan` out.
+"""What a package requires of its build: package.xml and CMakeLists.txt in, a :class:`Plan` out.
 
 Of CMake only the macros are read that matter to packages of Python. What needs a compiler is named in
 ``Plan.skipped``. Source: http://wiki.ros.org/catkin/CMakeLists.txt,
@@ -24,7 +24,7 @@ from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest
 __all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
-"""Where Python packages lie below a devel or install folder, as ROS on Debian and Ubuntu has it."""
+"""The folder of Python packages below a devel or install folder, as ROS on Debian and Ubuntu has it."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
@@ -134,7 +134,7 @@ class Plan(NamedTuple):
 
 
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
-    """The plan of the package in ``folder``; ``variables`` are what ``catkin_make -DNAME=VALUE`` sets.
+    """Return the plan of the package in ``folder``; ``variables`` are what ``catkin_make -DNAME=VALUE`` sets.
 
     Raises ManifestError, BuildError.
     """
@@ -192,7 +192,7 @@ class _Collector:
         }
 
     def read(self, command: Command) -> None:
-        """Note what a command asks for. Raises BuildError."""
+        """Record what a command requires. Raises BuildError."""
         reader = self._readers.get(command.name)
         if reader is None:
             return
@@ -200,14 +200,14 @@ class _Collector:
         self._seen.add(command.name)
         for later in _BEFORE.get(command.name, ()):
             if later in self._seen:
-                self._refused(command, f"{command.name}() must stand before {later}()")
+                self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
         """Warn of what real catkin refuses, and a build can do without."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
-        """Note what works all the same."""
+        """Record a warning."""
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
@@ -223,7 +223,7 @@ class _Collector:
                     self._warnings.append(f"{path} is not built: no {macro}() names it")
 
     def plan(self) -> Plan:
-        """What all commands ask for."""
+        """Return what all commands require."""
         return Plan(
             name=self._manifest.name,
             folder=self._folder,
@@ -240,14 +240,14 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """A path that a command names, as it is below the package."""
+        """Return a path that a command names, as it is below the package."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # What a package brings along in a folder of its own may be another project.
+        # A folder inside the package may be another project.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,
@@ -263,7 +263,7 @@ class _Collector:
 
     def _add_files(self, command: Command) -> None:
         if self._message_depends is not None:
-            raise _error(command, f"{command.name}() must stand before generate_messages()")
+            raise _error(command, f"{command.name}() must be called before generate_messages()")
         kind = _FOLDERS[command.name]
         given = keyword_arguments(command.arguments, _FILES_WORDS)
         place = next(iter(given.get("DIRECTORY", [])), kind)
@@ -271,10 +271,11 @@ class _Collector:
         there = {path.name: path for path in sorted(folder.glob(f"*.{kind}")) if path.is_file()}
         names = [*given[""], *given.get("FILES", [])]
         if given[""]:
-            self._refused(command, f"FILES must stand before {given[''][0]}")
+            self._refused(command, f"FILES must come before {given[''][0]}")
         if not _GENERATORS & {name for name, _ in self._needs}:
             self._refused(
-                command, "find_package(catkin REQUIRED COMPONENTS message_generation) must stand before it"
+                command,
+                "find_package(catkin REQUIRED COMPONENTS message_generation) must be called before it",
             )
         if not names and "FILES" not in given:
             names = list(there)
@@ -290,7 +291,7 @@ class _Collector:
             if not _TYPE_NAME.match(path.stem):
                 raise _error(
                     command,
-                    f"{command.name}: [{name}] is no name of a type: letters, digits, underscores, a letter first",
+                    f"{command.name}: [{name}] is not the name of a type: letters, digits, underscores, a letter first",
                 )
             self._definitions[path] = command
             if "NOINSTALL" in given:
@@ -298,14 +299,14 @@ class _Collector:
 
     def _generate(self, command: Command) -> None:
         if self._message_depends is not None:
-            self._refused(command, "generate_messages() must stand there once")
+            self._refused(command, "generate_messages() must be called once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
         self._message_depends = given.get("DEPENDENCIES", [])
         if not self._definitions:
             self.warn(
                 command.file,
                 command.line,
-                "generate_messages(): nothing to generate; add_message_files() and so on stand before it",
+                "generate_messages(): nothing to generate; add_message_files() and so on must be called before it",
             )
 
     def _options(self, command: Command) -> None:
@@ -315,7 +316,7 @@ class _Collector:
             )
 
     def _catkin_package(self, command: Command) -> None:
-        """What is passed on to other packages must be named in package.xml, for the build and for the run."""
+        """Check that package.xml names what is passed on to other packages, for the build and for the run."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
         given = keyword_arguments(command.arguments, _PACKAGE_WORDS)
@@ -337,7 +338,7 @@ class _Collector:
 
     def _python_setup(self, command: Command) -> None:
         if not (self._folder / "setup.py").is_file():
-            raise _error(command, "catkin_python_setup() needs a setup.py beside this file")
+            raise _error(command, "catkin_python_setup() needs a setup.py in the folder of this file")
         self._has_setup = True
 
     def _compiled(self, command: Command) -> None:
@@ -389,7 +390,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What ``PATTERN x`` and ``REGEX x`` choose, and what they leave out with ``EXCLUDE``."""
+    """Return what ``PATTERN x`` and ``REGEX x`` choose, and what they leave out with ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):
@@ -401,7 +402,7 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _variables(folder: Path, name: str) -> dict[str, str]:
-    """What catkin and CMake set before a package's file is read. Destinations are below the install folder."""
+    """Return what catkin and CMake set before a package's file is read. Destinations are below the install folder."""
     source = folder.as_posix()
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}
     package = {f"CATKIN_PACKAGE_{kind}_DESTINATION": f"{place}/{name}" for kind, place in places.items()}

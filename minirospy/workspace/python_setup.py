@@ -26,7 +26,7 @@ __all__ = ["PythonSetup", "read_python_setup"]
 
 
 class PythonSetup(NamedTuple):
-    """Names -> where they lie: top-level packages (folders), modules (files); scripts (files)."""
+    """Names -> their paths: top-level packages (folders), modules (files); scripts (files)."""
 
     packages: dict[str, Path]
     modules: dict[str, Path]
@@ -34,7 +34,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """What ``folder``/setup.py names. Raises BuildError with its line."""
+    """Return the packages and scripts that ``folder``/setup.py names. Raises BuildError with its line."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -53,7 +53,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, Any], name: str, kind: type, form: str) -> Any:
-    """An argument of ``setup()``; of None and of nothing, an empty one. Raises BuildError."""
+    """Return an argument of ``setup()``; of None and of nothing, an empty one. Raises BuildError."""
     value = given.get(name) or kind()
     if not isinstance(value, kind):
         raise BuildError(str(file), 0, f"{name} is {value!r}: {name}={form} is its form")
@@ -94,7 +94,7 @@ def _run(file: Path) -> Mapping[str, Any]:
 
 
 class _StandIn(types.ModuleType):
-    """A module whose names are whatever is asked for: empty classes, but for those that are set."""
+    """A module that has every name: empty classes, except for those that are set."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -128,9 +128,9 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, Any], folder: Path) -> Iterator[None]:
-    """Modules that a setup.py imports, with a ``setup`` that notes its arguments; the folder is the current one.
+    """Replace modules that a setup.py imports, with a ``setup`` that notes its arguments; the folder is the current one.
 
-    As of a script, modules beside it can be imported; they are forgotten afterwards.
+    As with a script, modules in its folder can be imported; they are forgotten afterwards.
     """
 
     def setup(**arguments: Any) -> None:
@@ -180,7 +180,7 @@ def _stand_ins(given: dict[str, Any], folder: Path) -> Iterator[None]:
 
 
 def _metadata(folder: Path) -> dict[str, Any]:
-    """What package.xml says of a package, under the names of ``setup()``'s arguments."""
+    """Return what package.xml says of a package, under the names of ``setup()``'s arguments."""
     manifest = read_manifest(folder)
     return {
         "name": manifest.name,

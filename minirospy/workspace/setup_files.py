@@ -34,7 +34,7 @@ class SetUp(NamedTuple):
 
 
 def setup_files(setup: SetUp) -> dict[str, str]:
-    """File name -> text, of all that a prefix needs to be sourced."""
+    """Return file name -> text of all that a prefix needs to be sourced."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
@@ -55,7 +55,7 @@ def setup_files(setup: SetUp) -> dict[str, str]:
 
 
 def shell_text(shell: str, setup: SetUp) -> str:
-    """What ``eval "$(minirospy shell)"`` evaluates: the environment without a workspace, and the functions."""
+    """Return the text for ``eval "$(minirospy shell)"``: the environment without a workspace, and the functions."""
     if shell == "fish":
         return _fish_base(setup) + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
     if shell == "bat":
@@ -149,10 +149,10 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """The workspaces that were sourced before go; those that this one stands on come."""
+    """Return the text that removes the workspaces sourced before, and adds those that this one extends."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
-  # The workspaces that were sourced before make way.
+  # Remove the workspaces that were sourced before.
   _minirospy_before=${{CMAKE_PREFIX_PATH:-}}
   while [ -n "$_minirospy_before" ]; do
     _minirospy_one=${{_minirospy_before%%:*}}
@@ -212,7 +212,7 @@ _BASE = {
 
 
 def _quoted(path: Path) -> str:
-    """A path as one word of a shell."""
+    """Return a path as one word of a shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
 
 
@@ -299,7 +299,7 @@ def _others_make_way_bat(setup: SetUp) -> str:
     chain = "".join(f'call :minirospy_workspace put "{parent}"\n' for parent in reversed(setup.parents))
     return f"""if "%~1"=="--extend" goto minirospy_own
 if not defined CMAKE_PREFIX_PATH goto minirospy_below
-rem The workspaces that were sourced before make way.
+rem Remove the workspaces that were sourced before.
 for %%P in ("%CMAKE_PREFIX_PATH:;=" "%") do if exist "%%~P\\.catkin" call :minirospy_workspace take "%%~P"
 :minirospy_below
 {chain}:minirospy_own
@@ -343,7 +343,7 @@ call :minirospy_take %1 %2
 if defined %~1 (call set "%~1=%%%~1%%;%~2") else set "%~1=%~2"
 exit /b 0
 
-rem VARIABLE ENTRY: take it out. What call runs is read twice: %% stands for the % of the second time.
+rem VARIABLE ENTRY: remove it. What call runs is parsed twice: %% is the % of the second time.
 :minirospy_take
 if not defined %~1 exit /b 0
 call set "MINIROSPY_REST=;%%%~1%%;"

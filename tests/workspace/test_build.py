@@ -297,12 +297,12 @@ def good(cmake: str) -> str:
         (
             "generate_messages(DEPENDENCIES std_msgs)\nadd_message_files(FILES Led.msg)",
             4,
-            "must stand before generate_messages()",
+            "must be called before generate_messages()",
         ),
         (
             "add_message_files(FILES Led.msg)\ngenerate_messages()\nadd_message_files(FILES Led.msg)",
             5,
-            "must stand before",
+            "must be called before",
         ),
         (
             "add_message_files(FILES Led.msg)\ngenerate_messages(DEPENDENCIES std_msg)",
@@ -322,8 +322,8 @@ def good(cmake: str) -> str:
         ("add_subdirectory(nowhere)", 3, "add_subdirectory(nowhere): there is no"),
         ("include(CMakeLists.txt)", 1, "includes or calls itself"),
         ("if(" + "(" * 3000 + "1" + ")" * 3000 + ")\nendif()", 1, "is nested too deeply"),
-        ("# \0", 1, "is no text in UTF-8"),
-        ("add_message_files(FILES my-led.msg)", 3, "[my-led.msg] is no name of a type"),
+        ("# \0", 1, "is not UTF-8 text"),
+        ("add_message_files(FILES my-led.msg)", 3, "[my-led.msg] is not the name of a type"),
         ("project(other)", 3, "project(other), but package.xml names the package [p]"),
         ("message(", 3, "message( is not closed"),
     ],
@@ -500,11 +500,11 @@ def test_what_catkin_would_refuse_in_package_xml(scene: Scene) -> None:
 @pytest.mark.parametrize(
     ("cmake", "line", "text"),
     [
-        ("{find}\ncatkin_package()\n{add}\ngenerate_messages()", 6, "generate_messages() must stand before catkin_package()"),
-        ("{find}\n{add}\ngenerate_messages()\ncatkin_python_setup()", 6, "catkin_python_setup() must stand before"),
-        ("{find}\n{add}\ngenerate_messages()\ngenerate_messages()", 6, "generate_messages() must stand there once"),
-        ("{find}\nadd_message_files(A.msg)\ngenerate_messages()", 4, "FILES must stand before A.msg"),
-        ("{add}\ngenerate_messages()", 3, "COMPONENTS message_generation) must stand before it"),
+        ("{find}\ncatkin_package()\n{add}\ngenerate_messages()", 6, "generate_messages() must be called before catkin_package()"),
+        ("{find}\n{add}\ngenerate_messages()\ncatkin_python_setup()", 6, "catkin_python_setup() must be called before"),
+        ("{find}\n{add}\ngenerate_messages()\ngenerate_messages()", 6, "generate_messages() must be called once"),
+        ("{find}\nadd_message_files(A.msg)\ngenerate_messages()", 4, "FILES must come before A.msg"),
+        ("{add}\ngenerate_messages()", 3, "COMPONENTS message_generation) must be called before it"),
     ],
 )  # fmt: skip
 def test_what_catkin_would_refuse_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> None:

@@ -87,10 +87,10 @@ def test_a_metapackage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ("words", "text"),
     [
         ([], "the following arguments are required: name"),
-        (["1x"], "[1x] is no name for a package"),
-        (["../x"], "[../x] is no name for a package"),
-        (["x", "a b"], "[a b] is no name of a package to depend on"),
-        (["x", "-V", "1"], "[1] is no version: three numbers, as in 0.1.0"),
+        (["1x"], "[1x] is not a name for a package"),
+        (["../x"], "[../x] is not a name for a package"),
+        (["x", "a b"], "[a b] is not the name of a package to depend on"),
+        (["x", "-V", "1"], "[1] is not a version: three numbers, as in 0.1.0"),
         (["there"], "is a package already"),
     ],
 )

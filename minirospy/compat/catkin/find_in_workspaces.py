@@ -1,4 +1,4 @@
-"""catkin.find_in_workspaces, filled in by minirospy: the files of a package in all workspaces."""
+"""catkin.find_in_workspaces: the files of a package in all workspaces."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """The folders, or files ``path`` in them, that the workspaces have in ``search_dirs`` (of the package ``project``).
+    """Return the folders, or files ``path`` in them, that the workspaces have in ``search_dirs`` (of the package ``project``).
 
-    ``search_dirs``: of etc, include, libexec and share, without a project also of bin and lib. What is looked for is
+    ``search_dirs``: of etc, include, libexec and share, without a project also of bin and lib. What is searched is
     added to ``considered_paths``. Raises ValueError on other folders.
     """
     chosen = _checked(search_dirs, project)
@@ -58,7 +58,7 @@ def _checked(search_dirs: Sequence[str] | None, project: str | None) -> list[str
 def _by_workspace(
     workspaces: Sequence[str], chosen: Sequence[str], project: str | None
 ) -> Iterator[list[Path]]:
-    """The folders to look into, those of a workspace together; packages that lie elsewhere come last."""
+    """Yield the folders to look into, those of a workspace together; packages elsewhere come last."""
     for workspace in workspaces:
         folders = []
         for each in chosen:

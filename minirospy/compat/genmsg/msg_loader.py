@@ -46,7 +46,7 @@ SearchPath = Mapping[str, Sequence[str]]
 
 
 class MsgNotFound(Exception):
-    """There is no file of a definition."""
+    """The file of a definition was not found."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class MsgContext:
 
     @staticmethod
     def create_default() -> MsgContext:
-        """A context that knows ``time`` and ``duration``."""
+        """Return a context that knows ``time`` and ``duration``."""
         context = MsgContext()
         for name, kind in (("time", "uint32"), ("duration", "int32")):
             text = f"{kind} secs\n{kind} nsecs"
@@ -79,35 +79,35 @@ class MsgContext:
         return context
 
     def register(self, full_msg_type: str, msgspec: MsgSpec) -> None:
-        """Make a message known."""
+        """Add a message to the context."""
         self._specs[bare_msg_type(full_msg_type)] = msgspec
 
     def is_registered(self, full_msg_type: str) -> bool:
-        """Whether a message, or that of an array, is known."""
+        """Return whether a message, or that of an array, is known."""
         return bare_msg_type(full_msg_type) in self._specs
 
     def get_registered(self, full_msg_type: str) -> MsgSpec:
-        """A message that is known. Raises KeyError."""
+        """Return a message that is known. Raises KeyError."""
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
-        """Say what file a definition stands in."""
+        """Set the file of a definition."""
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """The file that a definition stands in; None where that is not known."""
+        """Return the file of a definition; None where that is not known."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
-        """Say which messages one has in its fields."""
+        """Set which messages one has in its fields."""
         self._depends[full_msg_type] = list(dependencies)
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
-        """The messages that one has in its fields; None before :func:`load_depends`."""
+        """Return the messages that one has in its fields; None before :func:`load_depends`."""
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """The messages that one needs, each before those that it needs itself. Raises KeyError."""
+        """Return the messages that one needs, each before those that it needs itself. Raises KeyError."""
         found: list[str] = []
         for name in self._depends[full_msg_type]:
             found += [each for each in (name, *self.get_all_depends(name)) if each not in found]
@@ -115,7 +115,7 @@ class MsgContext:
 
 
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
-    """The file of a definition. Raises MsgNotFound."""
+    """Return the file of a definition. Raises MsgNotFound."""
     if package not in search_path:
         raise MsgNotFound(
             f"Cannot locate message [{base_type}]: unknown package [{package}] on search path [{search_path}]",
@@ -137,33 +137,33 @@ def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str
 
 
 def get_srv_file(package: str, base_type: str, search_path: SearchPath) -> str:
-    """The file of a service's definition. Raises MsgNotFound."""
+    """Return the file of a service's definition. Raises MsgNotFound."""
     return get_msg_file(package, base_type, search_path, ".srv")
 
 
 def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> MsgSpec:
-    """The message of a text, which becomes known. Raises InvalidMsgSpec."""
+    """Add the message of a text to the context, and return it. Raises InvalidMsgSpec."""
     spec = _msg_spec(_parsed(text, full_name))
     msg_context.register(full_name, spec)
     return spec
 
 
 def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> MsgSpec:
-    """The message of a file, which becomes known. Raises InvalidMsgSpec, OSError."""
+    """Add the message of a file to the context, and return it. Raises InvalidMsgSpec, OSError."""
     spec = load_msg_from_string(msg_context, _text(file_path), full_name)
     msg_context.set_file(full_name, file_path)
     return spec
 
 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
-    """A message by its name, which becomes known. Raises InvalidMsgSpec, MsgNotFound."""
+    """Add a message to the context by its name, and return it. Raises InvalidMsgSpec, MsgNotFound."""
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
     package, _, base = name.rpartition("/")
     return load_msg_from_file(msg_context, get_msg_file(package, base, search_path), name)
 
 
 def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> SrvSpec:
-    """The service of a text; its request and response become known. Raises InvalidMsgSpec."""
+    """Return the service of a text; add its request and response to the context. Raises InvalidMsgSpec."""
     parsed = parsed_service(text, full_name)
     request, response = _msg_spec(parsed.request), _msg_spec(parsed.response)
     for spec in (request, response):
@@ -172,20 +172,20 @@ def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> 
 
 
 def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> SrvSpec:
-    """The service of a file. Raises InvalidMsgSpec, OSError."""
+    """Return the service of a file. Raises InvalidMsgSpec, OSError."""
     spec = load_srv_from_string(msg_context, _text(file_path), full_name)
     msg_context.set_file(full_name, file_path)
     return spec
 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
-    """A service by its name. Raises InvalidMsgSpec, MsgNotFound."""
+    """Return a service by its name. Raises InvalidMsgSpec, MsgNotFound."""
     package, _, base = srv_type.rpartition("/")
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
 
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> None:
-    """Make all that a message or service needs known. Raises InvalidMsgSpec, MsgNotFound."""
+    """Add all that a message or service needs to the context. Raises InvalidMsgSpec, MsgNotFound."""
     if isinstance(spec, SrvSpec):
         both: list[str] = []
         for part in (spec.request, spec.response):
@@ -207,12 +207,12 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
-    """Our specs of the messages that a context knows, by name. The function raises KeyError."""
+    """Return a function of a name that returns our spec of a message in a context, or raises KeyError."""
     return lambda name: parsed_message(msg_context.get_registered(name))
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Our spec of a message. Raises InvalidMsgSpec."""
+    """Return our spec of a message. Raises InvalidMsgSpec."""
     return _parsed(spec.text, spec.full_name)
 
 

@@ -101,15 +101,15 @@ class MsgSpec:
         self.header_present = self.has_header()
 
     def fields(self) -> list[tuple[str, str]]:
-        """(type, name) of each field."""
+        """Return (type, name) of each field."""
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
-        """The fields, their types taken apart."""
+        """Return the fields, their types taken apart."""
         return [Field(name, type_) for type_, name in self.fields()]
 
     def has_header(self) -> bool:
-        """Whether it starts with a header that publishers fill in."""
+        """Return whether it starts with a header that publishers fill in."""
         return self.fields()[:1] == [(HEADER_FULL_NAME, "header")]
 
     def __eq__(self, other: object) -> bool:
@@ -131,37 +131,37 @@ class MsgSpec:
 
 
 def is_builtin(msg_type_name: str) -> bool:
-    """Whether a type is no message."""
+    """Return whether a type is built in, not a message."""
     return msg_type_name in BUILTIN_TYPES
 
 
 def is_header_type(msg_type: str) -> bool:
-    """Whether a type is that of a header, by any of its names."""
+    """Return whether a type is that of a header, by any of its names."""
     return msg_type in _HEADERS
 
 
 def is_valid_msg_type(x: str) -> bool:
-    """Whether a text is a type's name, with or without brackets."""
+    """Return whether a text is a type's name, with or without brackets."""
     return bool(x) and re.match(r"[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
 
 
 def is_valid_msg_field_name(x: str) -> bool:
-    """Whether a text is a field's name."""
+    """Return whether a text is a field's name."""
     return re.match(r"[A-Za-z]\w*\Z", x, re.ASCII) is not None
 
 
 def is_valid_constant_type(x: str) -> bool:
-    """Whether a constant can be of a type."""
+    """Return whether a constant can be of a type."""
     return x in PRIMITIVE_TYPES
 
 
 def bare_msg_type(msg_type: str) -> str:
-    """A type without its brackets."""
+    """Return a type without its brackets."""
     return msg_type and msg_type.partition("[")[0]
 
 
 def resolve_type(msg_type: str, package_context: str) -> str:
-    """A type with its package, as definitions in ``package_context`` mean it."""
+    """Return a type with its package, as definitions in ``package_context`` mean it."""
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
@@ -170,7 +170,7 @@ def resolve_type(msg_type: str, package_context: str) -> str:
 
 
 def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
-    """(type without brackets, whether it is an array, its length where that is fixed). Raises ValueError."""
+    """Return (type without brackets, whether it is an array, its length where that is fixed). Raises ValueError."""
     if not msg_type:
         raise ValueError("Invalid empty type")
     base, bracket, rest = msg_type.partition("[")

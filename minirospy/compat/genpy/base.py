@@ -19,5 +19,5 @@ class MsgGenerationException(MessageException):
 
 
 def is_simple(type_: str) -> bool:
-    """Whether ``struct`` packs a type."""
+    """Return whether ``struct`` packs a type."""
     return type_ in SIMPLE_TYPES_DICT

@@ -10,7 +10,7 @@ __all__ = ["generate_dynamic"]
 
 
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, Any]:
-    """The class of a full text, and those of all types in it, by name. Raises InvalidMsgSpec on a text that is none."""
+    """Return the classes of a full text and of all types in it, by name. Raises InvalidMsgSpec."""
     from minirospy.compat.genmsg.base import InvalidMsgSpec
     from minirospy.idl import load
 

@@ -23,7 +23,7 @@ struct_I = struct.Struct("<I")
 
 
 class RosMsgUnicodeErrors:
-    """Replaces bytes that are not UTF-8, and says so once for a message type."""
+    """Replaces bytes that are not UTF-8, and logs it once for a message type."""
 
     def __init__(self) -> None:
         self.msg_type: str | None = None
@@ -51,21 +51,21 @@ def register_unicode_errors() -> None:
 
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:
-    """The class of ``pkg/Name``, or None. Raises ValueError on what is no name of a type."""
+    """Return the class of ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
     from minirospy.idl import load
 
     return load.get_message_class(_checked(message_type))
 
 
 def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
-    """The class of the service ``pkg/Name``, or None. Raises ValueError on what is no name of a type."""
+    """Return the class of the service ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
     from minirospy.idl import load
 
     return load.get_service_class(_checked(service_type))
 
 
 def isstring(s: object) -> bool:
-    """Whether a value is text or bytes."""
+    """Return whether a value is text or bytes."""
     return isinstance(s, str | bytes)
 
 

@@ -1,4 +1,4 @@
-"""rosclean, filled in by minirospy: how much log files take. Source: http://wiki.ros.org/rosclean."""
+"""rosclean: how much log files take. Source: http://wiki.ros.org/rosclean."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ __all__ = ["CleanupException", "get_disk_usage", "get_human_readable_disk_usage"
 
 
 class CleanupException(Exception):
-    """A folder whose size cannot be told."""
+    """The size of a folder cannot be determined."""
 
 
 def get_disk_usage(d: str) -> int:
-    """The bytes that a folder takes. Raises CleanupException."""
+    """Return the bytes that a folder takes. Raises CleanupException."""
     if not Path(d).is_dir():
-        raise CleanupException(f"[{d}] is no folder")
+        raise CleanupException(f"[{d}] is not a folder")
     return disk_usage(Path(d))
 
 
 def get_human_readable_disk_usage(d: str) -> str:
-    """The same as `du -h` prints it. Raises CleanupException."""
+    """Return the bytes that a folder takes, as `du -h` prints them. Raises CleanupException."""
     return human_size(get_disk_usage(d))
 
 
 def rosclean_main(argv: Sequence[str] | None = None) -> int:
-    """The command; ``argv`` begins with its name. Its exit status."""
+    """Run the command; ``argv`` starts with its name. Return its exit status."""
     return main(list(sys.argv if argv is None else argv)[1:])

@@ -1,4 +1,4 @@
-"""The master as Python code asks it; answers as ROS's own lists. Source: http://wiki.ros.org/ROS/Master_API."""
+"""The Master API for Python code: blocking calls, results as ROS's lists. Source: http://wiki.ros.org/ROS/Master_API."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = [
 
 
 class MasterException(Exception):
-    """The master cannot be asked, or says no."""
+    """The master cannot be reached, or answers with an error."""
 
 
 ROSMasterException = MasterException
@@ -36,14 +36,14 @@ class MasterFailure(MasterException):
 
 
 class MasterError(MasterException):
-    """The call was wrong: an unknown name, a bad argument."""
+    """The call was invalid: an unknown name, a bad argument."""
 
 
 Error, Failure = MasterError, MasterFailure
 
 
 class Master:
-    """The master at ``master_uri`` (default: that of the environment), asked in the name of ``caller_id``."""
+    """The master at ``master_uri`` (default: that of the environment), called as the node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
         uri = master_uri or get_master_uri()
@@ -52,10 +52,10 @@ class Master:
             parse_http_host_and_port(uri)
         except ValueError as error:
             raise ValueError(f"invalid master URI: {uri}") from error
-        # As rosgraph has it, without the slash at its end.
+        # As in rosgraph, without the trailing slash.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._proxy = MasterProxy(uri, self.caller_id)
-        # ROS's Master has no close(): its connections go with it.
+        # ROS's Master has no close(): its connections are closed with the object.
         weakref.finalize(self, self._proxy.close)
 
     def _call(self, method: str, *args: Any) -> Any:
@@ -64,7 +64,7 @@ class Master:
         except RpcRefused as error:
             raise (MasterError if error.code == -1 else MasterFailure)(error.text) from error
         except MasterUnreachableError as error:
-            # Code that polls for a master expects the socket's own kind of error.
+            # Code that polls for a master expects an error of sockets.
             raise ConnectionRefusedError(str(error)) from error
         except RpcError as error:
             raise MasterException(str(error)) from error
@@ -77,7 +77,7 @@ class Master:
         return ServerProxy(self.master_uri)
 
     def is_online(self) -> bool:
-        """Whether the master answers."""
+        """Return whether the master answers."""
         try:
             self.getPid()
         except (OSError, MasterException):
@@ -85,35 +85,35 @@ class Master:
         return True
 
     def getPid(self) -> int:
-        """The master's process id."""
+        """Return the master's process id."""
         return int(self._call("getPid"))
 
     def getUri(self) -> str:
-        """The URI that the master tells of itself."""
+        """Return the URI that the master reports."""
         return str(self._call("getUri"))
 
     def getSystemState(self) -> Any:
-        """[publishers, subscribers, services], each a list of [name, [nodes]]."""
+        """Return [publishers, subscribers, services], each a list of [name, [nodes]]."""
         return self._call("getSystemState")
 
     def getPublishedTopics(self, subgraph: str) -> Any:
-        """[[topic, type]] of what is published."""
+        """Return [[topic, type]] of the published topics."""
         return self._call("getPublishedTopics", subgraph)
 
     def getTopicTypes(self) -> Any:
-        """[[topic, type]] of all that the master knows."""
+        """Return [[topic, type]] of all topics that the master knows."""
         return self._call("getTopicTypes")
 
     def lookupNode(self, node_name: str) -> str:
-        """The URI of a node."""
+        """Return the URI of a node."""
         return str(self._call("lookupNode", node_name))
 
     def lookupService(self, service: str) -> str:
-        """The URI of a service."""
+        """Return the URI of a service."""
         return str(self._call("lookupService", service))
 
     def getParam(self, key: str) -> Any:
-        """A parameter's value."""
+        """Return a parameter's value."""
         return self._call("getParam", key)
 
     def setParam(self, key: str, value: Any) -> Any:
@@ -121,7 +121,7 @@ class Master:
         return self._call("setParam", key, value)
 
     def hasParam(self, key: str) -> bool:
-        """Whether a parameter is set."""
+        """Return whether a parameter is set."""
         return bool(self._call("hasParam", key))
 
     def deleteParam(self, key: str) -> Any:
@@ -129,35 +129,35 @@ class Master:
         return self._call("deleteParam", key)
 
     def searchParam(self, key: str) -> Any:
-        """The nearest parameter of this name."""
+        """Return the nearest parameter of this name."""
         return self._call("searchParam", key)
 
     def getParamNames(self) -> Any:
-        """The names of all parameters."""
+        """Return the names of all parameters."""
         return self._call("getParamNames")
 
     def subscribeParam(self, caller_api: str, key: str) -> Any:
-        """Be told of a parameter's changes; its value."""
+        """Subscribe to a parameter's changes; return its value."""
         return self._call("subscribeParam", caller_api, key)
 
     def unsubscribeParam(self, caller_api: str, key: str) -> Any:
-        """Be told no more."""
+        """Unsubscribe from a parameter's changes."""
         return self._call("unsubscribeParam", caller_api, key)
 
     def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> Any:
-        """Register a publisher; the subscribers' URIs."""
+        """Register a publisher; return the subscribers' URIs."""
         return self._call("registerPublisher", topic, topic_type, caller_api)
 
     def unregisterPublisher(self, topic: str, caller_api: str) -> Any:
-        """Take a publisher back."""
+        """Unregister a publisher."""
         return self._call("unregisterPublisher", topic, caller_api)
 
     def registerSubscriber(self, topic: str, topic_type: str, caller_api: str) -> Any:
-        """Register a subscriber; the publishers' URIs."""
+        """Register a subscriber; return the publishers' URIs."""
         return self._call("registerSubscriber", topic, topic_type, caller_api)
 
     def unregisterSubscriber(self, topic: str, caller_api: str) -> Any:
-        """Take a subscriber back."""
+        """Unregister a subscriber."""
         return self._call("unregisterSubscriber", topic, caller_api)
 
     def registerService(self, service: str, service_api: str, caller_api: str) -> Any:
@@ -165,10 +165,10 @@ class Master:
         return self._call("registerService", service, service_api, caller_api)
 
     def unregisterService(self, service: str, service_api: str) -> Any:
-        """Take a service back."""
+        """Unregister a service."""
         return self._call("unregisterService", service, service_api)
 
 
 def is_online(master_uri: str | None = None) -> bool:
-    """Whether a master answers at ``master_uri`` (default: that of the environment)."""
+    """Return whether a master answers at ``master_uri`` (default: that of the environment)."""
     return Master("/rosgraph", master_uri).is_online()

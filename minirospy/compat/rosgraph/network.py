@@ -1,4 +1,4 @@
-"""How this machine is reached, and connection headers, under the words of rosgraph.
+"""The addresses of this machine, and connection headers, with rosgraph's function names.
 
 Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
 """
@@ -36,7 +36,7 @@ _LENGTH_BYTES = 4
 
 
 class ROSHandshakeException(Exception):
-    """A connection header that does not read."""
+    """A connection header that cannot be parsed."""
 
 
 def get_address_override() -> str | None:
@@ -47,12 +47,12 @@ def get_address_override() -> str | None:
 
 
 def get_host_name() -> str:
-    """The name that other nodes reach this machine by."""
+    """Return the name that other nodes reach this machine by."""
     return Environment.read().host
 
 
 def get_local_address() -> str:
-    """The address that other nodes reach this machine by."""
+    """Return the address that other nodes reach this machine by."""
     host = get_address_override()
     if host:
         return host
@@ -60,7 +60,7 @@ def get_local_address() -> str:
 
 
 def get_local_addresses() -> list[str]:
-    """The addresses of this machine, IPv6 ones where ROS_IPV6 is on."""
+    """Return the addresses of this machine, IPv6 ones where ROS_IPV6 is on."""
     import psutil
 
     families = {socket.AF_INET, socket.AF_INET6} if use_ipv6() else {socket.AF_INET}
@@ -71,7 +71,7 @@ def get_local_addresses() -> list[str]:
 
 
 def is_local_address(hostname: str) -> bool:
-    """Whether a host is this machine."""
+    """Return whether a host is this machine."""
     try:
         found = {str(info[4][0]) for info in socket.getaddrinfo(hostname, 0, 0, 0, socket.SOL_TCP)}
     except OSError:
@@ -82,22 +82,22 @@ def is_local_address(hostname: str) -> bool:
 
 
 def use_ipv6() -> bool:
-    """Whether ROS_IPV6 is on."""
+    """Return whether ROS_IPV6 is on."""
     return Environment.read(host="localhost").ipv6
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """The address that servers listen on."""
+    """Return the address that servers listen on."""
     return (Environment.read(host=address) if address else Environment.read()).bind_host
 
 
 def create_local_xmlrpc_uri(port: int) -> str:
-    """The URI of a server on this machine."""
+    """Return the URI of a server on this machine."""
     return f"http://{Environment.read().uri_host}:{port}/"
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
-    """(host, port) of a URL; port 80 where it has none. Raises ValueError."""
+    """Return (host, port) of a URL; port 80 where it has none. Raises ValueError."""
     from urllib.parse import urlsplit
 
     if not url:
@@ -109,12 +109,12 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def encode_ros_handshake_header(header: Mapping[str, Any]) -> bytes:
-    """A connection header's bytes, its length in front."""
+    """Return a connection header's bytes, its length in front."""
     return serialize_header({key: str(value) for key, value in header.items()})
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """The fields of a connection header, its length in front. Raises ROSHandshakeException."""
+    """Return the fields of a connection header, its length in front. Raises ROSHandshakeException."""
     size = int.from_bytes(header_str[:_LENGTH_BYTES], "little")
     body = header_str[_LENGTH_BYTES : _LENGTH_BYTES + size]
     if len(body) < size:
@@ -128,7 +128,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 
 
 def read_ros_handshake_header(sock: socket.socket, b: Any, buff_size: int) -> dict[str, str]:
-    """The connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
+    """Return the connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
 
     Raises ROSHandshakeException where the peer ends before.
     """
@@ -152,7 +152,7 @@ def read_ros_handshake_header(sock: socket.socket, b: Any, buff_size: int) -> di
 
 
 def write_ros_handshake_header(sock: socket.socket, header: Mapping[str, Any]) -> int:
-    """Send a connection header; the number of its bytes."""
+    """Send a connection header; return the number of its bytes."""
     data = encode_ros_handshake_header(header)
     sock.sendall(data)
     return len(data)

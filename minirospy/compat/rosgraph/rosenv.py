@@ -28,6 +28,6 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """The URI of the master that the command line (``__master:=``) or else the environment names."""
+    """Return the URI of the master that the command line (``__master:=``) or else the environment names."""
     named = parse_arguments(sys.argv if argv is None else argv).special.get("__master")
     return named or (os.environ if env is None else env).get(ROS_MASTER_URI) or DEFAULT_MASTER_URI

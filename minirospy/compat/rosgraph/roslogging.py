@@ -1,4 +1,4 @@
-"""rosgraph.roslogging, filled in by minirospy: the handler that logging configuration files name and programs derive from."""
+"""rosgraph.roslogging: the handler that logging configuration files name and programs derive from."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class RospyLogger(logging.Logger):
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the folder of log files; its path, which is in ROS_LOG_FILENAME too."""
+    """Log to a file in the log folder; return its path, which is also in ROS_LOG_FILENAME."""
     from pathlib import Path
 
     from minirospy.compat.rospkg.environment import get_log_dir

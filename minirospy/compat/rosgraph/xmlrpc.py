@@ -1,6 +1,6 @@
-"""rosgraph.xmlrpc, filled in by minirospy: an XML-RPC server in a thread, for tools that are nodes by hand.
+"""rosgraph.xmlrpc: an XML-RPC server in a thread, for tools that are nodes by hand.
 
-Our own nodes do not use it; it stands on Python's xmlrpc.
+Our own nodes do not use it; it is based on Python's xmlrpc.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _log = logging.getLogger("xmlrpc")
 
 
 class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
-    """A request of HTTP 1.1, logged only where the server asks for it."""
+    """A request of HTTP 1.1, logged only if the server wants it."""
 
     protocol_version = "HTTP/1.1"
     rpc_paths = ()
@@ -41,18 +41,18 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A peer that went away is no news."""
+        """Ignore peers that disconnect; log everything else."""
         _log.debug("connection from %s", client_address, exc_info=True)
 
 
 class XmlRpcHandler:
-    """The root of what an :class:`XmlRpcNode` serves; names that begin with an underscore are not served."""
+    """The root of what an :class:`XmlRpcNode` serves; names that start with an underscore are not served."""
 
     def _ready(self, uri: str) -> None:
-        """The server listens at ``uri``."""
+        """Handle the start of the server, which listens at ``uri``."""
 
     def _shutdown(self, reason: str) -> None:
-        """The server ends."""
+        """Handle the shutdown of the server."""
 
 
 class XmlRpcNode:
@@ -104,7 +104,7 @@ class XmlRpcNode:
             if isinstance(self.handler, XmlRpcHandler):
                 self.handler._ready(str(self.uri))
             self.server.serve_forever(poll_interval=0.1)
-        except Exception as error:  # the thread's edge: whoever made the node is told
+        except Exception as error:  # the thread's edge: reported to the owner of the node
             if self.on_run_error is None:
                 raise
             self.on_run_error(error)

@@ -1,4 +1,4 @@
-"""roslaunch, filled in by minirospy. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
+"""roslaunch. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAME = "roslaunch"
 
 
 def configure_logging(uuid: str) -> None:
-    """Nothing is left to do: what roslaunch says goes into roslaunch-HOST-PID.log of the run's folder by itself."""
+    """Accept ROS's call; roslaunch always logs to roslaunch-HOST-PID.log in the folder of the run."""
 
 
 def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | None) -> None:
@@ -29,7 +29,7 @@ def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | N
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``roslaunch``; ``argv`` with the command's name in front."""
+    """Run the command ``roslaunch``; ``argv`` starts with its name. Return its exit status."""
     from minirospy.cli.ros import roslaunch
 
     return roslaunch.main(None if argv is None else argv[1:])

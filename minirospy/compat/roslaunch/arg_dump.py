@@ -1,4 +1,4 @@
-"""roslaunch.arg_dump, filled in by minirospy."""
+"""roslaunch.arg_dump."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["get_args"]
 
 
 def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
-    """The args that launch files declare: name -> (doc, default)."""
+    """Return the args that launch files declare: name -> (doc, default)."""
     packages, found = Packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each

@@ -36,7 +36,7 @@ LaunchFile = str | tuple[str, Sequence[str]]
 
 
 class ROSLaunchConfig:
-    """What launch files say: ``nodes``, ``params`` (by global name), ``machines``, ``tests``, ``clear_params``."""
+    """The content of launch files: ``nodes``, ``params`` (by global name), ``machines``, ``tests``, ``clear_params``."""
 
     def __init__(self) -> None:
         self.master = Master()
@@ -90,12 +90,12 @@ class ROSLaunchConfig:
             node.machine = self.machines[found.name if found else ""]
 
     def has_remote_nodes(self) -> bool:
-        """Whether a node runs on another machine, as assign_machines() found."""
+        """Return whether a node runs on another machine, as assign_machines() found."""
         nodes = (*self.nodes, *self.tests)
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """What roslaunch shows before it starts anything."""
+        """Return what roslaunch shows before it starts anything."""
         return summary(
             self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.clear_params
         )
@@ -105,7 +105,7 @@ class ROSLaunchConfig:
         self.params[p.key] = p
 
     def add_clear_param(self, param: str) -> None:
-        """Have a namespace deleted before the parameters are set."""
+        """Delete a namespace before the parameters are set."""
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> None:
@@ -117,7 +117,7 @@ class ROSLaunchConfig:
         self.config_errors.append(msg)
 
     def add(self, spec: LaunchSpec) -> None:
-        """Add all that launch files say."""
+        """Add the content of launch files."""
         self._spec.commands += spec.commands
         self._spec.warnings += spec.warnings
         self._spec.default_machine = spec.default_machine or self._spec.default_machine
@@ -158,7 +158,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """The configuration that launch files and texts say together. Raises RLException."""
+    """Return the configuration of launch files and texts together. Raises RLException."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()
@@ -176,11 +176,11 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """The launch file of a master's own nodes: None, the master needs none."""
+    """Return the launch file of the master's own nodes: None, as there are none."""
     return None
 
 
 def namespaces_of(name: str) -> list[str]:
-    """The namespaces that a global name lies in, the root first."""
+    """Return the namespaces that contain a global name, the root first."""
     parts = name.strip("/").split("/")[:-1]
     return ["/", *("/" + "/".join(parts[: i + 1]) for i in range(len(parts)))]

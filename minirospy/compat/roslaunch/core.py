@@ -1,4 +1,4 @@
-"""roslaunch.core, filled in by minirospy: nodes, parameters and machines, and what roslaunch says."""
+"""roslaunch.core: nodes, parameters and machines, and the output of roslaunch."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ TEST_TIME_LIMIT_DEFAULT = 60
 
 
 class RLException(Exception):
-    """roslaunch cannot do what was asked."""
+    """roslaunch failed."""
 
 
 class Master:
@@ -68,27 +68,27 @@ class Master:
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """The host of its URI."""
+        """Return the host of its URI."""
         return self.environment.master_address[0]
 
     def get_port(self) -> int:
-        """The port of its URI."""
+        """Return the port of its URI."""
         return self.environment.master_address[1]
 
     def get(self) -> ServerProxy:
-        """A proxy of Python's own for its calls."""
+        """Return an xmlrpc.client.ServerProxy for its calls."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.uri)
 
     def get_multi(self) -> MultiCall:
-        """The same, which sends several calls at once."""
+        """Return a proxy that sends several calls at once."""
         from xmlrpc.client import MultiCall
 
         return MultiCall(self.get())
 
     def is_running(self) -> bool:
-        """Whether it answers."""
+        """Return whether it answers."""
         with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
             return proxy.is_online()
 
@@ -150,12 +150,12 @@ class Machine:
 
 
 def local_machine() -> Machine:
-    """This machine."""
+    """Return this machine."""
     return Machine("", "localhost")
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Whether a machine is this one."""
+    """Return whether a machine is this one."""
     return not machine.user and is_own_host(machine.address)
 
 
@@ -212,7 +212,7 @@ class Node:
 
     @classmethod
     def of(cls, spec: NodeSpec) -> Node:
-        """The node that a launch file says."""
+        """Return the node of a launch file."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
             spec.respawn_delay, spec.remaps, spec.env, spec.output, spec.cwd, spec.launch_prefix, spec.required,
@@ -220,12 +220,12 @@ class Node:
         )  # fmt: skip
 
     def give_name(self) -> None:
-        """Give it a name that no other node has, where it has none."""
+        """Generate a unique name, where it has none."""
         if not self.name:
             self.name = names.anonymous_name("".join(c if c.isalnum() else "_" for c in self.type))
 
     def to_xml(self) -> str:
-        """As the text of a launch file."""
+        """Return the node as the text of a launch file."""
         return self.spec.to_xml()
 
     @property
@@ -279,7 +279,7 @@ class Test(Node):
 
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
-        """The test that a launch file says."""
+        """Return the test of a launch file."""
         node = spec.node
         return cls(
             spec.test_name, node.package, node.type, node.base_name, node.namespace, None, node.args, node.remaps,
@@ -288,7 +288,7 @@ class Test(Node):
 
 
 class _Handler:
-    """Hears the lines of one kind: errors, or all others."""
+    """Receives the lines of one kind: errors, or all others."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function
@@ -300,12 +300,12 @@ class _Handler:
 
 
 def add_printlog_handler(h: Callable[[str], object]) -> None:
-    """Have a function called with each line that roslaunch writes to standard output."""
+    """Call a function with each line that roslaunch writes to standard output."""
     Output.handlers.append(_Handler(h, errors=False))
 
 
 def add_printerrlog_handler(h: Callable[[str], object]) -> None:
-    """Have a function called with each line that roslaunch writes to standard error."""
+    """Call a function with each line that roslaunch writes to standard error."""
     Output.handlers.append(_Handler(h, errors=True))
 
 
@@ -320,35 +320,35 @@ def clear_printerrlog_handlers() -> None:
 
 
 def generate_run_id() -> str:
-    """A new run id."""
+    """Return a new run id."""
     return str(uuid.uuid1())
 
 
 def get_master_uri_env() -> str:
-    """The master's URI, as the environment has it."""
+    """Return the master's URI, as the environment has it."""
     return Environment.read().master_uri
 
 
 def setup_env(
     node: Node | None, machine: Machine, master_uri: str, env: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """The environment of a node's process, on ``env`` (of this process, where none is given)."""
+    """Return the environment of a node's process, on ``env`` (of this process, where none is given)."""
     environment = Environment.read()._replace(master_uri=master_uri)
     return node_environment((node or Node("p", "t", "n")).spec, environment, env)
 
 
 def printlog(msg: str) -> None:
-    """A line on standard output."""
+    """Print a line to standard output."""
     Output().say(msg)
 
 
 def printlog_bold(msg: str) -> None:
-    """A line on standard output, bold on a terminal."""
+    """Print a line to standard output, bold on a terminal."""
     Output().say(msg, bold=True)
 
 
 def printerrlog(msg: str) -> None:
-    """A line on standard error, red on a terminal."""
+    """Print a line to standard error, red on a terminal."""
     Output().warn(msg)
 
 

@@ -1,4 +1,4 @@
-"""roslaunch.depends, filled in by minirospy: what launch files need."""
+"""roslaunch.depends: what launch files need."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAME = "roslaunch-deps"
 
 
 class RoslaunchDepsException(Exception):
-    """What a launch file needs cannot be told."""
+    """The dependencies of a launch file cannot be determined."""
 
 
 class RoslaunchDeps:
@@ -49,7 +49,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """The package of the first file, what each file needs, and the packages that no package.xml names, by package.
+    """Return the package of the first file, what each file needs, and the packages that no package.xml names, by package.
 
     Raises RoslaunchDepsException.
     """

@@ -28,7 +28,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class ROSLaunchRunner:
-    """Runs a configuration beside the program. Errors are RLException."""
+    """Runs a configuration while the program goes on. Errors are RLException."""
 
     def __init__(
         self,
@@ -97,14 +97,14 @@ class ROSLaunchRunner:
         return (self._launcher.known[process.name], True) if process else (node.name or "", False)
 
     def is_node_running(self, node: Node) -> bool:
-        """Whether a node was started here, and runs."""
+        """Return whether a node was started here, and runs."""
         name = node.spec.name
         return any(
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Have it told of each end."""
+        """Notify a listener of each process that exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
@@ -122,7 +122,7 @@ class ROSLaunchRunner:
             self.stop()
 
     def spin_once(self) -> bool:
-        """Whether it runs on; signals are heard meanwhile."""
+        """Return whether it runs on; signals are heard meanwhile."""
         return self.pm is not None and self.pm.mainthread_spin_once()
 
     def stop(self) -> None:
@@ -165,7 +165,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 def replacement_of(module: str, name: str, ours: Function) -> Function:
     """Return what the program has put in place of a function of roslaunch's modules, or the function.
 
-    Programs silence roslaunch's signal handlers that way (``roslaunch.pmon._init_signal_handlers = ...``).
+    Programs silence roslaunch's signal handlers like this (``roslaunch.pmon._init_signal_handlers = ...``).
     """
     function: Function = getattr(sys.modules.get(module), name, ours)
     return function

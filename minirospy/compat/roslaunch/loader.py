@@ -1,4 +1,4 @@
-"""roslaunch.loader, filled in by minirospy."""
+"""roslaunch.loader."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ __all__ = ["convert_value"]
 
 
 def convert_value(value: str, type_: str) -> Any:
-    """A parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
+    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
     return substitution.convert(value, type_)

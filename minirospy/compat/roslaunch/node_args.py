@@ -1,4 +1,4 @@
-"""roslaunch.node_args, filled in by minirospy."""
+"""roslaunch.node_args."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ __all__ = [
 
 
 def get_node_list(config: ROSLaunchConfig) -> list[str]:
-    """The names of the nodes, sorted."""
+    """Return the names of the nodes, sorted."""
     return sorted(config.resolved_node_names)
 
 
 def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list[str]:
-    """The command of a node, the variables of its environment in front. Raises NodeParamsException."""
+    """Return the command of a node, the variables of its environment in front. Raises NodeParamsException."""
     spec = _find(node_name, roslaunch_files).spec
     environment = node_environment(spec, Environment.read(), {})
     environment.pop("ROS_MASTER_URI")
@@ -37,7 +37,7 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list
 
 
 def create_local_process_args(node: Node, machine: Machine | None, env: object = None) -> list[str]:
-    """The command of a node. Raises NodeParamsException."""
+    """Return the command of a node. Raises NodeParamsException."""
     node.give_name()
     return _command(node.spec)
 

@@ -1,4 +1,4 @@
-"""roslaunch.nodeprocess, filled in by minirospy."""
+"""roslaunch.nodeprocess."""
 
 from minirospy.launch.process import Timeouts
 

@@ -1,4 +1,4 @@
-"""roslaunch.param_dump, filled in by minirospy."""
+"""roslaunch.param_dump."""
 
 from __future__ import annotations
 

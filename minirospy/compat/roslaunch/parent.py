@@ -25,7 +25,7 @@ __all__ = ["ROSLaunchParent"]
 
 
 class ROSLaunchParent:
-    """Runs launch files (paths, or paths with arguments) beside the program. Errors are RLException."""
+    """Runs launch files (paths, or paths with arguments) while the program goes on. Errors are RLException."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class ROSLaunchParent:
             self.runner.spin()
 
     def spin_once(self) -> bool:
-        """Whether it runs on; signals are heard meanwhile."""
+        """Return whether it runs on; signals are heard meanwhile."""
         return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:
@@ -110,7 +110,7 @@ class ROSLaunchParent:
             self.runner.stop()
 
     def _load_config(self) -> None:
-        """Fill ``config``; programs overwrite this to fill it otherwise."""
+        """Fill ``config``; programs override this to fill it differently."""
         load = replacement_of("roslaunch.config", "load_config_default", load_config_default)
         self.config = load(
             self.roslaunch_files, self.port, roslaunch_strs=self.roslaunch_strs, verbose=self.verbose

@@ -46,11 +46,11 @@ class ProcessListener:
     """Hears of the end of processes."""
 
     def process_died(self, process_name: str, exit_code: int) -> None:
-        """A process has ended; called in a thread of roslaunch's own."""
+        """Handle the exit of a process; called in a thread of roslaunch."""
 
 
 class ApiLauncher(Launcher):
-    """A launcher that tells listeners, and keeps the Process of each node that it started."""
+    """A launcher that notifies listeners, and keeps the Process of each node that it started."""
 
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
@@ -61,16 +61,16 @@ class ApiLauncher(Launcher):
         self.known: dict[str, Process] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """The command of a node. Raises LaunchError."""
+        """Return the command of a node. Raises LaunchError."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
-        """The environment of a node's process."""
+        """Return the environment of a node's process."""
         return node_environment(node, self._environment)
 
     @property
     def log_folder(self) -> str:
-        """Where the log files of its nodes lie."""
+        """The folder of its nodes' log files."""
         return str(self._log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -87,7 +87,7 @@ class ApiLauncher(Launcher):
 
 
 class Process:
-    """A process of a node: one that runs, or (of create_node_process) one that start() begins."""
+    """A process of a node: a running one, or (of create_node_process) one for start()."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         self.name = name
@@ -114,7 +114,7 @@ class Process:
 
     @property
     def stopped(self) -> bool:
-        """Whether somebody asked it to end."""
+        """Whether its end was requested."""
         return self.process is not None and self.process.is_ending
 
     @property
@@ -148,7 +148,7 @@ class Process:
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
-        """Whether it runs. As in ROS, one that was not started yet counts as alive."""
+        """Return whether it runs. As in ROS, one that was not started yet counts as alive."""
         return self.process is None or self.process.is_running
 
     def start(self) -> bool:
@@ -169,7 +169,7 @@ class Process:
             self._launcher.end_process(self.process)
 
     def get_info(self) -> dict[str, Any]:
-        """What is known of it."""
+        """Return pid, exit code and other facts about it."""
         keys = [
             "package",
             "name",
@@ -188,7 +188,7 @@ class Process:
         return info
 
     def get_exit_description(self) -> str:
-        """How it ended."""
+        """Return how it exited."""
         files = f"log file: {os.path.join(self.log_dir, self.name.replace('/', '-'))}*.log"
         if self.exit_code == 0:
             return f"process has finished cleanly\n{files}"
@@ -223,7 +223,7 @@ class ProcessMonitor:
 
     @property
     def is_shutdown(self) -> bool:
-        """Whether somebody asked all to end."""
+        """Whether a shutdown was requested."""
         return bool(self._launcher.stopped_by)
 
     @property
@@ -238,19 +238,19 @@ class ProcessMonitor:
         return [each for each in self._launcher.known.values() if each.started and each.name not in watched]
 
     def get_active_names(self) -> list[str]:
-        """The names of those that are watched."""
+        """Return the names of those that are watched."""
         return [process.name for process in self.procs]
 
     def get_process_names_with_spawn_count(self) -> list[list[tuple[str, int]]]:
-        """The names of those that are watched, and of those that have ended, each with how often it was started."""
+        """Return the names of those that are watched, and of those that exited, each with its number of starts."""
         return [[(each.name, each.spawn_count) for each in some] for some in (self.procs, self.dead_list)]
 
     def has_process(self, name: str) -> bool:
-        """Whether one of this name is watched."""
+        """Return whether one of this name is watched."""
         return name in self.get_active_names()
 
     def get_process(self, name: str) -> Process | None:
-        """The one of this name."""
+        """Return the process of this name, or None."""
         return next((process for process in self.procs if process.name == name), None)
 
     def kill_process(self, name: str) -> bool:
@@ -263,22 +263,24 @@ class ProcessMonitor:
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process of create_node_process(); to be called before its start()."""
+        """Watch a process of create_node_process(); call it before its start()."""
         if self.done:
             raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
         p.register(self._launcher)
 
     def registrations_complete(self) -> None:
-        """No further process comes: the monitor ends with the last one."""
+        """Let the monitor end with the last process, as no further one will be registered."""
         self._launcher.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Have it told of each end."""
+        """Notify a listener of each process that exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread until somebody stops it, or registrations_complete() was called and they
-        have ended; then end what is left."""
+        """Watch the processes in a thread, and stop them in the end.
+
+        It ends when it is stopped, or when registrations_complete() was called and all processes have exited.
+        """
 
         def watch() -> None:
             try:
@@ -286,7 +288,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # Where the program is killed, this thread is, too: then the guardian ends the nodes.
+        # If the program is killed, so is this thread; then the guardian stops the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
@@ -297,7 +299,7 @@ class ProcessMonitor:
         self._ended.set()
 
     def is_alive(self) -> bool:
-        """Whether it watches."""
+        """Return whether it watches."""
         return self.is_watching and not self.done
 
     def join(self, timeout: float | None = None) -> None:
@@ -305,7 +307,7 @@ class ProcessMonitor:
         if threading.current_thread() is self._thread:
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
-        # In slices: on Windows a wait without end hears no signal.
+        # In slices: on Windows a wait without timeout ignores signals.
         while not self.done and (left := end - time.monotonic()) > 0:
             self._ended.wait(min(0.5, left))
 
@@ -314,7 +316,7 @@ class ProcessMonitor:
         self.join()
 
     def mainthread_spin_once(self) -> bool:
-        """Whether it watches on; signals are heard meanwhile."""
+        """Return whether it watches on; signals are heard meanwhile."""
         return not self._ended.wait(0.01)
 
     def shutdown(self) -> None:
@@ -323,12 +325,12 @@ class ProcessMonitor:
 
     @classmethod
     def living(cls) -> list[ProcessMonitor]:
-        """All that have not ended."""
+        """Return all monitors that have not ended."""
         return [monitor for monitor in cls._living if not monitor.done]
 
 
 def start_process_monitor() -> ProcessMonitor:
-    """A monitor for processes of create_node_process()."""
+    """Return a monitor for processes of create_node_process()."""
     monitor = ProcessMonitor(ApiLauncher(LaunchSpec(), Environment.read()))
     monitor.watch()
     return monitor
@@ -345,7 +347,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """A process for a node, to be started with its start(). Raises NodeParamsException where it has no program."""
+    """Return a process for a node, to be started with its start(). Raises NodeParamsException where it has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -368,7 +370,7 @@ def pmon_shutdown() -> None:
 
 
 class _Handler:
-    """Of a signal: ends all that this program launched; whoever handled it before does so still."""
+    """A signal handler that stops all that this program launched, and then calls the previous handler."""
 
     def __init__(self, number: signal.Signals) -> None:
         self._before = signal.getsignal(number)
@@ -394,5 +396,5 @@ def init_signal_handlers() -> None:
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:
-    """What a signal does: ends all that this program launched."""
+    """Handle a signal: stop all that this program launched."""
     pmon_shutdown()

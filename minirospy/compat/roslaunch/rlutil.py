@@ -1,4 +1,4 @@
-"""roslaunch.rlutil, filled in by minirospy."""
+"""roslaunch.rlutil."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def check_log_disk_usage() -> None:
 
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
-    """What is wrong with a launch file: all faults and programs that are missing, a line for each; None: nothing."""
+    """Return what is wrong with a launch file: all faults and programs that are missing, a line for each; None: nothing."""
     return "\n".join(map(str, faults_of(f, Packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
@@ -52,7 +52,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """The run id: the given one, that of the master, or (where none answers) a new one."""
+    """Return the run id: the given one, that of the master, or (where none answers) a new one."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
@@ -65,7 +65,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """The paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
+    """Return the paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
     try:
         return find_files([word for word in args if ":=" not in word], Packages())
     except MinirospyError as error:

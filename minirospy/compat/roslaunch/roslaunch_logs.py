@@ -1,4 +1,4 @@
-"""roslaunch.roslaunch_logs, filled in by minirospy: where the log files of the present run lie."""
+"""roslaunch.roslaunch_logs: the log folder of the current run."""
 
 __all__ = ["NAME"]
 

@@ -22,15 +22,15 @@ class ROSLaunch:
         self.started = False
 
     def load(self, f: str) -> None:
-        """Have start() run a launch file, too."""
+        """Let start() also run a launch file."""
         XmlLoader().load(f, self._config)
 
     def load_str(self, s: str) -> None:
-        """Have start() run the text of a launch file, too."""
+        """Let start() also run the text of a launch file."""
         XmlLoader().load_string(s, self._config)
 
     def start(self) -> None:
-        """Begin; nodes can now be launched."""
+        """Start; nodes can now be launched."""
         self.parent.start(auto_terminate=False)
         self.started = True
 
@@ -50,7 +50,7 @@ class ROSLaunch:
         self.parent.spin()
 
     def spin_once(self) -> bool:
-        """Whether it runs on."""
+        """Return whether it runs on."""
         return self.parent.spin_once()
 
     def stop(self) -> None:

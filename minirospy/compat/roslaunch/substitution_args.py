@@ -26,7 +26,7 @@ def resolve_args(
     resolve_anon: bool = True,
     filename: str | None = None,
 ) -> str:
-    """A text with its substitution arguments made; ``context`` may hold the args as ``{"arg": {name: value}}``.
+    """Return a text with its substitution arguments made; ``context`` may hold the args as ``{"arg": {name: value}}``.
 
     Raises SubstitutionException, and ArgException where an arg is not set.
     """

@@ -22,7 +22,7 @@ class Configuration(Protocol):
     """What launch files are loaded into: a ROSLaunchConfig."""
 
     def add(self, spec: LaunchSpec) -> None:
-        """Add all that launch files say."""
+        """Add the content of launch files."""
 
 
 class XmlLoader:
@@ -59,5 +59,5 @@ class XmlLoader:
 
 
 def assignments(argv: Sequence[str]) -> dict[str, str]:
-    """What ``["name:=value", ...]`` gives: name -> value."""
+    """Return name -> value of ``["name:=value", ...]``."""
     return {name: value for name, sep, value in (word.partition(":=") for word in argv) if sep}

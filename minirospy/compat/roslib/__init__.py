@@ -1,4 +1,4 @@
-"""roslib, filled in by minirospy. Source: http://wiki.ros.org/roslib."""
+"""roslib. Source: http://wiki.ros.org/roslib."""
 
 __all__ = ["is_interactive", "set_interactive"]
 
@@ -6,10 +6,10 @@ _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Whether the process belongs to an interactive shell, as it says itself."""
+    """Return whether set_interactive() marked the process as interactive."""
     return _interactive[0]
 
 
 def set_interactive(interactive: bool) -> None:
-    """Say that the process belongs to an interactive shell."""
+    """Set whether the process is interactive."""
     _interactive[0] = interactive

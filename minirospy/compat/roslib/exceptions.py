@@ -1,4 +1,4 @@
-"""roslib.exceptions, filled in by minirospy."""
+"""roslib.exceptions."""
 
 __all__ = ["ROSLibException"]
 

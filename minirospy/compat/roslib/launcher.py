@@ -16,9 +16,9 @@ __all__ = ["load_manifest"]
 
 
 def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
-    """Put the ``src`` folders of a package and of all that it needs on sys.path, as scripts of old ask for.
+    """Put the ``src`` folders of a package and of all that it needs on sys.path, as old scripts do.
 
-    A package that the script itself lies in, or that can be imported, need not be on ROS_PACKAGE_PATH.
+    The package that contains the script, or one that can be imported, need not be on ROS_PACKAGE_PATH.
     Raises ResourceNotFound.
     """
     rospack = RosPack()
@@ -40,7 +40,7 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
 
 
 def _folder_of_script(package: str) -> Path | None:
-    """The package that the running script lies in, if it has this name."""
+    """Return the folder of the package that contains the running script, if it has this name."""
     script: Sequence[str] = sys.argv[:1]
     if not script or not script[0]:
         return None

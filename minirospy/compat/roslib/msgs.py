@@ -1,4 +1,4 @@
-"""roslib.msgs, filled in by minirospy: of genmsg's names under those of old, what programs ask of types."""
+"""roslib.msgs: queries about types, with genmsg's functions under their former names."""
 
 from minirospy.idl.load import Catalogue
 from minirospy.workspace.packages import Packages
@@ -10,5 +10,5 @@ SEP = "/"
 
 
 def list_msg_types(package: str, include_depends: bool) -> list[str]:
-    """The names of the message files of a package, without it; ``include_depends`` is of rosbuild."""
+    """Return the names of the message files of a package, without it; ``include_depends`` is of rosbuild."""
     return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))

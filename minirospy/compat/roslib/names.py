@@ -1,4 +1,4 @@
-"""roslib.names, filled in by minirospy: rosgraph's names, and those of resources (``package/name``)."""
+"""roslib.names: rosgraph's names, and those of resources (``package/name``)."""
 
 import re
 
@@ -17,22 +17,22 @@ PRN_SEPARATOR = TYPE_SEPARATOR = "/"
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """``package/name``, or the name alone in the package itself."""
+    """Return ``package/name``, or the name alone in the package itself."""
     return name if res_pkg_name == my_pkg else f"{res_pkg_name}{PRN_SEPARATOR}{name}"
 
 
 def resource_name_base(name: str) -> str:
-    """The name without its package."""
+    """Return the name without its package."""
     return name.rpartition(PRN_SEPARATOR)[2]
 
 
 def resource_name_package(name: str) -> str | None:
-    """The package of a name, or None."""
+    """Return the package of a name, or None."""
     return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
 
 
 def package_resource_name(name: str) -> tuple[str, str]:
-    """(package, name); the package is empty where the name has none. Raises ValueError on two slashes."""
+    """Return (package, name); the package is empty where the name has none. Raises ValueError on two slashes."""
     if name.count(PRN_SEPARATOR) > 1:
         raise ValueError(f"invalid name [{name}]")
     package, _, base = name.rpartition(PRN_SEPARATOR)
@@ -40,10 +40,10 @@ def package_resource_name(name: str) -> tuple[str, str]:
 
 
 def is_legal_resource_name(name: str) -> bool:
-    """Whether a name is one of a resource, with or without its package."""
+    """Return whether a name is one of a resource, with or without its package."""
     return name is not None and bool(re.match(r"^[A-Za-z][\w/]*\Z", name, re.ASCII)) and "//" not in name
 
 
 def is_legal_resource_base_name(name: str) -> bool:
-    """Whether a name is one of a resource without its package."""
+    """Return whether a name is one of a resource without its package."""
     return name is not None and bool(re.match(r"^[A-Za-z]\w*\Z", name, re.ASCII))

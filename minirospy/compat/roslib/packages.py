@@ -49,7 +49,7 @@ class MultipleNodesException(ROSPkgException):
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """The folder of a package. Raises InvalidROSPkgException where there is none, if ``required``; else None."""
+    """Return the folder of a package. Raises InvalidROSPkgException where there is none and ``required``; else None."""
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:
@@ -61,7 +61,7 @@ def get_pkg_dir(
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """(folder, name) of the package that a path lies in; (None, None) where it lies in none."""
+    """Return (folder, name) of the package that contains a path; (None, None) where none does."""
     name = get_package_name(d)
     place = Path(d).absolute()
     folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)
@@ -71,7 +71,7 @@ def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
 def get_pkg_subdir(
     package: str, subdir: str, required: bool = True, env: dict[str, str] | None = None
 ) -> str | None:
-    """A folder in a package, made where it is not there if ``required``; else None. Raises InvalidROSPkgException."""
+    """Return a folder in a package, made where it is not there if ``required``; else None. Raises InvalidROSPkgException."""
     folder = get_pkg_dir(package, required)
     if folder is None:
         return None
@@ -82,12 +82,12 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """The path that a file in a folder of a package has, or would have. Raises InvalidROSPkgException."""
+    """Return the path that a file in a folder of a package has, or would have. Raises InvalidROSPkgException."""
     return os.path.join(str(get_pkg_dir(package)), subdir, resource_name)
 
 
 def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[str]:
-    """The programs of a name in a package. Raises ResourceNotFound."""
+    """Return the programs of a name in a package. Raises ResourceNotFound."""
     return find_resource(pkg, node_type, _is_program, rospack)
 
 
@@ -97,7 +97,7 @@ def find_resource(
     filter_fn: Callable[[str], bool] | None = None,
     rospack: RosPack | None = None,
 ) -> list[str]:
-    """The files of a name in a package, and where its workspace puts what it builds. Raises ResourceNotFound."""
+    """Return the files of a name in a package, and where its workspace puts what it builds. Raises ResourceNotFound."""
     folder = Path((rospack or RosPack()).get_path(pkg))
     if len(Path(resource_name).parts) > 1:
         found: Iterator[Path] = filter(Path.is_file, [folder / resource_name])
@@ -112,7 +112,7 @@ def list_pkgs_by_path(
     cache: dict[str, str] | None = None,
     env: dict[str, str] | None = None,
 ) -> list[str]:
-    """The packages below a folder, added to ``packages``."""
+    """Return the packages below a folder, added to ``packages``."""
     found = [] if packages is None else packages
     found += [name for name in RosPack([path]).list() if name not in found]
     return found

@@ -1,4 +1,4 @@
-"""roslib.rosenv, filled in by minirospy: what the environment says, under the words of old."""
+"""roslib.rosenv: values of the environment, with roslib's former names."""
 
 from __future__ import annotations
 
@@ -35,34 +35,34 @@ class ROSEnvException(ROSLibException):
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
-    """ROS_ROOT. Raises ROSEnvException where it is not set, if ``required``."""
+    """Return ROS_ROOT. Raise ROSEnvException where it is not set, if ``required``."""
     return _variable(ROS_ROOT, required, env)
 
 
 def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """ROS_PACKAGE_PATH. Raises ROSEnvException where it is not set, if ``required``."""
+    """Return ROS_PACKAGE_PATH. Raise ROSEnvException where it is not set, if ``required``."""
     return _variable(ROS_PACKAGE_PATH, required, env)
 
 
 def get_master_uri(
     required: bool = True, env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
-    """The URI of the master that the command line or the environment names."""
+    """Return the URI of the master that the command line or the environment names."""
     return rosenv.get_master_uri(env, argv)
 
 
 def get_ros_home(env: Mapping[str, str] | None = None) -> str:
-    """The folder of ROS's own files: ROS_HOME, or ~/.ros."""
+    """Return the folder of ROS's own files: ROS_HOME, or ~/.ros."""
     return environment.get_ros_home(env)
 
 
 def get_log_dir(env: Mapping[str, str] | None = None) -> str:
-    """The folder of log files."""
+    """Return the folder of log files."""
     return environment.get_log_dir(env)
 
 
 def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
-    """The folder of test results."""
+    """Return the folder of test results."""
     return environment.get_test_results_dir(env)
 
 

@@ -1,4 +1,4 @@
-"""roslib.scriptutil, filled in by minirospy: the master as scripts of old ask for it."""
+"""roslib.scriptutil: the master, as old scripts get it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["get_master", "get_param_server"]
 
 
 def get_master() -> ServerProxy:
-    """The master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
+    """Return the master that the environment names: each method takes the caller's id first and gives (code, text, value)."""
     return ServerProxy(get_master_uri())
 
 

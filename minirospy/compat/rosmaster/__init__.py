@@ -1,4 +1,4 @@
-"""rosmaster, filled in by minirospy: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
+"""rosmaster: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["rosmaster_main"]
 
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:
-    """The command; ``argv`` begins with its name. Its exit status, once it ends."""
+    """Run the command; ``argv`` starts with its name. Return its exit status when it ends."""
     from minirospy.cli.ros.master import rosmaster
 
     return rosmaster(list(sys.argv if argv is None else argv)[1:])

@@ -1,4 +1,4 @@
-"""rosmaster.master, filled in by minirospy: a master inside a program, as tests start one."""
+"""rosmaster.master: a master inside a program, as tests start one."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Master:
         self.uri = f"http://{environment.uri_host}:{self.port}/"
 
     def ok(self) -> bool:
-        """Whether it serves."""
+        """Return whether it serves."""
         return self.uri is not None
 
     def stop(self) -> None:

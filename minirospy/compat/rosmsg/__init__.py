@@ -1,4 +1,4 @@
-"""rosmsg, filled in by minirospy: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
+"""rosmsg: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
 
 from __future__ import annotations
 
@@ -35,31 +35,31 @@ _KINDS = {MODE_MSG: Kind.MESSAGE, MODE_SRV: Kind.SERVICE}
 
 
 class ROSMsgException(Exception):
-    """A type is not there, or its definition does not parse."""
+    """A type does not exist, or its definition is invalid."""
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """The text of a message type, unfolded, or as it stands in its file. Raises ROSMsgException."""
+    """Return the text of a message type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
     return _text(type_, raw, Kind.MESSAGE)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """The text of a service type, unfolded, or as it stands in its file. Raises ROSMsgException."""
+    """Return the text of a service type, expanded, or with ``raw`` as in its file. Raises ROSMsgException."""
     return _text(type_, raw, Kind.SERVICE)
 
 
 def list_msgs(package: str, rospack: object = None) -> list[str]:
-    """The message types of a package. Raises rospkg.ResourceNotFound."""
+    """Return the message types of a package. Raises rospkg.ResourceNotFound."""
     return list_types(package, MODE_MSG)
 
 
 def list_srvs(package: str, rospack: object = None) -> list[str]:
-    """The service types of a package. Raises rospkg.ResourceNotFound."""
+    """Return the service types of a package. Raises rospkg.ResourceNotFound."""
     return list_types(package, MODE_SRV)
 
 
 def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
-    """The types of a package. Raises rospkg.ResourceNotFound, ValueError on a mode that is none."""
+    """Return the types of a package. Raises rospkg.ResourceNotFound, ValueError on an unknown mode."""
     try:
         return _interfaces(_kind(mode)).in_package(package)
     except NotFoundError as error:
@@ -69,7 +69,7 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> li
 
 
 def rosmsg_md5(mode: str, type_: str) -> str:
-    """The md5sum of a type. Raises ROSMsgException."""
+    """Return the md5sum of a type. Raises ROSMsgException."""
     try:
         return _interfaces(_kind(mode)).md5sum(type_)
     except (NotFoundError, DefinitionError) as error:
@@ -77,22 +77,22 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """The types of a name without its package."""
+    """Yield the types of a name without its package."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 
 
 def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
-    """(name, folder of its definitions) of each package that has any."""
+    """Yield (name, folder of its definitions) of each package that has any."""
     packages = Packages()
     for name in Interfaces(packages, _kind(mode)).packages():
         yield name, str(packages.find(name) / mode.removeprefix("."))
 
 
 def spec_to_str(msg_context: Any, spec: Any, buff: Any = None, indent: str = "") -> str:
-    """A message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
+    """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
 
-    Raises KeyError where it needs a message that the context does not know.
+    Raises KeyError where it needs a message that is not in the context.
     """
     from minirospy.compat.genmsg.msg_loader import lookup_in, parsed_message
 
@@ -104,9 +104,9 @@ def spec_to_str(msg_context: Any, spec: Any, buff: Any = None, indent: str = "")
 
 
 def get_yaml_for_msg(msg: Any, prefix: str = "", *, flow_style_: bool | None = None) -> str:
-    """A message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
+    """Return a message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
 
-    Else a message or array of more than four makes all that is flat stand in braces, so that it fits the screen.
+    Else flat values are in braces if a message or array has more than four entries, so that it fits the screen.
     """
     import yaml
 
@@ -117,14 +117,14 @@ def get_yaml_for_msg(msg: Any, prefix: str = "", *, flow_style_: bool | None = N
 
 
 def rosmsgmain(mode: str = MODE_MSG) -> int:
-    """The command on this process's command line. Its exit status."""
+    """Run the command on this process's command line. Return its exit status."""
     from minirospy.cli.ros import rosmsg
 
     return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
 
 
 def _plain(value: Any) -> Any:
-    """A value as dictionaries, lists and what YAML knows."""
+    """Return a value as dictionaries, lists and scalars of YAML."""
     if isinstance(value, TVal):
         return {"secs": value.secs, "nsecs": value.nsecs}
     if hasattr(value, "__slots__"):
@@ -133,13 +133,13 @@ def _plain(value: Any) -> Any:
 
 
 def _width(plain: Any) -> int:
-    """The number of entries of the widest dictionary or list."""
+    """Return the number of entries of the widest dictionary or list."""
     inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
     return max(len(inner), *map(_width, inner), 0)
 
 
 def _get_package_paths(pkgname: str, rospack: Any) -> list[str]:
-    """The folders that hold a package's definitions, as programs ask for them that load them by genmsg."""
+    """Return the folders of a package's definitions, for programs that load them by genmsg."""
     return [rospack.get_path(pkgname)]
 
 

@@ -1,4 +1,4 @@
-"""rosnode, filled in by minirospy: what user code asks of nodes. Source: http://wiki.ros.org/rosnode."""
+"""rosnode: queries about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _PING_SECONDS = 3.0
 
 
 class ROSNodeException(Exception):
-    """A node cannot be used as asked."""
+    """A request about a node failed."""
 
 
 class ROSNodeIOException(ROSNodeException):
@@ -53,19 +53,19 @@ class ROSNodeIOException(ROSNodeException):
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:
-    """The names of the nodes at or below ``namespace``. Raises ROSNodeIOException."""
+    """Return the names of the nodes at or below ``namespace``. Raises ROSNodeIOException."""
     with _graph() as graph:
         return nodes.list_nodes(graph, graph.resolve(namespace) if namespace else "/")
 
 
 def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = False) -> str | None:
-    """The URI of a node; None where the master does not know it. The master is always asked."""
+    """Return the URI of a node; None where the master does not know it. The master is always queried."""
     with _graph(master) as graph:
         return graph.node_uri(caller_id)
 
 
 def get_node_info_description(node_name: str) -> str:
-    """What the master knows of a node, as `rosnode info` prints it. Raises ROSNodeIOException."""
+    """Return what the master knows of a node, as `rosnode info` prints it. Raises ROSNodeIOException."""
     with _graph() as graph:
         name = graph.resolve(node_name)
         try:
@@ -75,7 +75,7 @@ def get_node_info_description(node_name: str) -> str:
 
 
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
-    """Process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
+    """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
 
     Raises ROSNodeIOException where the node does not answer.
     """
@@ -89,7 +89,7 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Whether a node answers ``max_count`` pings (None: pings until it does not). Raises ROSNodeIOException.
+    """Return whether a node answers ``max_count`` pings (None: pings until it does not). Raises ROSNodeIOException.
 
     Why it does not is printed on stderr, all else with ``verbose`` alone.
     """
@@ -115,7 +115,7 @@ def rosnode_ping(
 
 
 def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
-    """(nodes that answer, nodes that do not). Raises ROSNodeIOException."""
+    """Return (nodes that answer, nodes that do not). Raises ROSNodeIOException."""
     answering: list[str] = []
     silent: list[str] = []
     with _graph() as graph:
@@ -131,8 +131,8 @@ def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[l
 
 
 def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
-    """Ask nodes to shut down; (asked, unknown or hanging). Where no master answers, all are unknown."""
-    asked: list[str] = []
+    """Request nodes to shut down; return (notified, unknown or unreachable). Without a master all are unknown."""
+    notified: list[str] = []
     unknown: list[str] = []
     try:
         with _graph() as graph:
@@ -142,12 +142,12 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
                     continue
                 try:
                     nodes.kill_node(graph, node)
-                    asked.append(node.name)
+                    notified.append(node.name)
                 except NodeUnreachableError:
                     unknown.append(node.name)
     except ROSNodeIOException:
-        unknown = [name for name in node_names if name not in asked]
-    return asked, unknown
+        unknown = [name for name in node_names if name not in notified]
+    return notified, unknown
 
 
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
@@ -172,14 +172,14 @@ def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str])
 
 
 def get_machines_by_nodes() -> list[str]:
-    """The machines that nodes run on."""
+    """Return the machines that nodes run on."""
     with _graph() as graph:
         hosts = (node_host(node.uri) for node in graph.addresses(nodes.list_nodes(graph)))
         return sorted({host for host in hosts if host})
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """The nodes on a machine. Raises ROSNodeException where its name does not resolve."""
+    """Return the nodes on a machine. Raises ROSNodeException where its name does not resolve."""
     try:
         wanted = socket.gethostbyname(machine)
     except OSError as error:
@@ -213,7 +213,7 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
 
 
 def rosnode_cleanup() -> None:
-    """What `rosnode cleanup` does, its question included. Raises ROSNodeIOException."""
+    """Run `rosnode cleanup` with its confirmation prompt. Raises ROSNodeIOException."""
     from minirospy.cli.ros.rosnode import main
 
     with _graph() as graph:
@@ -222,7 +222,7 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """The command; ``argv`` begins with its name. Ends the program with its exit status, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit with its status, as ROS's does."""
     from minirospy.cli.ros.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
@@ -234,7 +234,7 @@ def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
 def _sub_rosnode_listnodes(
     namespace: str | None = None, list_uri: bool = False, list_all: bool = False
 ) -> str:
-    """The lines that `rosnode list` prints."""
+    """Return the lines that `rosnode list` prints."""
     with _graph() as graph:
         found = graph.addresses(get_node_names(namespace))
     if list_all:
@@ -243,7 +243,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[Any]) -> Any:
-    """The value of an answer (code, text, value). Raises ROSNodeException where it is a refusal."""
+    """Return the value of an answer (code, text, value). Raises ROSNodeException where it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -255,7 +255,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """The seconds that a ping takes; None where the node does not answer, which is told of."""
+    """Return the seconds that a ping takes; None where the node does not answer, which is printed."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:
@@ -277,8 +277,8 @@ def _address(host: str) -> str | None:
 def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
-    """The graph of ``master``, else of the environment's; faults by the names that they have here."""
-    # A ServerProxy, which scripts of old pass, has any attribute, but no such text.
+    """Yield the graph of ``master``, else of the environment's; raise errors as this module's exceptions."""
+    # A ServerProxy, which old scripts pass, has any attribute, but no such text.
     uri = getattr(master, "master_uri", None)
     try:
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:

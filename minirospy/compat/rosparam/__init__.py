@@ -1,4 +1,4 @@
-"""rosparam, filled in by minirospy: parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
+"""rosparam: parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
 
 
 class RosParamException(Exception):
-    """A parameter or file cannot be used as asked."""
+    """A request about a parameter or file failed."""
 
 
 class RosParamIOException(RosParamException):
@@ -57,7 +57,7 @@ class _YamlError(RosParamException, yaml.YAMLError):
 
 
 def get_param(param: str) -> Any:
-    """A parameter's value. Raises rosgraph.MasterError where it is not set, or the name is empty."""
+    """Return a parameter's value. Raises rosgraph.MasterError where it is not set, or the name is empty."""
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
@@ -76,7 +76,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
-    """Set a parameter to a value; a dictionary leaves the parameters beside its own."""
+    """Set a parameter to a value; a dictionary leaves other parameters of its namespace."""
     with _graph() as graph:
         for name, single in parameters.set_parameter(graph, graph.resolve(param), value):
             if verbose:
@@ -114,18 +114,18 @@ def print_params(params: Any, ns: str) -> None:
 
 
 def get_param_server() -> Master:
-    """The master that the environment names, which keeps the parameters."""
+    """Return the parameter server: the master that the environment names."""
     return Master("/" + NAME)
 
 
 def list_params(ns: str) -> list[str]:
-    """The names of the parameters below a namespace."""
+    """Return the names of the parameters below a namespace."""
     with _graph() as graph:
         return parameters.list_parameters(graph, graph.resolve(ns))
 
 
 def load_file(filename: str, default_namespace: str | None = None, verbose: bool = False) -> list[Any]:
-    """[(values, namespace)] of each document of a YAML file, which may hold what no parameter can.
+    """Return [(values, namespace)] of each document of a YAML file, which may contain more than a parameter can.
 
     Raises RosParamException where it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
     """
@@ -145,7 +145,7 @@ def load_file(filename: str, default_namespace: str | None = None, verbose: bool
 def load_str(
     str: str, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[Any]:
-    """[(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
+    """Return [(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
     try:
         documents = list(parse_documents(str, filename))
     except ValueTextError as error:
@@ -169,7 +169,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
     from minirospy.cli.ros.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
@@ -177,7 +177,7 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """The global name of a parameter. An empty one would be the namespace, and so all parameters in it."""
+    """Return the global name of a parameter. An empty one would be the namespace, and so all parameters in it."""
     if not param:
         raise MasterError("ERROR: parameter [key] must be specified and non-empty")
     return graph.resolve(param)

@@ -10,5 +10,5 @@ __all__ = ["current_distro_codename"]
 
 
 def current_distro_codename(env: Mapping[str, str] | None = None) -> str:
-    """ROS_DISTRO, or the last one of ROS 1."""
+    """Return ROS_DISTRO, or the last distribution of ROS 1."""
     return folders.distro_codename(env)

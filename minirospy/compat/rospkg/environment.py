@@ -38,45 +38,45 @@ ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"
 
 
 def get_ros_root(env: Environ | None = None) -> str | None:
-    """ROS_ROOT."""
+    """Return ROS_ROOT, or None."""
     return _environ(env).get("ROS_ROOT")
 
 
 def get_ros_package_path(env: Environ | None = None) -> str | None:
-    """ROS_PACKAGE_PATH."""
+    """Return ROS_PACKAGE_PATH, or None."""
     return _environ(env).get("ROS_PACKAGE_PATH")
 
 
 def get_ros_paths(env: Environ | None = None) -> list[str]:
-    """The folders of ROS_PACKAGE_PATH, and what minirospy brings along."""
+    """Return the folders of ROS_PACKAGE_PATH, and those of minirospy's own packages."""
     environ = _environ(env)
     named = [environ.get("ROS_ROOT", ""), *environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)]
     return list(dict.fromkeys([path for path in named if path] + [str(root) for root in built_in_roots()]))
 
 
 def get_ros_home(env: Environ | None = None) -> str:
-    """ROS_HOME, or ``~/.ros``."""
+    """Return ROS_HOME, or ``~/.ros``."""
     return folders.ros_home(env)
 
 
 def get_log_dir(env: Environ | None = None) -> str:
-    """ROS_LOG_DIR, or ``log`` in ROS_HOME."""
+    """Return ROS_LOG_DIR, or ``log`` in ROS_HOME."""
     return folders.log_dir(env)
 
 
 def get_test_results_dir(env: Environ | None = None) -> str:
-    """ROS_TEST_RESULTS_DIR, or ``test_results`` in ROS_HOME."""
+    """Return ROS_TEST_RESULTS_DIR, or ``test_results`` in ROS_HOME."""
     return folders.results_dir(env)
 
 
 def get_etc_ros_dir(env: Environ | None = None) -> str:
-    """ROS_ETC_DIR, or where the system keeps ROS's settings."""
+    """Return ROS_ETC_DIR, or the system's folder of ROS settings."""
     default = r"C:\opt\ros\etc" if sys.platform == "win32" else "/etc/ros"
     return _environ(env).get("ROS_ETC_DIR") or default
 
 
 def on_ros_path(p: str, env: Environ | None = None) -> bool:
-    """Whether a path is or lies in one of the folders that are searched for packages."""
+    """Return whether a path is in one of the folders that are searched for packages."""
     place = Path(p).resolve()
     return any(place.is_relative_to(Path(root).resolve()) for root in get_ros_paths(env))
 

@@ -17,7 +17,7 @@ __all__ = ["Depend", "Export", "InvalidManifest", "Manifest", "RosDep", "parse_m
 
 
 class InvalidManifest(Exception):
-    """A package.xml does not read."""
+    """A package.xml is invalid."""
 
 
 class Depend(NamedTuple):
@@ -31,7 +31,7 @@ class Depend(NamedTuple):
 
 
 class RosDep(NamedTuple):
-    """A dependency on what is no ROS package."""
+    """A dependency on something other than a ROS package."""
 
     name: str
 
@@ -48,7 +48,7 @@ class Export:
         self.str = str
 
     def get(self, attr: str) -> str | None:
-        """The value of an attribute, or None."""
+        """Return the value of an attribute, or None."""
         return self.attrs.get(attr)
 
 
@@ -75,7 +75,7 @@ class Manifest:
         self.unknown_tags: list[str] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """The values of an attribute in the exports of a tag; ``${prefix}`` becomes the folder if ``convert``."""
+        """Return the values of an attribute in the exports of a tag; ``${prefix}`` becomes the folder if ``convert``."""
         values = [export.attrs[attr] for export in self.exports if export.tag == tag and attr in export.attrs]
         folder = os.path.dirname(self.filename)
         return [value.replace("${prefix}", folder) if convert else value for value in values]
@@ -91,7 +91,7 @@ def _people(read: manifest.Manifest) -> str:
 
 
 def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: Any = None) -> Manifest:
-    """The package.xml in a folder; every dependency counts as a package. Raises InvalidManifest."""
+    """Return the package.xml in a folder; every dependency counts as a package. Raises InvalidManifest."""
     from minirospy.workspace.manifest import read_manifest
 
     try:

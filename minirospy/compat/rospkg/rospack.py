@@ -1,7 +1,7 @@
 """rospkg's classes and functions, over Packages and Dependencies; `import rospkg` re-exports them.
 
-Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. Where rospkg asks rosdep's database which names
-are packages, ours asks the packages that it finds: the other names are rosdep keys.
+Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. Where rospkg looks into rosdep's database
+for names that are packages, ours takes the packages that it finds: the other names are rosdep keys.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 
 
 class ManifestManager:
-    """Packages, or stacks, below some folders. What is found is kept: a new object sees what is new on disk."""
+    """Packages, or stacks, below some folders. Results are cached: create a new object to see changes on disk."""
 
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
@@ -46,7 +46,7 @@ class ManifestManager:
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
-        """The one object for these folders."""
+        """Return the one object for these folders."""
         key: Any = cls
         found = _instance(key, tuple(get_ros_paths() if ros_paths is None else ros_paths))
         assert isinstance(found, cls)
@@ -58,26 +58,26 @@ class ManifestManager:
         return list(self._ros_paths)
 
     def get_ros_paths(self) -> Names:
-        """The folders that are searched."""
+        """Return the folders that are searched."""
         return self.ros_paths
 
     def list(self) -> Names:
-        """The names, sorted."""
+        """Return the names, sorted."""
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """The folder of one. Raises ResourceNotFound."""
+        """Return the folder of one. Raises ResourceNotFound."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
         return str(folders[name])
 
     def get_manifest(self, name: str) -> Manifest:
-        """The manifest of one. Raises ResourceNotFound, InvalidManifest."""
+        """Return the manifest of one. Raises ResourceNotFound, InvalidManifest."""
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """The packages that one names, or with ``implicit`` also what those need.
+        """Return the packages that one names, or with ``implicit`` also what those need.
 
         Raises ResourceNotFound, InvalidManifest.
         """
@@ -89,23 +89,23 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """The packages that name this one, or with ``implicit`` those that need it."""
+        """Return the packages that name this one, or with ``implicit`` those that need it."""
         found = []
         for other in self._folders():
             try:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
             except InvalidManifest:
-                # It is not what was asked for.
+                # It does not matter to other packages.
                 continue
         return found
 
     def get_custom_cache(self, key: Any, default: Any = None) -> Any:
-        """What the user kept here."""
+        """Return a value of the user's cache."""
         return self._custom.get(key, default)
 
     def set_custom_cache(self, key: Any, value: Any) -> None:
-        """Keep something."""
+        """Store a value in the user's cache."""
         self._custom[key] = value
 
     def _folders(self) -> dict[str, Path]:
@@ -119,7 +119,7 @@ class ManifestManager:
             raise InvalidManifest(str(error)) from error
 
     def _split(self, name: str) -> tuple[Names, Names]:
-        """The names in a manifest: those that are packages, those that are not."""
+        """Return the names in a manifest: those that are packages, those that are not."""
         from minirospy.workspace.manifest import Kind
 
         left_out = {Kind.DOC, Kind.BUILDTOOL_EXPORT}
@@ -140,7 +140,7 @@ class RosPack(ManifestManager):
     """Packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """The names in a manifest, or with ``implicit`` also in those that it needs, that are no packages.
+        """Return the names in a manifest, or with ``implicit`` also in those that it needs, that are not packages.
 
         Raises ResourceNotFound, InvalidManifest.
         """
@@ -148,7 +148,7 @@ class RosPack(ManifestManager):
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """The stack of a package: None, as catkin has no stacks. Raises ResourceNotFound."""
+        """Return the stack of a package: None, as catkin has no stacks. Raises ResourceNotFound."""
         self.get_path(package)
         return None
 
@@ -160,11 +160,11 @@ class RosStack(ManifestManager):
     """Metapackages."""
 
     def packages_of(self, stack: str) -> Names:
-        """The packages that a metapackage names. Raises ResourceNotFound, InvalidManifest."""
+        """Return the packages that a metapackage names. Raises ResourceNotFound, InvalidManifest."""
         return self.get_depends(stack, implicit=False)
 
     def get_stack_version(self, stack: str) -> str:
-        """The version of a metapackage. Raises ResourceNotFound, InvalidManifest."""
+        """Return the version of a metapackage. Raises ResourceNotFound, InvalidManifest."""
         return self._read(stack).version
 
     def _folders(self) -> dict[str, Path]:
@@ -177,7 +177,7 @@ def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> Manifes
 
 
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:
-    """The packages below a folder; their folders go into ``cache``."""
+    """Return the packages below a folder; their folders go into ``cache``."""
     found = {name: str(folder) for name, folder in Packages.below(Path(path)).folders().items()}
     for name, folder in found.items():
         cache.setdefault(name, folder)
@@ -185,7 +185,7 @@ def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[s
 
 
 def get_package_name(path: str) -> str | None:
-    """The package that a path is or lies in; None where it is in none."""
+    """Return the package that contains a path; None where none does."""
     place = Path(path).absolute()
     return next(filter(None, map(package_name, (place, *place.parents))), None)
 
@@ -193,7 +193,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """(packages, unknown names): names of metapackages become those of their packages."""
+    """Return (packages, unknown names): names of metapackages become those of their packages."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():
@@ -206,5 +206,5 @@ def expand_to_packages(
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str:
-    """The version in the package.xml of a folder. Raises InvalidManifest."""
+    """Return the version in the package.xml of a folder. Raises InvalidManifest."""
     return parse_manifest_file(stack_dir).version

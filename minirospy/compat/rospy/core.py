@@ -1,6 +1,6 @@
-"""What rospy.core and rospy.rostime offer beside the names of `minirospy.client`: the inside of a node's life.
+"""rospy.core: the life cycle of a node, in addition to the names of `minirospy.client`.
 
-Source: the behaviour of rospy.core and rospy.rostime; the log functions of rospy's own lines go to the log file only.
+Source: the behaviour of rospy.core; its internal log functions write to the log file only.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ logerror = logerr
 
 
 def is_initialized() -> bool:
-    """Whether init_node has been called."""
+    """Return whether init_node has been called."""
     return process.initialized
 
 
 def is_shutdown_requested() -> bool:
-    """Whether a shutdown has begun; while its hooks run, is_shutdown() is still false."""
+    """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
     return process.is_shutdown_requested
 
 
@@ -67,7 +67,7 @@ def add_shutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
-    """The same as rospy.on_shutdown."""
+    """Call ``h()`` at shutdown, as rospy.on_shutdown."""
     process.on_shutdown(h)
 
 
@@ -77,7 +77,7 @@ def register_signals() -> None:
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """ROS_ROOT of the environment. Raises ROSException where it is ``required`` and not set."""
+    """Return ROS_ROOT of the environment. Raises ROSException where it is ``required`` and not set."""
     root = (os.environ if env is None else env).get("ROS_ROOT")
     if required and not root:
         raise ROSException("ROS_ROOT is not set")
@@ -85,7 +85,7 @@ def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -
 
 
 def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
-    """(host, port) of a service's ``rosrpc://host:port``. Raises ParameterInvalid."""
+    """Return (host, port) of a service's ``rosrpc://host:port``. Raises ParameterInvalid."""
     if not uri.startswith(ROSRPC):
         raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
     try:
@@ -96,5 +96,5 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """A check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
     return valid_name(param_name)

@@ -1,4 +1,4 @@
-"""rospy.logger_level_service_caller, filled in by minirospy: the levels of other nodes' loggers.
+"""rospy.logger_level_service_caller: the levels of other nodes' loggers.
 
 Source: the behaviour of rospy's class, which rqt_logger_level and programs that make a noisy node quiet use.
 """
@@ -15,27 +15,27 @@ _GET, _SET = "/get_loggers", "/set_logger_level"
 
 
 class ROSConsoleException(Exception):
-    """A node does not tell its loggers."""
+    """A node does not report its loggers."""
 
 
 class LoggerLevelServiceCaller:
-    """Asks nodes for the levels of their loggers, and sets them."""
+    """Gets and sets the levels of other nodes' loggers."""
 
     def __init__(self) -> None:
         self._current_loggers: list[str] = []
         self._current_levels: dict[str, str] = {}
 
     def get_levels(self) -> list[str]:
-        """The levels, from the least severe on."""
+        """Return the levels, from the least severe on."""
         return ["debug", "info", "warn", "error", "fatal"]
 
     def get_node_names(self) -> list[str]:
-        """The nodes whose levels can be set."""
+        """Return the nodes whose levels can be set."""
         names = rosservice.get_service_list()
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
     def get_loggers(self, node: str) -> list[str]:
-        """The names of a node's loggers; keeps their levels. Raises ROSConsoleException."""
+        """Return the names of a node's loggers, and keep their levels. Raises ROSConsoleException."""
         try:
             _, response = rosservice.call_service(_service(node, _GET), [])
         except rosservice.ROSServiceException as error:
@@ -47,7 +47,7 @@ class LoggerLevelServiceCaller:
         return self._current_loggers
 
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
-        """Set a level; False where get_loggers() told that it is the same already.
+        """Set a level; return False where get_loggers() found it set already.
 
         Raises rosservice.ROSServiceException.
         """

@@ -1,4 +1,4 @@
-"""Messages with their length in front, as rospy.msg writes and reads them. Source: http://wiki.ros.org/ROS/TCPROS."""
+"""Messages with a length prefix, as rospy.msg writes and reads them. Source: http://wiki.ros.org/ROS/TCPROS."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def deserialize_messages(
     max_msgs: int | None = None,
     start: int = 0,
 ) -> None:
-    """Move the complete messages of ``b``, from ``start`` to where it stands, to ``msg_queue``.
+    """Move the complete messages of ``b``, from ``start`` to its position, to ``msg_queue``.
 
     At most ``max_msgs`` of them; ``queue_size`` keeps only so many, the newest. What is incomplete moves to the
     front of ``b``. Raises DeserializationError.

@@ -1,4 +1,4 @@
-"""The master as rospy.get_master() gives it: the Master API with its answers as they come, and parameters like a dict.
+"""The master that rospy.get_master() returns: the Master API with unchanged results, and parameters like a dict.
 
 Source: http://wiki.ros.org/ROS/Master_API and the behaviour of rospy.msproxy.
 """
@@ -73,9 +73,9 @@ class ServerProxy:
 
 
 class MasterProxy:
-    """The master at ``uri``: its API with this node's name put in front and names resolved, answers as they come.
+    """The master at ``uri``: its API with this node's name as first argument and names resolved, results unchanged.
 
-    ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``. Beside it
+    ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``. In addition
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
     are those of the parameters. Errors: see :class:`ServerProxy`.
     """
@@ -117,29 +117,29 @@ class MasterProxy:
         return iter(value if code == 1 else [])
 
     def search_param(self, key: str) -> str | None:
-        """The nearest parameter of this name, upwards from this node's namespace; None where there is none."""
+        """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none."""
         code, _, value = self.target.searchParam(process.name, key)
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
-        """A parameter's value, kept by this node. Raises KeyError."""
+        """Return a parameter's value from this node's cache. Raises KeyError."""
         return get_param_cached(key)
 
 
 def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
-    """The master of this node; an ``env`` of the caller's own names another by its ROS_MASTER_URI."""
+    """Return the master of this node, or of the ROS_MASTER_URI in an ``env`` that is not os.environ."""
     uri = None if env is os.environ else env.get("ROS_MASTER_URI")
     return _master(uri or process.environment.master_uri, os.getpid())
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """The XML-RPC server at ``uri``, of which there is one object; None where that is no URI."""
+    """Return the XML-RPC server at ``uri``, one object for each; None where that is not a URI."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# By process: a fork must not speak on its parent's connections.
+# One per process: a fork must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

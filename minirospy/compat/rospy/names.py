@@ -1,4 +1,4 @@
-"""What rospy.names offers beside the names of `minirospy.client`: mappings, and the checks of a call's arguments.
+"""rospy.names: remappings, and the validation of a call's arguments.
 
 Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
 """
@@ -49,11 +49,11 @@ REMAP = ":="
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
 Validator = Callable[[Any, str], str]
-"""Checks an argument of a call by the node ``caller_id``, and gives what to go on with."""
+"""Checks an argument of a call by the node ``caller_id``, and returns the value to use."""
 
 
 class ParameterInvalid(Exception):
-    """An argument of a call does not do."""
+    """An argument of a call is invalid."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
@@ -64,40 +64,40 @@ class ParameterInvalid(Exception):
 
 
 def get_mappings() -> dict[str, str]:
-    """The remappings of this node's command line as they are spelt, ``__name`` and its kin among them."""
+    """Return the remappings of this node's command line as they are spelled, ``__name`` and its like included."""
     return {**process.arguments.remappings, **process.arguments.special}
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """The same by global names; empty before init_node."""
+    """Return the remappings by global names; empty before init_node."""
     return {**process.remappings, **process.arguments.special} if process.initialized else {}
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
-    """The remappings in a command line, as they are spelt; private parameters are none."""
+    """Return the remappings in a command line, as they are spelled, without private parameters."""
     arguments = names.parse_arguments(argv)
     return {**arguments.remappings, **arguments.special}
 
 
 def reload_mappings(argv: Sequence[str]) -> None:
-    """Take ``argv`` for this node's command line."""
+    """Use ``argv`` as this node's command line."""
     process.reload_arguments(argv)
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings anew, as the node ``node_name`` sees them."""
+    """Resolve the remappings again, as the node ``node_name`` sees them."""
     process.remappings = process.arguments.resolved_remappings(node_name)
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """The global name of a topic before init_node. Raises ValueError on a private one."""
+    """Return the global name of a topic before init_node. Raises ValueError on a private one."""
     if names.is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return process.resolve_topic(name)
 
 
 def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """The namespace of a process, with slashes around it: ``__ns:=`` of its command line, or ROS_NAMESPACE."""
+    """Return the namespace of a process, with slashes around it: ``__ns:=`` of its command line, or ROS_NAMESPACE."""
     special = process.arguments.special if argv is None else names.parse_arguments(argv).special
     return make_global_ns(
         special.get("__ns") or (os.environ if env is None else env).get("ROS_NAMESPACE", "/")
@@ -105,53 +105,53 @@ def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] 
 
 
 def make_global_ns(name: str) -> str:
-    """``name`` as a namespace, with slashes around it. Raises ValueError on a private name."""
+    """Return ``name`` as a namespace, with slashes around it. Raises ValueError on a private name."""
     if names.is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
     return ("" if names.is_global(name) else "/") + name + ("" if name.endswith("/") or not name else "/")
 
 
 def namespace(name: str) -> str:
-    """The namespace that holds ``name``, with a slash at its end. Raises ValueError on None."""
+    """Return the namespace of ``name``, with a trailing slash. Raises ValueError on None."""
     if name is None:
         raise ValueError("name")
     return names.namespace_of(name)
 
 
 def ns_join(ns: str, name: str) -> str:
-    """``name`` below ``ns``; global and private names stay what they are."""
+    """Return ``name`` below ``ns``; global and private names stay what they are."""
     return names.join(ns, name)
 
 
 def canonicalize_name(name: str) -> str:
-    """``name`` without doubled or trailing slashes."""
+    """Return ``name`` without doubled or trailing slashes."""
     return names.canonicalize(name)
 
 
 def is_global(name: str) -> bool:
-    """Whether ``name`` starts at the root."""
+    """Return whether ``name`` starts at the root."""
     return bool(name) and names.is_global(name)
 
 
 def is_private(name: str) -> bool:
-    """Whether ``name`` starts with ``~``."""
+    """Return whether ``name`` starts with ``~``."""
     return bool(name) and names.is_private(name)
 
 
 def isstring(s: object) -> bool:
-    """Whether ``s`` is a text."""
+    """Return whether ``s`` is a str."""
     return isinstance(s, str)
 
 
 def scoped_name(caller_id: str, name: str) -> str:
-    """``name`` without the namespace of ``caller_id``. Raises ROSException where that is not global."""
+    """Return ``name`` without the namespace of ``caller_id``. Raises ROSException where that is not global."""
     if not is_global(caller_id):
         raise ROSException("caller_id must be global")
     return names.canonicalize(name)[len(names.namespace_of(caller_id)) :]
 
 
 def global_name(param_name: str) -> Validator:
-    """A check that the argument ``param_name`` is a global name. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid."""
 
     def validator(param_value: Any, caller_id: str) -> str:
         text = _text(param_name, param_value)
@@ -163,18 +163,18 @@ def global_name(param_name: str) -> Validator:
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Validator:
-    """A check that the argument ``param_name`` is a name, which it resolves. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a name, which it resolves. The check raises ParameterInvalid."""
     check = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
     return lambda param_value, caller_id: check(param_name, param_value, caller_id)
 
 
 def valid_name_validator_resolved(param_name: str, param_value: Any, caller_id: str) -> str:
-    """The global name of an argument, not remapped. Raises ParameterInvalid."""
+    """Return the global name of an argument, not remapped. Raises ParameterInvalid."""
     return names.resolve(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: Any, caller_id: str) -> str:
-    """An argument that is a name. Raises ParameterInvalid."""
+    """Return an argument that is a name. Raises ParameterInvalid."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

@@ -1,4 +1,4 @@
-"""rospy.rosconsole, filled in by minirospy: the command rosconsole."""
+"""rospy.rosconsole: the command rosconsole."""
 
 NAME = "rosconsole"
 

@@ -27,27 +27,27 @@ def wallsleep(duration: float) -> None:
 
 
 def is_wallclock() -> bool:
-    """Whether the node's time is the machine's, not a simulated one."""
+    """Return whether the node's time is the machine's, not a simulated one."""
     return not isinstance(process.clock, SimulatedClock)
 
 
 def get_rostime_cond() -> threading.Condition:
-    """What is notified of each simulated time."""
+    """Return the condition that is notified of each simulated time."""
     return process.time_changed
 
 
 def is_rostime_initialized() -> bool:
-    """Whether the time may be asked for."""
+    """Return whether the time is available."""
     return process.has_time
 
 
 def set_rostime_initialized(val: bool) -> None:
-    """Say that the time may be asked for, so that a program without a node can use Time.now()."""
+    """Make the time available, so that a program without a node can use Time.now()."""
     process.has_time = bool(val)
 
 
 def set_rostime(t: Any) -> None:
-    """Set the node's time, which is simulated from now on. Raises ValueError on what is no Time."""
+    """Set the node's time, which is simulated from now on. Raises ValueError where ``t`` is not a Time."""
     if not isinstance(t, Time):
         raise ValueError(f"must be Time instance: {t.__class__}")
     clock = process.clock
@@ -57,9 +57,9 @@ def set_rostime(t: Any) -> None:
 
 
 def switch_to_wallclock() -> None:
-    """Go by the machine's time from now on."""
+    """Use the machine's time from now on."""
     before, process.clock = process.clock, WallClock()
     if isinstance(before, SimulatedClock):
-        # Who sleeps by it wakes up.
+        # Wake the threads that sleep by it.
         before.set(process.clock.now())
     process.has_time = True

@@ -1,4 +1,4 @@
-"""rosservice, filled in by minirospy: what user code asks of services. Source: http://wiki.ros.org/rosservice."""
+"""rosservice: queries about services, and calls. Source: http://wiki.ros.org/rosservice."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NAME = "rosservice"
 
 
 class ROSServiceException(Exception):
-    """A service cannot be used as asked."""
+    """A request about a service failed."""
 
 
 class ROSServiceIOException(ROSServiceException):
@@ -49,7 +49,7 @@ class ROSServiceIOException(ROSServiceException):
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """The names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
+    """Return the names of the services (of a node, below a namespace); with ``include_nodes`` as [name, [nodes]]."""
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
         owner = graph.resolve(node) if node else None
@@ -58,7 +58,7 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """The type of a service; None where it is not there. Raises ROSServiceIOException where it does not answer."""
+    """Return the type of a service; None where it does not exist. Raises ROSServiceIOException where it does not answer."""
     with _graph() as graph:
         try:
             return services.service_type(graph, graph.resolve(service_name))
@@ -67,7 +67,7 @@ def get_service_type(service_name: str) -> str | None:
 
 
 def get_service_uri(service_name: str) -> str | None:
-    """Where a service is called; None where it is not there."""
+    """Return the URI of a service; None where it does not exist."""
     with _graph() as graph:
         try:
             return services.service_uri(graph, graph.resolve(service_name))
@@ -76,20 +76,20 @@ def get_service_uri(service_name: str) -> str | None:
 
 
 def get_service_node(service_name: str) -> str | None:
-    """The node that offers a service; None where it is not there."""
+    """Return the node that offers a service; None where it does not exist."""
     with _graph() as graph:
         nodes = graph.state().services.get(graph.resolve(service_name))
     return nodes[0] if nodes else None
 
 
 def get_service_args(service_name: str) -> str:
-    """The names of the fields of a service's request, with spaces between. Raises ROSServiceException."""
+    """Return the names of the fields of a service's request, with spaces between. Raises ROSServiceException."""
     with _graph() as graph:
         return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
 
 
 def get_service_class_by_name(service_name: str) -> Any:
-    """The class of a running service. Raises ROSServiceException where it is not there or not installed."""
+    """Return the class of a running service. Raises ROSServiceException where it does not exist or is not installed."""
     from minirospy.idl.load import service_class
 
     with _graph() as graph:
@@ -97,7 +97,7 @@ def get_service_class_by_name(service_name: str) -> Any:
 
 
 def rosservice_find(service_type: str) -> list[str]:
-    """The services of a type."""
+    """Return the services of a type."""
     with _graph() as graph:
         return services.find_services_of_type(graph, service_type)
 
@@ -105,7 +105,7 @@ def rosservice_find(service_type: str) -> list[str]:
 def call_service(
     service_name: str, service_args: Sequence[Any], service_class: Any = None
 ) -> tuple[Any, Any]:
-    """(request, response) of a call with the request's values. Raises ROSServiceException."""
+    """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
     with _graph() as graph:
         name = graph.resolve(service_name)
         type_ = service_class._type if service_class else services.service_type(graph, name)
@@ -114,18 +114,18 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """The connection header that a service answers with. Raises ROSServiceIOException where it does not."""
+    """Return the connection header that a service answers with. Raises ROSServiceIOException where it does not."""
     with _graph() as graph:
         return services.service_header(graph, graph.resolve(service_name), service_uri)
 
 
 def has_service_args(service_name: str, service_class: Any = None) -> bool:
-    """Whether a service's request has fields."""
+    """Return whether a service's request has fields."""
     return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
     from minirospy.cli.ros.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):

@@ -1,4 +1,4 @@
-"""rostopic, filled in by minirospy: what user code asks of topics. Source: http://wiki.ros.org/rostopic."""
+"""rostopic: queries about topics, and publishing. Source: http://wiki.ros.org/rostopic."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _LATCH_SECONDS = 3.0
 
 
 class ROSTopicException(Exception):
-    """A topic cannot be used as asked."""
+    """A request about a topic failed."""
 
 
 class ROSTopicIOException(ROSTopicException):
@@ -45,13 +45,13 @@ class ROSTopicIOException(ROSTopicException):
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """As programs expect it of ROS's get_topic_list, also an error of sockets."""
+    """Also an error of sockets, as programs expect of ROS's get_topic_list."""
 
 
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Any], Any] | None]:
-    """(type, topic, function that takes the field out of a message); three times None where it is not there.
+    """Return (type, topic, function that returns the field of a message); three times None where there is no topic.
 
     ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
     """
@@ -73,7 +73,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Any] | None, str | None, Callable[[Any], Any] | None]:
-    """Like :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
+    """Return the same as :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
     from minirospy.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -86,7 +86,7 @@ def get_topic_class(
 
 
 def get_topic_list(master: Any = None) -> tuple[list[Any], list[Any]]:
-    """(published, subscribed), each a list of (topic, type, nodes)."""
+    """Return (published, subscribed), each a list of (topic, type, nodes)."""
     with _graph(_NoMaster) as graph:
         found = topics.list_topics(graph)
     published, subscribed = ([(each.name, each.type, list(each.nodes)) for each in side] for side in found)
@@ -94,13 +94,13 @@ def get_topic_list(master: Any = None) -> tuple[list[Any], list[Any]]:
 
 
 def find_by_type(topic_type: str) -> list[str]:
-    """The topics of a type."""
+    """Return the topics of a type."""
     with _graph() as graph:
         return topics.find_topics_of_type(graph, topic_type)
 
 
 def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
-    """A function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
+    """Return a function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
 
     None, too, where the path does not parse, which is then said on stderr.
     """
@@ -113,7 +113,7 @@ def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
 
 
 def get_info_text(topic: str) -> str:
-    """The type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
+    """Return the type, publishers and subscribers of a topic, as `rostopic info` prints them. Raises ROSTopicException."""
     from minirospy.introspect.texts import topic_text
 
     with _graph() as graph:
@@ -124,7 +124,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """The URI of a node, or `unknown address` and its name. Raises ROSTopicIOException."""
+    """Return the URI of a node, or `unknown address` and its name. Raises ROSTopicIOException."""
     try:
         return master.lookupNode(caller_id)
     except masterapi.MasterException:
@@ -136,7 +136,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
 ) -> tuple[Any, type[Any]]:
-    """(publisher, message class) for a topic, by the type's name; makes the program a node, unless it is one.
+    """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
 
     Raises ROSTopicException where the type is not installed.
     """
@@ -167,7 +167,7 @@ def publish_message(
 ) -> None:
     """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
 
-    ``substitute_keywords``: `now` and `auto` are filled in anew for each. Raises ROSTopicException on values that do
+    ``substitute_keywords``: `now` and `auto` are replaced in each message. Raises ROSTopicException on values that do
     not fit.
     """
     import rospy
@@ -206,7 +206,7 @@ def publish_message(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """The command; ``argv`` begins with its name. Ends the program where it fails, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program where it fails, as ROS's does."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
@@ -214,13 +214,13 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 
 def _check_master() -> None:
-    """Raises ROSTopicIOException where no master answers."""
+    """Raise ROSTopicIOException where no master answers."""
     with _graph() as graph:
         graph.master.get_pid()
 
 
 def _master_get_topic_types(master: masterapi.Master) -> Any:
-    """[[topic, type]] of all that the master knows."""
+    """Return [[topic, type]] of all topics that the master knows."""
     return master.getTopicTypes()
 
 
@@ -273,7 +273,7 @@ def _rostopic_echo(
 
 
 def _is_shutdown() -> bool:
-    """Whether the program is a node that shuts down; one that never imported rospy is none."""
+    """Return whether the program is a node that shuts down; one that never imported rospy is none."""
     rospy: Any = sys.modules.get("rospy")
     return rospy is not None and bool(rospy.is_shutdown())
 

@@ -1,4 +1,4 @@
-"""The printing of messages that user code hangs into a subscriber, or derives from."""
+"""The printing of messages in user code, as callback of a subscriber or base class."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class CallbackEcho:
 
 
 def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
-    """A function for `strify_message` that leaves out fields that are texts, or arrays."""
+    """Return a function for `strify_message` that leaves out fields that are texts, or arrays."""
 
     def fields(message: Any) -> list[str]:
         return [
@@ -113,5 +113,5 @@ def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
 
 
 def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> ValueTransform:
-    """A function of (value, type) that puts a note in the place of texts, or of arrays."""
+    """Return a function of (value, type) that replaces texts, or arrays, by a note."""
     return lambda value, type_: elided(value, str(type_ or ""), not echo_nostr, not echo_noarr)

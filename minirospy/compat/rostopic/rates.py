@@ -1,4 +1,4 @@
-"""The measuring of rates, bandwidths and delays that user code hangs into a subscriber."""
+"""The measuring of rates, bandwidths and delays in user code, as callbacks of a subscriber."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class ROSTopicHz:
         self._windows: dict[str | None, RateWindow] = {}
 
     def callback_hz(self, m: Any, topic: str | None = None) -> None:
-        """A message has come."""
+        """Count a message."""
         if self.filter_expr is None or self.filter_expr(m):
             now = time.time() if self.use_wtime else _now()
             with self.lock:
                 self._window(topic).add(now)
 
     def get_hz(self, topic: str | None = None) -> Statistics | None:
-        """(rate, least pause, longest pause, standard deviation, messages); None where nothing new has come."""
+        """Return (rate, least pause, longest pause, standard deviation, messages); None where no new message has arrived."""
         report = self._report(topic)
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
@@ -77,7 +77,7 @@ class ROSTopicBandwidth:
         self.sizes: list[int] = []
 
     def callback(self, data: Any) -> None:
-        """A message has come."""
+        """Count a message."""
         with self.lock:
             self.times.append(time.time())
             self.sizes.append(len(data._buff or b""))
@@ -104,7 +104,7 @@ class ROSTopicDelay:
         self._window = DelayWindow(self.window_size)
 
     def callback_delay(self, msg: Any) -> None:
-        """A message has come; one that has no header is told of in the log."""
+        """Measure the delay of a message; log an error where it has no header."""
         if not msg._has_header:
             import rospy
 
@@ -115,7 +115,7 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """(mean, least, longest, standard deviation, messages); None where nothing new has come."""
+        """Return (mean, least, longest, standard deviation, messages); None where no new message has arrived."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 

@@ -1,3 +1,3 @@
-"""rosunit, filled in by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
+"""rosunit: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
 
 __version__ = "1.0.0"

@@ -1,10 +1,10 @@
-"""roswtf, filled in by minirospy: what is wrong with a graph. Source: http://wiki.ros.org/roswtf."""
+"""roswtf: what is wrong with a graph. Source: http://wiki.ros.org/roswtf."""
 
 __all__ = ["roswtf_main"]
 
 
 def roswtf_main() -> None:
-    """The command on this process's command line; ends the process."""
+    """Run the command on this process's command line, and exit."""
     import sys
 
     from minirospy.cli.doctor import roswtf

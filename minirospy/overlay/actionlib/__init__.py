@@ -1,4 +1,4 @@
-"""actionlib, filled in by minirospy.
+"""actionlib, provided by minirospy.
 
 Without a list of its names, as in ROS: `from actionlib import *` brings GoalStatus and the modules, too.
 """

@@ -1,4 +1,4 @@
-"""actionlib.action_client, filled in by minirospy."""
+"""actionlib.action_client, provided by minirospy."""
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import Header

@@ -1,4 +1,4 @@
-"""actionlib.action_server, filled in by minirospy."""
+"""actionlib.action_server, provided by minirospy."""
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 

@@ -1,4 +1,4 @@
-"""actionlib.exceptions, filled in by minirospy."""
+"""actionlib.exceptions, provided by minirospy."""
 
 from minirospy.actionlib import ActionException
 

@@ -1,4 +1,4 @@
-"""actionlib.goal_id_generator, filled in by minirospy."""
+"""actionlib.goal_id_generator, provided by minirospy."""
 
 from minirospy.actionlib import GoalIDGenerator
 

@@ -1,4 +1,4 @@
-"""actionlib.handle_tracker_deleter, filled in by minirospy."""
+"""actionlib.handle_tracker_deleter, provided by minirospy."""
 
 from minirospy.actionlib import HandleTrackerDeleter
 

@@ -1,4 +1,4 @@
-"""actionlib.server_goal_handle, filled in by minirospy."""
+"""actionlib.server_goal_handle, provided by minirospy."""
 
 from minirospy.actionlib import ServerGoalHandle
 

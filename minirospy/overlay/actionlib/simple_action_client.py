@@ -1,4 +1,4 @@
-"""actionlib.simple_action_client, filled in by minirospy."""
+"""actionlib.simple_action_client, provided by minirospy."""
 
 from actionlib_msgs.msg import GoalStatus
 

@@ -1,4 +1,4 @@
-"""actionlib.simple_action_server, filled in by minirospy."""
+"""actionlib.simple_action_server, provided by minirospy."""
 
 from actionlib_msgs.msg import GoalStatus
 

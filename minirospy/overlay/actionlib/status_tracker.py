@@ -1,4 +1,4 @@
-"""actionlib.status_tracker, filled in by minirospy."""
+"""actionlib.status_tracker, provided by minirospy."""
 
 from minirospy.actionlib import StatusTracker
 

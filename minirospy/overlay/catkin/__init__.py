@@ -1,1 +1,1 @@
-"""catkin, filled in by minirospy: where the workspaces are, and files in them. Builds are catkin_make's business."""
+"""catkin, provided by minirospy: the workspaces of the environment."""

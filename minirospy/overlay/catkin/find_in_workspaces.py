@@ -1,4 +1,4 @@
-"""catkin.find_in_workspaces, filled in by minirospy: the files of a package in all workspaces."""
+"""catkin.find_in_workspaces, provided by minirospy: the files of a package in all workspaces."""
 
 from minirospy.compat.catkin.find_in_workspaces import find_in_workspaces
 from minirospy.compat.catkin.workspace import get_source_paths as get_source_paths

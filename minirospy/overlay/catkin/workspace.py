@@ -1,4 +1,4 @@
-"""catkin.workspace, filled in by minirospy: the workspaces of the environment."""
+"""catkin.workspace, provided by minirospy: the workspaces of the environment."""
 
 from minirospy.compat.catkin.workspace import CATKIN_MARKER_FILE, get_source_paths, get_workspaces
 

@@ -1,7 +1,4 @@
-"""genmsg, filled in by minirospy: definitions as programs read them that generate code.
-
-Templates in Empy (genmsg.template_tools) are not part of it. Source: http://docs.ros.org/api/genmsg/html/.
-"""
+"""genmsg, provided by minirospy: definitions of messages and services, as code generators read them."""
 
 from genmsg import base as base
 from genmsg import gentools as gentools

@@ -1,4 +1,4 @@
-"""genmsg.base, filled in by minirospy."""
+"""genmsg.base, provided by minirospy."""
 
 from minirospy.compat.genmsg.base import (
     COMMENTCHAR,

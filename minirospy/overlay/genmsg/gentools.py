@@ -1,4 +1,4 @@
-"""genmsg.gentools, filled in by minirospy: md5sums and full texts."""
+"""genmsg.gentools, provided by minirospy: md5sums and full texts."""
 
 from minirospy.compat.genmsg.gentools import compute_full_text, compute_md5, compute_md5_text
 

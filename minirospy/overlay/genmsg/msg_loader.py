@@ -1,4 +1,4 @@
-"""genmsg.msg_loader, filled in by minirospy: specs from texts and files."""
+"""genmsg.msg_loader, provided by minirospy."""
 
 from genmsg.base import COMMENTCHAR, CONSTCHAR, EXT_MSG, EXT_SRV, IODELIM, SEP
 from genmsg.msgs import (

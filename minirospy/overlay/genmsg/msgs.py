@@ -1,4 +1,4 @@
-"""genmsg.msgs, filled in by minirospy: types and specs of messages."""
+"""genmsg.msgs, provided by minirospy: types, fields and constants of messages."""
 
 from genmsg.base import EXT_MSG, MSG_DIR, SEP, InvalidMsgSpec
 from minirospy.compat.genmsg.msgs import (

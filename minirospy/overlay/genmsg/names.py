@@ -1,4 +1,4 @@
-"""genmsg.names, filled in by minirospy: names of resources (``package/name``)."""
+"""genmsg.names, provided by minirospy: names of resources (``package/name``)."""
 
 from roslib.names import (
     PRN_SEPARATOR,

@@ -1,4 +1,4 @@
-"""genmsg.srvs, filled in by minirospy."""
+"""genmsg.srvs, provided by minirospy: the spec of a service."""
 
 from minirospy.compat.genmsg.srvs import SrvSpec
 

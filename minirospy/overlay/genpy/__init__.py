@@ -1,4 +1,4 @@
-"""genpy, filled in by minirospy: what generated messages and user code import of it."""
+"""genpy, provided by minirospy: what generated messages import."""
 
 from genpy import base as base
 from genpy import dynamic as dynamic

@@ -1,4 +1,4 @@
-"""genpy.base, filled in by minirospy."""
+"""genpy.base, provided by minirospy: the types that `struct` packs."""
 
 from minirospy.compat.genpy.base import SIMPLE_TYPES, SIMPLE_TYPES_DICT, MsgGenerationException, is_simple
 

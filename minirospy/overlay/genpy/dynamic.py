@@ -1,4 +1,4 @@
-"""genpy.dynamic, filled in by minirospy: message classes from a full text."""
+"""genpy.dynamic, provided by minirospy: message classes from a full text."""
 
 from minirospy.compat.genpy.base import MsgGenerationException
 from minirospy.compat.genpy.dynamic import generate_dynamic

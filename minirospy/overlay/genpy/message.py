@@ -1,4 +1,4 @@
-"""genpy.message, filled in by minirospy."""
+"""genpy.message, provided by minirospy."""
 
 from minirospy.compat.genpy.base import is_simple
 from minirospy.compat.genpy.message import (

@@ -1,4 +1,4 @@
-"""genpy.rostime, filled in by minirospy."""
+"""genpy.rostime, provided by minirospy."""
 
 from minirospy.times import Duration, Time, TVal
 

@@ -1,4 +1,4 @@
-"""rosclean, filled in by minirospy: how much log files take. Source: http://wiki.ros.org/rosclean."""
+"""rosclean, provided by minirospy: how much log files take. Source: http://wiki.ros.org/rosclean."""
 
 from minirospy.compat.rosclean import (
     CleanupException,

@@ -1,4 +1,4 @@
-"""rosgraph, filled in by minirospy: the master as Python code asks it, names, the environment."""
+"""rosgraph, provided by minirospy: the Master API, names and the environment for Python code."""
 
 from minirospy.compat.rosgraph import __getattr__ as __getattr__
 from minirospy.compat.rosgraph import myargv

@@ -1,4 +1,4 @@
-"""The master as Python code asks it; answers as ROS's own lists. Source: http://wiki.ros.org/ROS/Master_API."""
+"""rosgraph.masterapi, provided by minirospy."""
 
 from minirospy.compat.rosgraph.masterapi import (
     Error,

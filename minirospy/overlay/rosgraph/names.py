@@ -1,4 +1,4 @@
-"""Names, under the words of rosgraph. Source: http://wiki.ros.org/Names."""
+"""rosgraph.names, provided by minirospy."""
 
 from minirospy.compat.rosgraph.names import (
     ANYTYPE,

@@ -1,7 +1,4 @@
-"""How this machine is reached, and connection headers, under the words of rosgraph.
-
-Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
-"""
+"""rosgraph.network, provided by minirospy."""
 
 from minirospy.compat.rosgraph.network import (
     ROSHandshakeException,

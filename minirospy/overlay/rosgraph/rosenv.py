@@ -1,4 +1,4 @@
-"""What the environment says, under the words of rosgraph."""
+"""rosgraph.rosenv, provided by minirospy."""
 
 from minirospy.compat.rosgraph.rosenv import (
     DEFAULT_MASTER_URI,

@@ -1,4 +1,4 @@
-"""rosgraph.roslogging, filled in by minirospy: the handler that logging configuration files name and programs derive from."""
+"""rosgraph.roslogging, provided by minirospy: the handler that logging configuration files name and programs derive from."""
 
 from minirospy.client.log import RosStreamHandler
 from minirospy.compat.rosgraph.roslogging import LoggingException, RospyLogger, configure_logging

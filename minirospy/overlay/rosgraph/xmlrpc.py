@@ -1,7 +1,4 @@
-"""rosgraph.xmlrpc, filled in by minirospy: an XML-RPC server in a thread, for tools that are nodes by hand.
-
-Our own nodes do not use it; it stands on Python's xmlrpc.
-"""
+"""rosgraph.xmlrpc, provided by minirospy: an XML-RPC server in a thread, for tools that are nodes by hand."""
 
 from xmlrpc.server import SimpleXMLRPCRequestHandler as SimpleXMLRPCRequestHandler
 from xmlrpc.server import SimpleXMLRPCServer as SimpleXMLRPCServer

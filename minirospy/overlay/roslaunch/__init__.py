@@ -1,4 +1,4 @@
-"""roslaunch, filled in by minirospy. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
+"""roslaunch, provided by minirospy."""
 
 from minirospy.compat.roslaunch import NAME, configure_logging, main, write_pid_file
 from minirospy.compat.roslaunch.config import ROSLaunchConfig

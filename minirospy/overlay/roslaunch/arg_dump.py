@@ -1,4 +1,4 @@
-"""roslaunch.arg_dump, filled in by minirospy."""
+"""roslaunch.arg_dump, provided by minirospy."""
 
 from minirospy.compat.roslaunch.arg_dump import get_args
 

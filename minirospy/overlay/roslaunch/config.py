@@ -1,4 +1,4 @@
-"""roslaunch.config, filled in by minirospy."""
+"""roslaunch.config, provided by minirospy."""
 
 from minirospy.compat.roslaunch.config import (
     ROSLaunchConfig,

@@ -1,4 +1,4 @@
-"""roslaunch.core, filled in by minirospy: nodes, parameters and machines, and what roslaunch says."""
+"""roslaunch.core, provided by minirospy: nodes, parameters and machines, and the output of roslaunch."""
 
 from minirospy.compat.roslaunch.core import (
     PHASE_RUN,

@@ -1,4 +1,4 @@
-"""roslaunch.depends, filled in by minirospy: what launch files need."""
+"""roslaunch.depends, provided by minirospy: what launch files need."""
 
 from minirospy.cli.ros.roslaunch_deps import main as roslaunch_deps_main
 from minirospy.compat.roslaunch.depends import NAME, RoslaunchDeps, RoslaunchDepsException, roslaunch_deps

@@ -1,4 +1,4 @@
-"""roslaunch.launch, filled in by minirospy."""
+"""roslaunch.launch, provided by minirospy: run a configuration that the program has made."""
 
 from minirospy.compat.roslaunch.core import Machine, Master, Node, Param, RLException, Test
 from minirospy.compat.roslaunch.launch import ROSLaunchRunner

@@ -1,4 +1,4 @@
-"""roslaunch.loader, filled in by minirospy."""
+"""roslaunch.loader, provided by minirospy."""
 
 import rosparam as rosparam
 

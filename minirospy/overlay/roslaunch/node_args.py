@@ -1,4 +1,4 @@
-"""roslaunch.node_args, filled in by minirospy."""
+"""roslaunch.node_args, provided by minirospy."""
 
 from minirospy.compat.roslaunch.config import load_config_default as load_config_default
 from minirospy.compat.roslaunch.node_args import (

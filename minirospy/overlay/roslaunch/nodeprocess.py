@@ -1,4 +1,4 @@
-"""roslaunch.nodeprocess, filled in by minirospy."""
+"""roslaunch.nodeprocess, provided by minirospy."""
 
 from minirospy.compat.roslaunch.core import Machine, Master, Node, RLException
 from minirospy.compat.roslaunch.nodeprocess import DEFAULT_TIMEOUT_SIGINT, DEFAULT_TIMEOUT_SIGTERM

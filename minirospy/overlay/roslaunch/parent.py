@@ -1,4 +1,4 @@
-"""roslaunch.parent, filled in by minirospy."""
+"""roslaunch.parent, provided by minirospy."""
 
 from minirospy.compat.roslaunch.config import load_config_default
 from minirospy.compat.roslaunch.core import RLException

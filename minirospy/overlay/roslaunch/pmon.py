@@ -1,4 +1,4 @@
-"""roslaunch.pmon, filled in by minirospy."""
+"""roslaunch.pmon, provided by minirospy."""
 
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.pmon import (

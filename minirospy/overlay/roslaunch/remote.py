@@ -1,4 +1,4 @@
-"""roslaunch.remote, filled in by minirospy: programs import it, though ROSLaunchParent alone starts other machines' nodes."""
+"""roslaunch.remote, provided by minirospy: programs import it, though ROSLaunchParent alone starts other machines' nodes."""
 
 from minirospy.compat.roslaunch.core import RLException, is_machine_local
 

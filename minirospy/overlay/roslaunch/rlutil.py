@@ -1,4 +1,4 @@
-"""roslaunch.rlutil, filled in by minirospy."""
+"""roslaunch.rlutil, provided by minirospy."""
 
 from minirospy.compat.roslaunch.rlutil import (
     change_terminal_name,

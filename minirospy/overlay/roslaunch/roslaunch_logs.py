@@ -1,4 +1,4 @@
-"""roslaunch.roslaunch_logs, filled in by minirospy: where the log files of the present run lie."""
+"""roslaunch.roslaunch_logs, provided by minirospy: the log folder of the current run."""
 
 from minirospy.cli.ros.roslaunch_logs import get_run_id
 from minirospy.cli.ros.roslaunch_logs import main as logs_main

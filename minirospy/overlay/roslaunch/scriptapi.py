@@ -1,4 +1,4 @@
-"""roslaunch.scriptapi, filled in by minirospy."""
+"""roslaunch.scriptapi, provided by minirospy: start nodes one by one from a program."""
 
 from minirospy.compat.roslaunch.core import Master, Node, RLException
 from minirospy.compat.roslaunch.scriptapi import ROSLaunch

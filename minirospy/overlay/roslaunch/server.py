@@ -1,4 +1,4 @@
-"""roslaunch.server, filled in by minirospy: what programs take from it; the parent's server is no business of theirs."""
+"""roslaunch.server, provided by minirospy: the names that programs import from it."""
 
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.compat.roslaunch.pmon import Process, ProcessListener

@@ -1,4 +1,4 @@
-"""roslaunch.substitution_args, filled in by minirospy."""
+"""roslaunch.substitution_args, provided by minirospy: `$(find ...)` and the other substitution arguments."""
 
 from minirospy.compat.roslaunch.substitution_args import ArgException, SubstitutionException, resolve_args
 

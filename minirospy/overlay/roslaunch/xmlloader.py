@@ -1,4 +1,4 @@
-"""roslaunch.xmlloader, filled in by minirospy."""
+"""roslaunch.xmlloader, provided by minirospy: launch files into a configuration."""
 
 from minirospy.compat.roslaunch.core import Machine, Node, Param, RLException, Test
 from minirospy.compat.roslaunch.substitution_args import ArgException, SubstitutionException

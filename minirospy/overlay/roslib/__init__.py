@@ -1,4 +1,4 @@
-"""roslib, filled in by minirospy. Source: http://wiki.ros.org/roslib."""
+"""roslib, provided by minirospy."""
 
 from minirospy.compat.roslib import is_interactive, set_interactive
 from minirospy.compat.roslib.launcher import load_manifest

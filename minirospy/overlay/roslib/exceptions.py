@@ -1,4 +1,4 @@
-"""roslib.exceptions, filled in by minirospy."""
+"""roslib.exceptions, provided by minirospy."""
 
 from minirospy.compat.roslib.exceptions import ROSLibException
 

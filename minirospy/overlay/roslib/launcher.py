@@ -1,4 +1,4 @@
-"""roslib.launcher, filled in by minirospy."""
+"""roslib.launcher, provided by minirospy: a package and what it needs on sys.path."""
 
 from minirospy.compat.roslib.launcher import load_manifest
 

@@ -1,4 +1,4 @@
-"""roslib.message, filled in by minirospy: genpy's names under those of old."""
+"""roslib.message, provided by minirospy: genpy's names under their former module."""
 
 from genpy.message import (
     DeserializationError,

@@ -1,4 +1,4 @@
-"""roslib.msgs, filled in by minirospy: of genmsg's names under those of old, what programs ask of types."""
+"""roslib.msgs, provided by minirospy: queries about types, with genmsg's functions under their former names."""
 
 from genmsg.msgs import (
     BUILTIN_TYPES,

@@ -1,4 +1,4 @@
-"""roslib.names, filled in by minirospy: rosgraph's names, and those of resources (``package/name``)."""
+"""roslib.names, provided by minirospy: rosgraph's names, and those of resources (``package/name``)."""
 
 from rosgraph.names import (
     ANYTYPE,

@@ -1,4 +1,4 @@
-"""roslib.network, filled in by minirospy: rosgraph's names under those of old."""
+"""roslib.network, provided by minirospy: rosgraph's names under their former module."""
 
 from rosgraph.network import (
     ROS_HOSTNAME,

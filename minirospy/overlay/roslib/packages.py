@@ -1,4 +1,4 @@
-"""roslib.packages, filled in by minirospy."""
+"""roslib.packages, provided by minirospy."""
 
 from minirospy.compat.roslib.packages import (
     ROS_PACKAGE_PATH,

@@ -1,4 +1,4 @@
-"""roslib.rosenv, filled in by minirospy: what the environment says, under the words of old."""
+"""roslib.rosenv, provided by minirospy: values of the environment, with roslib's former names."""
 
 from rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
 

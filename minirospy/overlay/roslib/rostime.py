@@ -1,4 +1,4 @@
-"""roslib.rostime, filled in by minirospy: genpy's names under those of old."""
+"""roslib.rostime, provided by minirospy: genpy's names under their former module."""
 
 from minirospy.times import Duration, Time, TVal
 

@@ -1,4 +1,4 @@
-"""roslib.scriptutil, filled in by minirospy: the master as scripts of old ask for it."""
+"""roslib.scriptutil, provided by minirospy: the master, as old scripts get it."""
 
 from rosgraph.names import script_resolve_name
 

@@ -1,4 +1,4 @@
-"""rosmaster, filled in by minirospy: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
+"""rosmaster, provided by minirospy: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
 
 from minirospy.compat.rosmaster import rosmaster_main
 from rosmaster import master as master

@@ -1,4 +1,4 @@
-"""rosmaster.master, filled in by minirospy: a master inside a program, as tests start one."""
+"""rosmaster.master, provided by minirospy: a master inside a program, as tests start one."""
 
 from minirospy.compat.rosmaster.master import Master
 from minirospy.environment import DEFAULT_MASTER_PORT

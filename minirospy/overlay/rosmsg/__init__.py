@@ -1,4 +1,4 @@
-"""rosmsg, filled in by minirospy: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
+"""rosmsg, provided by minirospy: the types that are installed. Source: http://wiki.ros.org/rosmsg."""
 
 from minirospy.compat.rosmsg import (
     MODE_MSG,

@@ -1,4 +1,4 @@
-"""rosnode, filled in by minirospy: what user code asks of nodes. Source: http://wiki.ros.org/rosnode."""
+"""rosnode, provided by minirospy: queries about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
 
 import rosgraph as rosgraph
 

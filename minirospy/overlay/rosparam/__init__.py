@@ -1,4 +1,4 @@
-"""rosparam, filled in by minirospy: parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
+"""rosparam, provided by minirospy: parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
 
 import yaml as yaml
 from rosgraph.names import (

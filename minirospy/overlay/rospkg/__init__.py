@@ -1,4 +1,4 @@
-"""rospkg, filled in by minirospy: where packages are, and what they need."""
+"""rospkg, provided by minirospy: where packages are, and what they need."""
 
 from minirospy.compat.rospkg import __version__ as __version__
 from minirospy.compat.rospkg.common import MANIFEST_FILE as MANIFEST_FILE

@@ -1,4 +1,4 @@
-"""rospkg.common, filled in by minirospy."""
+"""rospkg.common, provided by minirospy: file names, and the error of a name that is not found."""
 
 from minirospy.compat.rospkg.common import (
     MANIFEST_FILE,

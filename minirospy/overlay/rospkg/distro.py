@@ -1,4 +1,4 @@
-"""rospkg.distro, filled in by minirospy."""
+"""rospkg.distro, provided by minirospy: the distribution of ROS that the environment names."""
 
 from minirospy.compat.rospkg.distro import current_distro_codename
 

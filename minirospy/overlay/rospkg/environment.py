@@ -1,4 +1,4 @@
-"""rospkg.environment, filled in by minirospy: the names of variables, and what they say."""
+"""rospkg.environment, provided by minirospy: the names of variables, and what they are set to."""
 
 from minirospy.compat.rospkg.environment import (
     ROS_ETC_DIR,

@@ -1,4 +1,4 @@
-"""rospkg.manifest, filled in by minirospy."""
+"""rospkg.manifest, provided by minirospy: a package.xml as rospkg shows it."""
 
 from minirospy.compat.rospkg.manifest import (
     Depend,

@@ -1,4 +1,4 @@
-"""rospkg.rospack, filled in by minirospy."""
+"""rospkg.rospack, provided by minirospy."""
 
 from minirospy.compat.rospkg.rospack import (
     ManifestManager,

@@ -1,4 +1,4 @@
-"""rospy, filled in by minirospy."""
+"""rospy, provided by minirospy."""
 
 from std_msgs.msg import Header as Header
 

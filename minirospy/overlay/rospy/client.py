@@ -1,4 +1,4 @@
-"""rospy.client, filled in by minirospy."""
+"""rospy.client, provided by minirospy."""
 
 from roscpp.msg import Logger
 from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse

@@ -1,4 +1,4 @@
-"""rospy.core, filled in by minirospy."""
+"""rospy.core, provided by minirospy: the life cycle of a node, in addition to the names of `minirospy.client`."""
 
 from logging import NullHandler as NullHandler
 

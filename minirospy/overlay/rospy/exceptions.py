@@ -1,4 +1,4 @@
-"""rospy.exceptions, filled in by minirospy."""
+"""rospy.exceptions, provided by minirospy."""
 
 from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.time import ROSTimeMovedBackwardsException

@@ -1,7 +1,4 @@
-"""rospy.logger_level_service_caller, filled in by minirospy: the levels of other nodes' loggers.
-
-Source: the behaviour of rospy's class, which rqt_logger_level and programs that make a noisy node quiet use.
-"""
+"""rospy.logger_level_service_caller, provided by minirospy: the levels of other nodes' loggers."""
 
 import rosservice as rosservice
 

@@ -1,4 +1,4 @@
-"""rospy.msg, filled in by minirospy."""
+"""rospy.msg, provided by minirospy."""
 
 from minirospy.client.topics import AnyMsg
 from minirospy.compat.rospy.msg import deserialize_messages, serialize_message

@@ -1,4 +1,4 @@
-"""rospy.msproxy, filled in by minirospy."""
+"""rospy.msproxy, provided by minirospy."""
 
 from minirospy.compat.rospy.msproxy import MasterProxy
 

@@ -1,4 +1,4 @@
-"""rospy.names, filled in by minirospy."""
+"""rospy.names, provided by minirospy: remappings, and the validation of a call's arguments."""
 
 from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
 from minirospy.compat.rospy.names import (

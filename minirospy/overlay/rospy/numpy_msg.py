@@ -1,4 +1,4 @@
-"""rospy.numpy_msg, filled in by minirospy: message classes whose arrays are numpy arrays."""
+"""rospy.numpy_msg, provided by minirospy: message classes whose arrays are numpy arrays."""
 
 from minirospy.idl.arrays import numpy_class as numpy_msg
 

@@ -1,4 +1,4 @@
-"""rospy.rosconsole, filled in by minirospy: the command rosconsole."""
+"""rospy.rosconsole, provided by minirospy: the command rosconsole."""
 
 from minirospy.cli.ros.rosconsole import main
 from minirospy.compat.rospy.rosconsole import NAME

@@ -1,4 +1,4 @@
-"""rospy.rostime, filled in by minirospy."""
+"""rospy.rostime, provided by minirospy: the clock of the node, which a program may set."""
 
 from minirospy.client.time import Duration, Time, get_rostime, get_time
 from minirospy.compat.rospy.rostime import (

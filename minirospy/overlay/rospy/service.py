@@ -1,4 +1,4 @@
-"""rospy.service, filled in by minirospy."""
+"""rospy.service, provided by minirospy."""
 
 from minirospy.client.services import Service as Service
 from minirospy.client.services import ServiceProxy as ServiceProxy

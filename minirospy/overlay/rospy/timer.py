@@ -1,4 +1,4 @@
-"""rospy.timer, filled in by minirospy."""
+"""rospy.timer, provided by minirospy."""
 
 from minirospy.client.time import Rate, Timer, TimerEvent, sleep
 

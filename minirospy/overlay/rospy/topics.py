@@ -1,4 +1,4 @@
-"""rospy.topics, filled in by minirospy."""
+"""rospy.topics, provided by minirospy."""
 
 from minirospy.client.topics import Publisher as Publisher
 from minirospy.client.topics import SubscribeListener as SubscribeListener

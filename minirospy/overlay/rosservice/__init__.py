@@ -1,4 +1,4 @@
-"""rosservice, filled in by minirospy: what user code asks of services. Source: http://wiki.ros.org/rosservice."""
+"""rosservice, provided by minirospy: queries about services, and calls. Source: http://wiki.ros.org/rosservice."""
 
 from minirospy.compat.rosservice import (
     NAME,

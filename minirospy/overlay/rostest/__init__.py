@@ -1,4 +1,4 @@
-"""rostest, filled in by minirospy: tests that are nodes. Source: http://wiki.ros.org/rostest."""
+"""rostest, provided by minirospy: tests that are nodes. Source: http://wiki.ros.org/rostest."""
 
 from minirospy.compat.rostest import rostestmain
 from minirospy.testing.node import get_master, is_publisher, is_subscriber, rosrun, run, unitrun

@@ -1,4 +1,4 @@
-"""rostopic, filled in by minirospy: what user code asks of topics. Source: http://wiki.ros.org/rostopic."""
+"""rostopic, provided by minirospy: queries about topics, and publishing. Source: http://wiki.ros.org/rostopic."""
 
 import rosgraph as rosgraph
 

@@ -1,4 +1,4 @@
-"""rosunit, filled in by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
+"""rosunit, provided by minirospy: unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
 
 from minirospy.compat.rosunit import __version__ as __version__
 from minirospy.testing.unit import (

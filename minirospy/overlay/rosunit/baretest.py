@@ -1,4 +1,4 @@
-"""rosunit.baretest, filled in by minirospy."""
+"""rosunit.baretest, provided by minirospy."""
 
 from minirospy.testing.unit import print_runner_summary, print_unittest_summary
 

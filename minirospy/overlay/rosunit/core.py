@@ -1,4 +1,4 @@
-"""rosunit.core, filled in by minirospy."""
+"""rosunit.core, provided by minirospy."""
 
 from minirospy.testing.unit import (
     XML_OUTPUT_FLAG,

@@ -1,4 +1,4 @@
-"""rosunit.junitxml, filled in by minirospy: files of test results."""
+"""rosunit.junitxml, provided by minirospy: files of test results."""
 
 from minirospy.testing.junit import (
     Result,

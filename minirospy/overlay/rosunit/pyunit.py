@@ -1,4 +1,4 @@
-"""rosunit.pyunit, filled in by minirospy."""
+"""rosunit.pyunit, provided by minirospy."""
 
 from minirospy.testing.unit import XML_OUTPUT_FLAG, create_xml_runner, print_unittest_summary, unitrun
 

@@ -1,4 +1,4 @@
-"""rosunit.xmlrunner, filled in by minirospy."""
+"""rosunit.xmlrunner, provided by minirospy."""
 
 from minirospy.testing.unit import XMLTestRunner
 

@@ -1,4 +1,4 @@
-"""roswtf, filled in by minirospy: what is wrong with a graph. Source: http://wiki.ros.org/roswtf."""
+"""roswtf, provided by minirospy: what is wrong with a graph. Source: http://wiki.ros.org/roswtf."""
 
 from minirospy.compat.roswtf import roswtf_main
 

@@ -1,4 +1,4 @@
-"""rosgraph.impl.graph, filled in by minirospy: the graph as edges between nodes and topics.
+"""rosgraph.impl.graph: the graph as edges between nodes and topics.
 
 All of it comes from the master, so that ``update()`` waits for no node; so none is ever in ``bad_nodes``.
 """
@@ -17,12 +17,12 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """What stands for a topic among the edges: its name behind a space."""
+    """Return a topic's node in the graph: its name after a space."""
     return " " + topic
 
 
 def node_topic(node: str) -> str:
-    """The topic that a name made by :func:`topic_node` stands for."""
+    """Return the topic of a name made by :func:`topic_node`."""
     return node[1:]
 
 
@@ -85,7 +85,7 @@ class EdgeList:
     __hash__ = None  # type: ignore[assignment]
 
     def has(self, edge: Edge) -> bool:
-        """Whether an edge is there."""
+        """Return whether an edge is there."""
         return edge in self._edges
 
     def add(self, edge: Edge) -> bool:
@@ -96,7 +96,7 @@ class EdgeList:
         return True
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
-        """Add the edge of a connection as getBusInfo tells it, both for the direction ``b``; whether one is new."""
+        """Add the edge of a row of getBusInfo, both for the direction ``b``; return whether one is new."""
         directions = ("o", "i") if direction == "b" else (direction,)
         added = [self.add(Edge(*edge_args(start, dest, each, label))) for each in directions]
         return any(added)
@@ -111,7 +111,7 @@ class EdgeList:
 
 
 def edge_args(start: str, dest: str, direction: str, label: str) -> tuple[str, str, str]:
-    """(start, end, label) of a connection; the direction ``i`` turns it round."""
+    """Return (start, end, label) of a connection, reversed for the direction ``i``."""
     return (dest, start, label) if direction == "i" else (start, dest, label)
 
 
@@ -137,19 +137,19 @@ class Graph:
         self.last_master_refresh = 0.0
 
     def set_master_stale(self, stale_secs: float) -> None:
-        """For how long an answer of the master will do."""
+        """Set the seconds between queries of the master."""
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
-        """For how long a node's answer will do: none is asked."""
+        """Accept the seconds between queries of a node; has no effect, as nodes are not queried."""
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Ask the nodes in ``bad_nodes`` again: there are none. False."""
+        """Query the nodes in ``bad_nodes`` again. Return False, as there are none."""
         return False
 
     def update(self) -> bool:
-        """Ask the master, unless it was asked a moment ago; whether something has changed."""
+        """Query the master, unless the last query is recent. Return whether the graph has changed."""
         if time.time() - self.last_master_refresh < self.master_stale:
             return False
         publishers, subscribers, services = self.master.getSystemState()
@@ -178,7 +178,7 @@ class Graph:
         return before != (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
 
     def _side(self, table: list[tuple[str, list[str]]]) -> dict[str, list[str]]:
-        """Topic -> nodes, of those that are asked for."""
+        """Return topic -> nodes, of the topics in the namespace."""
         kept = {
             topic: [node for node in nodes if in_namespace(node, self.node_ns)]
             for topic, nodes in table

@@ -1,4 +1,4 @@
-"""rospy.impl.init, filled in by minirospy."""
+"""rospy.impl.init."""
 
 __all__ = ["DEFAULT_MASTER_PORT", "DEFAULT_MASTER_URI", "DEFAULT_NODE_PORT"]
 

@@ -1,4 +1,4 @@
-"""rospy.impl.rosout, filled in by minirospy: the handler that publishes log records, and the levels' numbers."""
+"""rospy.impl.rosout: the handler that publishes log records, and the levels' numbers."""
 
 from minirospy.client.log import PYTHON_LEVELS
 

@@ -1,4 +1,4 @@
-"""rospy.impl.simtime, filled in by minirospy."""
+"""rospy.impl.simtime."""
 
 from minirospy.client.process import process
 from minirospy.errors import ROSInitException
@@ -7,7 +7,7 @@ __all__ = ["init_simtime"]
 
 
 def init_simtime() -> bool:
-    """Go by /clock where the parameter /use_sim_time says so, as init_node does; whether the master tells."""
+    """Follow /clock if the parameter /use_sim_time is true, as init_node does; return whether the master answers."""
     try:
         process.start_clock()
     except ROSInitException:

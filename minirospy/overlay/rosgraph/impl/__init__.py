@@ -1,3 +1,3 @@
-"""rosgraph.impl, filled in by minirospy."""
+"""rosgraph.impl, provided by minirospy: the graph as it is polled."""
 
 from rosgraph.impl import graph as graph

@@ -1,7 +1,4 @@
-"""rosgraph.impl.graph, filled in by minirospy: the graph as edges between nodes and topics.
-
-All of it comes from the master, so that ``update()`` waits for no node; so none is ever in ``bad_nodes``.
-"""
+"""rosgraph.impl.graph, provided by minirospy: the graph as edges between nodes and topics."""
 
 from minirospy.compat.rosgraph.impl.graph import (
     BadNode,

@@ -1,3 +1,3 @@
-"""rospy.impl, filled in by minirospy: the few internal names of rospy that programs use."""
+"""rospy.impl, provided by minirospy."""
 
 from minirospy.compat.rospy.impl import __getattr__ as __getattr__

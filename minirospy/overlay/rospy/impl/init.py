@@ -1,4 +1,4 @@
-"""rospy.impl.init, filled in by minirospy."""
+"""rospy.impl.init, provided by minirospy."""
 
 from minirospy.client.log import RosStreamHandler
 from minirospy.compat.rospy.impl.init import DEFAULT_MASTER_PORT, DEFAULT_MASTER_URI, DEFAULT_NODE_PORT

@@ -1,4 +1,4 @@
-"""rospy.impl.paramserver, filled in by minirospy."""
+"""rospy.impl.paramserver, provided by minirospy."""
 
 from minirospy.client.params import KeptParameters as ParamServerCache
 from minirospy.client.params import get_param_server_cache

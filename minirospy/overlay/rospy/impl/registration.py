@@ -1,4 +1,4 @@
-"""rospy.impl.registration, filled in by minirospy."""
+"""rospy.impl.registration, provided by minirospy."""
 
 from minirospy.compat.rospy.impl.registration import Registration, get_service_manager, get_topic_manager
 

@@ -1,4 +1,4 @@
-"""rospy.impl.rosout, filled in by minirospy: the handler that publishes log records, and the levels' numbers."""
+"""rospy.impl.rosout, provided by minirospy: the handler that publishes log records, and the levels' numbers."""
 
 from minirospy.client.log import RosOutHandler
 from minirospy.compat.rospy.impl.rosout import _logging_to_rospy_levels as _logging_to_rospy_levels

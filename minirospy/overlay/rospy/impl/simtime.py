@@ -1,4 +1,4 @@
-"""rospy.impl.simtime, filled in by minirospy."""
+"""rospy.impl.simtime, provided by minirospy."""
 
 from minirospy.compat.rospy.impl.simtime import init_simtime
 

@@ -1,4 +1,4 @@
-"""rospy.impl.tcpros_base, filled in by minirospy."""
+"""rospy.impl.tcpros_base, provided by minirospy."""
 
 from minirospy.compat.rospy.impl.transport import DEFAULT_BUFF_SIZE, TCPROS
 

@@ -1,4 +1,4 @@
-"""rospy.impl.tcpros_service, filled in by minirospy."""
+"""rospy.impl.tcpros_service, provided by minirospy."""
 
 from minirospy.client.services import Service, ServiceProxy, wait_for_service
 from minirospy.errors import ServiceException

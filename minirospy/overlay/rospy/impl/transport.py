@@ -1,4 +1,4 @@
-"""rospy.impl.transport, filled in by minirospy: the directions of a connection, as getBusInfo tells them."""
+"""rospy.impl.transport, provided by minirospy: the directions of a connection in getBusInfo, and constants of TCPROS."""
 
 from minirospy.compat.rospy.impl.transport import BIDIRECTIONAL, INBOUND, OUTBOUND
 from minirospy.compat.rospy.impl.transport import __getattr__ as __getattr__

@@ -1,4 +1,4 @@
-"""rospy.impl.validators, filled in by minirospy."""
+"""rospy.impl.validators, provided by minirospy."""
 
 from minirospy.compat.rospy.names import ParameterInvalid
 
