@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/actionlib/DetailedDescription.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 
@@ -16,8 +16,13 @@ from minirospy.actionlib.machine import ClientGoalHandle, FeedbackCallback, Goal
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
+from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message
+from minirospy.runtime.links import OutLink
+from minirospy.runtime.topics import InLink
 
 __all__ = ["ActionClient"]
+
+_M = TypeVar("_M", bound=Message)
 
 
 class ActionClient:
@@ -27,7 +32,7 @@ class ActionClient:
     of its queues. Raises ActionException on a class that is no action.
     """
 
-    def __init__(self, ns: str, ActionSpec: type[Any]) -> None:
+    def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
         self.ns = ns
         self.last_status_msg: GoalStatusArray | None = None
         self._news = Waiting()
@@ -72,7 +77,7 @@ class ActionClient:
 
     def send_goal(
         self,
-        goal: Any,
+        goal: Message,
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
@@ -113,8 +118,8 @@ class ActionClient:
         )
 
     def _subscribe(
-        self, name: str, data_class: type[Any], callback: Callable[[Any], None]
-    ) -> rospy.Subscriber[Any]:
+        self, name: str, data_class: type[_M], callback: Callable[[_M], None]
+    ) -> rospy.Subscriber[_M]:
         return rospy.Subscriber(
             rospy.remap_name(self.ns) + name,
             data_class,
@@ -128,10 +133,10 @@ class ActionClient:
         self.manager.update_statuses(msg)
         self._news.notify()
 
-    def _result_cb(self, msg: Any) -> None:
+    def _result_cb(self, msg: ActionResult) -> None:
         self.manager.update_results(msg)
 
-    def _feedback_cb(self, msg: Any) -> None:
+    def _feedback_cb(self, msg: ActionFeedback) -> None:
         self.manager.update_feedbacks(msg)
 
 
@@ -148,7 +153,6 @@ class _Listener(rospy.SubscribeListener):
         self._tell()
 
 
-def _peer(link: Any) -> str | None:
-    """The name of the node at the other end of a link."""
-    header = getattr(link, "header", None)
-    return link.peer if header is None else header.get("callerid")  # type: ignore[no-any-return]
+def _peer(link: InLink | OutLink) -> str | None:
+    """Return the name of the node at the other end of a link."""
+    return link.header.get("callerid") if isinstance(link, InLink) else link.peer

@@ -5,7 +5,7 @@ Which state follows which is a table (`minirospy.graph.goals`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from actionlib_msgs.msg import GoalID, GoalStatus
 
@@ -17,6 +17,7 @@ from minirospy.graph.goals import SERVER_STEPS, TERMINAL, GoalEvent
 
 if TYPE_CHECKING:
     from minirospy.actionlib.server import ActionServer
+    from minirospy.idl.protocols import ActionGoal, Message
 
 __all__ = ["HandleTrackerDeleter", "ServerGoalHandle", "StatusTracker"]
 
@@ -33,7 +34,9 @@ _WHERE_FROM = {
 class StatusTracker:
     """A goal of the server's list, or an id whose cancel came before its goal."""
 
-    def __init__(self, goal_id: GoalID | None = None, status: int | None = None, goal: Any = None) -> None:
+    def __init__(
+        self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None
+    ) -> None:
         self.goal = goal
         self.handle_tracker: HandleTrackerDeleter | None = None
         self.id_generator = GoalIDGenerator()
@@ -45,7 +48,7 @@ class StatusTracker:
             self.status.goal_id = goal_id or GoalID()
             self.status.status = status or GoalStatus.PENDING
         elif goal.goal_id.id:
-            self.status.goal_id = goal.goal_id
+            self.status.goal_id = cast("GoalID", goal.goal_id)
             if self.status.goal_id.stamp == _NOTHING:
                 self.status.goal_id.stamp = rospy.Time.now()
         else:
@@ -111,7 +114,7 @@ class ServerGoalHandle:
     def __hash__(self) -> int:
         return hash(self.get_goal_id().id)
 
-    def get_default_result(self) -> Any:
+    def get_default_result(self) -> Message | None:
         """A result with nothing in it."""
         return self.action_server.ActionResultType() if self.action_server else None
 
@@ -121,22 +124,22 @@ class ServerGoalHandle:
         if self._step(GoalEvent.ACCEPT, text) and self.action_server:
             self.action_server.publish_status()
 
-    def set_canceled(self, result: Any = None, text: str = "") -> None:
+    def set_canceled(self, result: Message | None = None, text: str = "") -> None:
         """The goal ends because it was asked to: RECALLED where it had not begun, else PREEMPTED."""
         self._tell("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
-    def set_rejected(self, result: Any = None, text: str = "") -> None:
+    def set_rejected(self, result: Message | None = None, text: str = "") -> None:
         """Refuse the goal."""
         self._tell("Setting status to rejected on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.REJECT, result, text)
 
-    def set_aborted(self, result: Any = None, text: str = "") -> None:
+    def set_aborted(self, result: Message | None = None, text: str = "") -> None:
         """The goal has failed."""
         self._tell("Setting status to aborted on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.ABORT, result, text)
 
-    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+    def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
         """The goal is reached."""
         self._tell("Setting status to succeeded on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.SUCCEED, result, text)
@@ -155,7 +158,7 @@ class ServerGoalHandle:
             self.action_server.publish_status()
             return True
 
-    def publish_feedback(self, feedback: Any) -> None:
+    def publish_feedback(self, feedback: Message) -> None:
         """Send feedback to the goal's client."""
         self._tell("Publishing feedback for goal, id: %s, stamp: %.2f")
         if not self.goal or self.status_tracker is None or self.action_server is None:
@@ -206,7 +209,7 @@ class ServerGoalHandle:
             tracker.status.text = text
             return True
 
-    def _finish(self, event: GoalEvent, result: Any, text: str) -> None:
+    def _finish(self, event: GoalEvent, result: Message | None, text: str) -> None:
         server, tracker = self.action_server, self.status_tracker
         if server is None or tracker is None:
             self._step(event, text)

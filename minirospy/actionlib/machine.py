@@ -18,6 +18,8 @@ from minirospy.actionlib.spec import action_types
 from minirospy.actionlib.states import CommState, TerminalState, get_name_of_constant
 from minirospy.actionlib.statuses import find_status
 from minirospy.graph.goals import TERMINAL, client_steps
+from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.idl.protocols import GoalStatus as AnyGoalStatus
 
 __all__ = ["ClientGoalHandle", "CommStateMachine", "GoalManager"]
 
@@ -109,10 +111,10 @@ class CommStateMachine:
 
     def __init__(
         self,
-        action_goal: Any,
+        action_goal: ActionGoal,
         transition_cb: TransitionCallback | None,
         feedback_cb: FeedbackCallback | None,
-        send_goal_fn: Callable[[Any], object] | None,
+        send_goal_fn: Callable[[ActionGoal], object] | None,
         send_cancel_fn: Callable[[GoalID], object],
     ) -> None:
         self.action_goal = action_goal
@@ -122,8 +124,8 @@ class CommStateMachine:
         self.send_cancel_fn = send_cancel_fn
         self.state: int = CommState.WAITING_FOR_GOAL_ACK
         self.mutex = threading.RLock()
-        self.latest_goal_status = GoalStatus(status=GoalStatus.PENDING)
-        self.latest_result: Any = None
+        self.latest_goal_status: AnyGoalStatus = GoalStatus(status=GoalStatus.PENDING)
+        self.latest_result: ActionResult | None = None
 
     def __eq__(self, o: object) -> bool:
         if not isinstance(o, CommStateMachine):
@@ -166,7 +168,7 @@ class CommStateMachine:
             elif self.state not in _NOT_TOLD:
                 self._mark_as_lost()
 
-    def update_result(self, action_result: Any) -> None:
+    def update_result(self, action_result: ActionResult) -> None:
         """A result has come, perhaps another goal's."""
         if self.action_goal.goal_id.id != action_result.status.goal_id.id:
             return
@@ -182,7 +184,7 @@ class CommStateMachine:
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
-    def update_feedback(self, action_feedback: Any) -> None:
+    def update_feedback(self, action_feedback: ActionFeedback) -> None:
         """Feedback has come, perhaps another goal's."""
         if self.action_goal.goal_id.id != action_feedback.status.goal_id.id:
             return
@@ -223,18 +225,18 @@ class GoalManager:
 
     _numbers = itertools.count(1)
 
-    def __init__(self, ActionSpec: type[Any]) -> None:
+    def __init__(self, ActionSpec: type[Action]) -> None:
         types = action_types(ActionSpec)
         self.list_mutex = threading.RLock()
         self.statuses: list[weakref.ref[CommStateMachine]] = []
-        self.send_goal_fn: Callable[[Any], object] | None = None
+        self.send_goal_fn: Callable[[ActionGoal], object] | None = None
         self.cancel_fn: Callable[[GoalID], object] = _no_cancel
         self.ActionSpec = ActionSpec
         self.ActionGoal = types.action_goal
         self.ActionResult = types.action_result
         self.ActionFeedback = types.action_feedback
 
-    def register_send_goal_fn(self, fn: Callable[[Any], object]) -> None:
+    def register_send_goal_fn(self, fn: Callable[[ActionGoal], object]) -> None:
         """What sends a goal with its header."""
         self.send_goal_fn = fn
 
@@ -244,7 +246,7 @@ class GoalManager:
 
     def init_goal(
         self,
-        goal: Any,
+        goal: Message,
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
@@ -264,12 +266,12 @@ class GoalManager:
         for machine in self._get_live_statuses():
             machine.update_status(status_array)
 
-    def update_results(self, action_result: Any) -> None:
+    def update_results(self, action_result: ActionResult) -> None:
         """A result has come."""
         for machine in self._get_live_statuses():
             machine.update_result(action_result)
 
-    def update_feedbacks(self, action_feedback: Any) -> None:
+    def update_feedbacks(self, action_feedback: ActionFeedback) -> None:
         """Feedback has come."""
         for machine in self._get_live_statuses():
             machine.update_feedback(action_feedback)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 from actionlib_msgs.msg import GoalID, GoalStatus
 
@@ -27,6 +27,7 @@ from minirospy.actionlib.statuses import StatusList
 from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
+from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.runtime.limits import naming_thread_limit
 
 __all__ = ["ActionServer", "nop_cb"]
@@ -53,6 +54,9 @@ def nop_cb(goal_handle: ServerGoalHandle) -> None:
     """The cancel callback of a server that has none."""
 
 
+_M = TypeVar("_M", bound=Message)
+
+
 class ActionServer:
     """The server of the action ``ActionSpec`` in the namespace ``ns``.
 
@@ -65,7 +69,7 @@ class ActionServer:
     def __init__(
         self,
         ns: str,
-        ActionSpec: type[Any],
+        ActionSpec: type[Action],
         goal_cb: GoalCallback | None,
         cancel_cb: GoalCallback = nop_cb,
         auto_start: bool = True,
@@ -79,11 +83,11 @@ class ActionServer:
         self.ActionResult = types.action_result
         self.ActionResultType = types.result
         self.ActionFeedback = types.action_feedback
-        self.goal_sub: rospy.Subscriber[Any] | None = None
-        self.cancel_sub: rospy.Subscriber[Any] | None = None
-        self.status_pub: rospy.Publisher[Any] | None = None
-        self.result_pub: rospy.Publisher[Any] | None = None
-        self.feedback_pub: rospy.Publisher[Any] | None = None
+        self.goal_sub: rospy.Subscriber[ActionGoal] | None = None
+        self.cancel_sub: rospy.Subscriber[GoalID] | None = None
+        self.status_pub: rospy.Publisher[StatusList] | None = None
+        self.result_pub: rospy.Publisher[ActionResult] | None = None
+        self.feedback_pub: rospy.Publisher[ActionFeedback] | None = None
         self.lock = threading.RLock()
         self.last_cancel: times.Time = rospy.Time()
         self.status_list_timeout = rospy.Duration()
@@ -177,7 +181,7 @@ class ActionServer:
         )
         self._teller = _Teller(self.publish_status_now, 1.0 / self.status_frequency)
 
-    def publish_result(self, status: GoalStatus, result: Any) -> None:
+    def publish_result(self, status: GoalStatus, result: Message | None) -> None:
         """Send a goal's result, and its status."""
         with self.lock:
             message = self.ActionResult(status=status, result=result)
@@ -185,7 +189,7 @@ class ActionServer:
             self._publish(self.result_pub, message)
             self.publish_status()
 
-    def publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
+    def publish_feedback(self, status: GoalStatus, feedback: Message) -> None:
         """Send feedback on a goal."""
         with self.lock:
             message = self.ActionFeedback(status=status, feedback=feedback)
@@ -234,7 +238,7 @@ class ActionServer:
                 tracker.end()
             self.last_cancel = max(self.last_cancel, goal_id.stamp)
 
-    def internal_goal_callback(self, goal: Any) -> None:
+    def internal_goal_callback(self, goal: ActionGoal) -> None:
         """A client has sent a goal."""
         header = getattr(goal, "_connection_header", None) or {}
         if not TAKES_FAST_ANSWERS.items() <= header.items():
@@ -286,7 +290,7 @@ class ActionServer:
             )
 
     @staticmethod
-    def _publish(publisher: rospy.Publisher[Any] | None, message: Any) -> None:
+    def _publish(publisher: rospy.Publisher[_M] | None, message: _M) -> None:
         if publisher and publisher.impl and not process.is_shutdown():
             publisher.publish(message)
 

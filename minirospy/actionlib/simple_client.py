@@ -18,6 +18,7 @@ from minirospy.actionlib.machine import ClientGoalHandle
 from minirospy.actionlib.states import CommState, SimpleGoalState
 from minirospy.actionlib.waiting import Waiting
 from minirospy.graph.goals import SIMPLE_STEPS, SimpleStep, visible_state
+from minirospy.idl.protocols import Action, Message
 
 __all__ = ["SimpleActionClient"]
 
@@ -30,7 +31,7 @@ class SimpleActionClient:
     ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raises ActionException.
     """
 
-    def __init__(self, ns: str, ActionSpec: type[Any]) -> None:
+    def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
         self.action_client = ActionClient(ns, ActionSpec)
         self.simple_state: int = SimpleGoalState.DONE
         self.gh: ClientGoalHandle | None = None
@@ -49,7 +50,7 @@ class SimpleActionClient:
 
     def send_goal(
         self,
-        goal: Any,
+        goal: Message,
         done_cb: DoneCallback | None = None,
         active_cb: Callable[[], object] | None = None,
         feedback_cb: Callable[[Any], object] | None = None,
@@ -69,7 +70,7 @@ class SimpleActionClient:
 
     def send_goal_and_wait(
         self,
-        goal: Any,
+        goal: Message,
         execute_timeout: times.Duration = rospy.Duration(),  # noqa: B008
         preempt_timeout: times.Duration = rospy.Duration(),  # noqa: B008
     ) -> int:
@@ -186,7 +187,7 @@ class SimpleActionClient:
             rospy.resolve_name(self.action_client.ns),
         )
 
-    def _handle_feedback(self, gh: ClientGoalHandle, feedback: Any) -> None:
+    def _handle_feedback(self, gh: ClientGoalHandle, feedback: Message) -> None:
         with self._lock:
             tracked, feedback_cb = self.gh, self.feedback_cb
         if tracked is None:

@@ -16,6 +16,7 @@ from minirospy import client as rospy
 from minirospy.actionlib.handle import ServerGoalHandle
 from minirospy.actionlib.server import ActionServer
 from minirospy.client.process import process
+from minirospy.idl.protocols import Action, Message
 from minirospy.runtime.limits import naming_thread_limit
 
 __all__ = ["SimpleActionServer"]
@@ -40,7 +41,7 @@ class SimpleActionServer:
     def __init__(
         self,
         name: str,
-        ActionSpec: type[Any],
+        ActionSpec: type[Action],
         execute_cb: Callable[[Any], object] | None = None,
         auto_start: bool = True,
     ) -> None:
@@ -103,27 +104,27 @@ class SimpleActionServer:
             return False
         return self.current_goal.get_goal_status().status in (GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
-    def set_succeeded(self, result: Any = None, text: str = "") -> None:
+    def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
         """The goal that runs is reached."""
         with self.lock:
             self.current_goal.set_succeeded(result or self.get_default_result(), text)
 
-    def set_aborted(self, result: Any = None, text: str = "") -> None:
+    def set_aborted(self, result: Message | None = None, text: str = "") -> None:
         """The goal that runs has failed."""
         with self.lock:
             self.current_goal.set_aborted(result or self.get_default_result(), text)
 
-    def set_preempted(self, result: Any = None, text: str = "") -> None:
+    def set_preempted(self, result: Message | None = None, text: str = "") -> None:
         """The goal that runs has made way."""
         with self.lock:
             rospy.logdebug("Setting the current goal as canceled")
             self.current_goal.set_canceled(result or self.get_default_result(), text)
 
-    def publish_feedback(self, feedback: Any) -> None:
+    def publish_feedback(self, feedback: Message) -> None:
         """Send feedback on the goal that runs."""
         self.current_goal.publish_feedback(feedback)
 
-    def get_default_result(self) -> Any:
+    def get_default_result(self) -> Message | None:
         """A result with nothing in it."""
         return self.action_server.ActionResultType()
 
@@ -195,7 +196,7 @@ class SimpleActionServer:
     def _has_work(self) -> bool:
         return self.need_to_terminate or process.is_shutdown() or (self.new_goal and not self.is_active())
 
-    def _execute(self, goal: Any) -> None:
+    def _execute(self, goal: Message) -> None:
         assert self.execute_callback
         try:
             self.execute_callback(goal)

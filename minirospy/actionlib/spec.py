@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy.errors import MinirospyError
+from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 
 __all__ = [
     "CANCEL_SECONDS",
@@ -33,15 +34,15 @@ class ActionException(MinirospyError):
 class ActionTypes(NamedTuple):
     """The message classes of an action; the ``action_`` ones are those that travel."""
 
-    action_goal: type[Any]
-    action_result: type[Any]
-    action_feedback: type[Any]
-    goal: type[Any]
-    result: type[Any]
-    feedback: type[Any]
+    action_goal: type[ActionGoal]
+    action_result: type[ActionResult]
+    action_feedback: type[ActionFeedback]
+    goal: type[Message]
+    result: type[Message]
+    feedback: type[Message]
 
 
-def action_types(action: Any) -> ActionTypes:
+def action_types(action: type[Action]) -> ActionTypes:
     """The message classes of an action's class, such as ``runningLedAction``. Raises ActionException."""
     try:
         parts = action()

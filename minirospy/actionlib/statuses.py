@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import struct
 from io import BytesIO
-from typing import Any
 
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+
+from minirospy.idl.protocols import Buffer, Writer
 
 __all__ = ["StatusList", "find_status", "status_bytes"]
 
@@ -64,7 +65,7 @@ class StatusList(GoalStatusArray):
                 return self._status(start, end)
         return None
 
-    def serialize(self, buff: Any) -> None:
+    def serialize(self, buff: Writer) -> None:
         """Write the message. Raises genpy.SerializationError."""
         if self._read is not None:
             self._parts = [status_bytes(status) for status in self._read]
@@ -75,7 +76,7 @@ class StatusList(GoalStatusArray):
         buff.write(_COUNT.pack(len(self._parts)))
         buff.write(b"".join(self._parts))
 
-    def deserialize(self, data: Any) -> StatusList:
+    def deserialize(self, data: Buffer) -> StatusList:
         """Take the message's bytes. Raises genpy.DeserializationError."""
         data = bytes(data)
         try:
