@@ -33,6 +33,7 @@ from types import CodeType, FrameType, FunctionType, ModuleType
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "minirospy"
@@ -237,6 +238,9 @@ def install(
         for function in functions.get((code.co_firstlineno, code.co_name), ()):
             if function.__code__.co_freevars == code.co_freevars:
                 function.__code__ = code
+    for each in vars(sys.modules[f"minirospy.{mutant.module}"]).values():
+        if hasattr(each, "cache_clear"):
+            each.cache_clear()
     statement = next((each for each in mutated.body if _holds(each, mutant.line)), None)
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         _assign(sys.modules[f"minirospy.{mutant.module}"], statement, path)
@@ -293,6 +297,13 @@ class Mutants:
         self._seconds: dict[int, float] = {}
         self.survivors: list[Mutant] = []
         self.results: Counter[str] = Counter()
+
+    def pytest_sessionstart(self) -> None:
+        """Have fewer examples made up, and the same ones for each mutant. The tests' own profile is loaded by now."""
+        settings.register_profile(
+            "mutants", settings(), max_examples=30, derandomize=True, database=None, deadline=None
+        )
+        settings.load_profile("mutants")
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leave out the tests of other processes."""

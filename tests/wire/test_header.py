@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import WireError
-from minirospy.wire.header import parse_header, serialize_header
+from minirospy.wire.header import MAX_HEADER, parse_header, serialize_header
 
 # "callerid=/a" is 11 bytes, "topic=/t" 8: each with its length in front, the whole with its own.
 GOLDEN = b"\x1b\x00\x00\x00" + b"\x0b\x00\x00\x00callerid=/a" + b"\x08\x00\x00\x00topic=/t"
@@ -56,3 +56,19 @@ def test_any_bytes_are_read_or_refused(body: bytes) -> None:
     except WireError:
         return
     assert all(isinstance(value, str) for value in fields.values())
+
+
+def test_bytes_that_are_not_utf_8_are_read() -> None:
+    """Third-party clients send names and definitions in any encoding; a comment must not end a connection."""
+    body = b"\x07\x00\x00\x00na\xe9me=\xff"
+    assert parse_header(body) == {"na\ufffdme": "\ufffd"}
+
+
+def test_empty_field_at_the_end_is_read() -> None:
+    assert parse_header(b"\x01\x00\x00\x00=") == {"": ""}
+    with pytest.raises(WireError, match="has no '='"):
+        parse_header(b"\0\0\0\0")
+
+
+def test_limit_of_a_header_is_four_mebibytes() -> None:
+    assert MAX_HEADER == 4194304

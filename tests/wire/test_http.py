@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import RpcProtocolError
-from minirospy.wire.http import HttpMessage, HttpReader, serialize_request, serialize_response
+from minirospy.wire.http import (
+    MAX_BODY,
+    HttpHead,
+    HttpMessage,
+    HttpReader,
+    serialize_error,
+    serialize_request,
+    serialize_response,
+)
 
 
 def feed(data: bytes, step: int, reader: HttpReader | None = None) -> list[HttpMessage]:
@@ -103,3 +111,266 @@ def test_a_peer_that_ends_inside_a_message() -> None:
     assert not reader.is_idle
     with pytest.raises(RpcProtocolError, match="ended inside"):
         reader.feed(b"")
+
+
+# --- what goes out, byte for byte
+
+
+def test_request_bytes() -> None:
+    assert serialize_request("robot:11311", "/RPC2", b"<x/>") == (
+        b"POST /RPC2 HTTP/1.1\r\nHost: robot:11311\r\nUser-Agent: minirospy\r\nContent-Type: text/xml\r\n"
+        b"Content-Length: 4\r\n\r\n<x/>"
+    )
+    assert serialize_request("robot", "", b"").startswith(b"POST / HTTP/1.1\r\n")
+    # A name of a machine that no header can hold: not found, but not a traceback either.
+    assert b"Host: r?bot\r\n" in serialize_request("r\u0151bot", "/", b"")
+
+
+def test_response_bytes() -> None:
+    assert serialize_response(b"<x/>") == (
+        b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\n\r\n<x/>"
+    )
+    assert serialize_response(b"", keep_alive=False) == (
+        b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [
+        (400, b"Bad Request"),
+        (405, b"Method Not Allowed"),
+        (413, b"Content Too Large"),
+        (500, b"Internal Server Error"),
+        (503, b"Service Unavailable"),
+    ],
+)
+def test_error_bytes(status: int, reason: bytes) -> None:
+    assert serialize_error(status, "wh\u00e4t") == (
+        b"HTTP/1.1 %d %s\r\nContent-Type: text/plain; charset=utf-8\r\nConnection: close\r\n"
+        b"Content-Length: 6\r\n\r\nwh\xc3\xa4t\n" % (status, reason)
+    )
+
+
+# --- what comes in
+
+
+def head_of(data: bytes) -> HttpHead:
+    (message,) = feed(data, 1 << 20)
+    return message.head
+
+
+def test_head_fields() -> None:
+    head = head_of(b"POST /x HTTP/1.1\r\nA-B:  c: d \r\nContent-Length: 0\r\n\r\n")
+    assert head.start == "POST /x HTTP/1.1"
+    assert head.headers == {"a-b": "c: d", "content-length": "0"}
+    assert (head.method, head.keep_alive, head.plain_length) == ("POST", True, 0)
+    (message,) = feed(b"GET / HTTP/1.1\r\nContent-Length: 2\r\n\r\nab", 1 << 20)
+    assert (message.start, message.method, message.keep_alive, message.status) == (
+        "GET / HTTP/1.1",
+        "GET",
+        True,
+        0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("start", "status"),
+    [
+        ("HTTP/1.1 200 OK", 200),
+        ("HTTP/1.1 404", 404),
+        ("HTTP/1.1 2000 OK", 0),
+        ("HTTP/1.1 ok 200", 0),
+        ("HTTP/1.1", 0),
+        ("HTTP/1.0 503 Service 100", 503),
+    ],
+)
+def test_status(start: str, status: int) -> None:
+    (message,) = feed(f"{start}\r\nContent-Length: 0\r\n\r\n".encode(), 1 << 20)
+    assert message.status == status
+
+
+@pytest.mark.parametrize(
+    ("version", "connection", "keeps"),
+    [
+        ("1.1", None, True),
+        ("1.1", "Close", False),
+        ("1.1", "keep-alive", True),
+        ("1.0", None, False),
+        ("1.0", "Keep-Alive", True),
+        ("1.0", "close", False),
+    ],
+)
+def test_connection_is_kept(version: str, connection: str | None, keeps: bool) -> None:
+    field = f"Connection: {connection}\r\n" if connection else ""
+    assert head_of(f"POST / HTTP/{version}\r\n{field}Content-Length: 0\r\n\r\n".encode()).keep_alive == keeps
+
+
+@pytest.mark.parametrize("field", ["Transfer-Encoding: chunked", "Transfer-Encoding: x, CHUNKED"])
+def test_chunked_body_goes_before_a_length(field: str) -> None:
+    data = f"POST / HTTP/1.1\r\n{field}\r\nContent-Length: 3\r\n\r\n2\r\nab\r\n0\r\n\r\n".encode()
+    (message,) = feed(data, 1 << 20)
+    assert (message.body, message.head.plain_length) == (b"ab", -1)
+
+
+def test_plain_length_is_not_that_of_a_peer_that_waits() -> None:
+    (message,) = feed(b"POST / HTTP/1.1\r\nExpect: x\r\nContent-Length: 2\r\n\r\nab", 1 << 20)
+    assert (message.body, message.head.plain_length) == (b"ab", -1)
+
+
+def test_request_without_a_length_has_no_body() -> None:
+    found = feed(b"GET / HTTP/1.1\r\n\r\nGET /2 HTTP/1.1\r\n\r\n", 1 << 20)
+    assert [(message.start, message.body, message.head.plain_length) for message in found] == [
+        ("GET / HTTP/1.1", b"", -1),
+        ("GET /2 HTTP/1.1", b"", -1),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"POST / HTTP/2.0\r\n\r\n", "not HTTP: 'POST / HTTP/2.0'"),
+        (b"POST /HTTP/1.1\r\n\r\n", "not HTTP"),
+        (b"POST / x HTTP/1.1\r\n\r\n", "not HTTP"),
+        (b"\r\n\r\n", "not HTTP"),
+        (b"POST / HTTP/1.1\r\n: x\r\n\r\n", "not an HTTP header"),
+        (b"POST / HTTP/1.1\r\nX : y\r\n\r\n", "not an HTTP header"),
+        (b"POST / HTTP/1.1\r\nX\t: y\r\n\r\n", "not an HTTP header"),
+        (b"POST / HTTP/1.1\r\n X: y\r\n\r\n", "not an HTTP header"),
+        (b"POST / HTTP/1.1\r\n\tX: y\r\n\r\n", "not an HTTP header"),
+        (b"POST / HTTP/1.1\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n", "two Content-Lengths"),
+        (b"POST / HTTP/1.1\r\nContent-Length: 1234567890123456789\r\n\r\n", "bad Content-Length"),
+        (b"POST / HTTP/1.1\r\nContent-Length: +1\r\n\r\n", "bad Content-Length"),
+        (
+            b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n1\r\nab\r\n",
+            "a chunk is longer than its size",
+        ),
+        (b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n1234567890123\r\n", "bad chunk size"),
+    ],
+)
+@pytest.mark.parametrize("step", [3, 1 << 20])
+def test_request_that_could_be_read_in_two_ways_is_refused(data: bytes, why: str, step: int) -> None:
+    with pytest.raises(RpcProtocolError, match=why):
+        feed(data, step)
+
+
+def test_same_length_twice_is_read() -> None:
+    found = feed(b"POST / HTTP/1.1\r\nContent-Length: 1\r\nContent-Length: 1\r\n\r\na", 1 << 20)
+    assert [message.body for message in found] == [b"a"]
+
+
+def test_body_at_the_limit_is_read_and_one_beyond_it_refused() -> None:
+    assert MAX_BODY == 64 * 2**20
+    for head, body in [
+        (b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n", b"x" * 1000),
+        (b"HTTP/1.1 200 OK\r\n\r\n", b"x" * 1000),
+    ]:
+        whole = head % len(body) if b"%d" in head else head
+        reader = HttpReader(max_body=1000)
+        found = feed(whole + body, 100, reader) or reader.feed(b"")
+        assert [message.body for message in found] == [body]
+        too_long = head % 1001 if b"%d" in head else head
+        with pytest.raises(
+            RpcProtocolError, match="an HTTP body of 1001 bytes is over the limit of 1000"
+        ) as refused:
+            feed(too_long + body + b"x", 100, HttpReader(max_body=1000)) or HttpReader(max_body=1000).feed(
+                b""
+            )
+        assert refused.value.status == 413
+
+
+def test_chunks_at_the_limit_are_read_and_one_beyond_it_refused() -> None:
+    head, chunk = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n", b"1f4\r\n" + b"x" * 500 + b"\r\n"
+    (message,) = feed(head + 2 * chunk + b"0\r\n\r\n", 1 << 20, HttpReader(max_body=1000))
+    assert message.body == b"x" * 1000
+    with pytest.raises(RpcProtocolError, match="an HTTP body of 1001 bytes is over the limit"):
+        feed(head + 2 * chunk + b"1\r\nx", 1 << 20, HttpReader(max_body=1000))
+
+
+@pytest.mark.parametrize("size", [600, 60_000])
+def test_long_head_is_read(size: int) -> None:
+    """Heads of up to 512 bytes are remembered, and those of up to 64 KiB are read."""
+    for step in (1000, 1 << 20):
+        (message,) = feed(b"POST / HTTP/1.1\r\nContent-Length: 1\r\nX: " + b"y" * size + b"\r\n\r\na", step)
+        assert (len(message.head.headers["x"]), message.body) == (size, b"a")
+
+
+def test_head_of_more_than_64_kib_is_refused() -> None:
+    reader = HttpReader()
+    assert feed(b"x" * 65536, 1000, reader) == []
+    with pytest.raises(RpcProtocolError, match="HTTP header too long"):
+        reader.feed(b"x")
+
+
+def test_reader_counts_what_it_holds() -> None:
+    reader = HttpReader()
+    assert (reader.is_idle, reader.held) == (True, 0)
+    reader.feed(b"POST / HTTP/1.1\r\n")
+    assert (reader.is_idle, reader.held) == (False, 17)
+    reader.feed(b"Content-Length: 10\r\n\r\n")
+    reader.feed(b"abc")
+    assert (reader.is_idle, reader.held) == (False, 3)
+    assert len(reader.feed(b"defghij")) == 1
+    assert (reader.is_idle, reader.held) == (True, 0)
+    # A head alone is not idle.
+    reader.feed(b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\n")
+    assert not reader.is_idle
+    chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
+    reader = HttpReader()
+    reader.feed(chunked + b"3\r\nabc\r\n2\r\nd")
+    assert (reader.is_idle, reader.held) == (False, 4)
+    reader.feed(b"e\r\n0\r\n")
+    assert reader.held == 0
+    assert len(reader.feed(b"\r\n")) == 1
+    assert reader.is_idle
+
+
+def test_close_forgets_an_incomplete_message() -> None:
+    reader = HttpReader()
+    reader.feed(b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n2\r\nd")
+    reader.close()
+    assert (reader.is_idle, reader.held) == (True, 0)
+    assert [message.body for message in feed(serialize_request("h", "/", b"next"), 5, reader)] == [b"next"]
+
+
+@pytest.mark.parametrize("step", [5, 1 << 20])
+def test_peer_waits_until_its_body_has_come(step: int) -> None:
+    reader = HttpReader()
+    assert not reader.wants_continue
+    feed(b"POST / HTTP/1.1\r\nExpect: 100-Continue\r\nContent-Length: 2\r\n\r\n", step, reader)
+    assert reader.wants_continue
+    assert len(reader.feed(b"ab")) == 1
+    assert not reader.wants_continue
+    feed(b"POST / HTTP/1.1\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n", step, reader)
+    reader.continue_line()
+    assert not reader.wants_continue
+    feed(b"POST / HTTP/1.1\r\nExpect: something\r\nContent-Length: 2\r\n\r\n", step, HttpReader())
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"POST / HT",
+        b"POST / HTTP/1.1\r\nContent-Length: 5\r\n\r\n",
+        b"POST / HTTP/1.1\r\nContent-Length: 5\r\n\r\nab",
+    ],
+)
+def test_peer_that_ends_too_early(data: bytes) -> None:
+    reader = HttpReader()
+    reader.feed(data)
+    with pytest.raises(RpcProtocolError, match="the peer ended inside a message"):
+        reader.feed(b"")
+
+
+def test_peer_that_ends_between_two_messages() -> None:
+    reader = HttpReader()
+    assert len(reader.feed(serialize_request("h", "/", b"x"))) == 1
+    assert reader.feed(b"") == []
+
+
+def test_answer_that_goes_on_until_the_end_comes_in_parts() -> None:
+    reader = HttpReader()
+    for data in (b"HTTP/1.1 200 OK\r\n\r\n", b"ab", b"cd"):
+        assert reader.feed(data) == []
+    (message,) = reader.feed(b"")
+    assert message.body == b"abcd"

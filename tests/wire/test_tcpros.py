@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from minirospy.errors import HandshakeRefused
+from minirospy.errors import HandshakeRefused, WireError
 from minirospy.wire.tcpros import (
     InterfaceType,
     check_publisher,
@@ -109,3 +111,87 @@ def test_text_of_a_refusal_is_escaped() -> None:
     with pytest.raises(HandshakeRefused, match=r"\\x1b") as raised:
         check_publisher(publisher_header("/t", evil, "/pub", latch=False), "/t", BOOL)
     assert "\x1b" not in str(raised.value)
+
+
+# The fields that go out, as rospy and roscpp send them.
+
+
+def test_subscriber_header_fields() -> None:
+    fields = {
+        "callerid": "/sub",
+        "md5sum": BOOL.md5sum,
+        "message_definition": "bool data\n",
+        "tcp_nodelay": "0",
+        "topic": "/t",
+        "type": "std_msgs/Bool",
+    }
+    assert subscriber_header("/t", BOOL, "/sub") == fields
+    more = subscriber_header("/t", BOOL, "/sub", tcp_nodelay=True, split_frames=True)
+    assert more == {**fields, "tcp_nodelay": "1", "split_frames": "1"}
+
+
+def test_publisher_header_fields() -> None:
+    fields = {
+        "callerid": "/pub",
+        "latching": "0",
+        "md5sum": BOOL.md5sum,
+        "message_definition": "bool data\n",
+        "topic": "/t",
+        "type": "std_msgs/Bool",
+    }
+    assert publisher_header("/t", BOOL, "/pub", latch=False) == fields
+    extra: dict[str, Any] = {"number": 5}
+    found = publisher_header("/t", BOOL, "/pub", latch=True, extra=extra)
+    assert found == {**fields, "latching": "1", "number": "5"}
+
+
+def test_service_client_header_fields() -> None:
+    fields = {"callerid": "/client", "md5sum": BOOL.md5sum, "service": "/s"}
+    assert service_client_header("/s", BOOL.md5sum, "/client") == fields
+    extra: dict[str, Any] = {"number": 5, "callerid": "/x"}
+    found = service_client_header("/s", BOOL.md5sum, "/client", persistent=True, probe=True, extra=extra)
+    assert found == {**fields, "persistent": "1", "probe": "1", "number": "5", "callerid": "/x"}
+
+
+def test_service_header_fields() -> None:
+    assert service_header("/s", BOOL, "/server", "a/BRequest", "a/BResponse") == {
+        "callerid": "/server",
+        "md5sum": BOOL.md5sum,
+        "request_type": "a/BRequest",
+        "response_type": "a/BResponse",
+        "service": "/s",
+        "type": "std_msgs/Bool",
+    }
+
+
+@pytest.mark.parametrize("missing", ["service", "md5sum", "callerid"])
+def test_service_client_must_send(missing: str) -> None:
+    fields = service_client_header("/s", BOOL.md5sum, "/client")
+    del fields[missing]
+    assert check_service_client(fields, BOOL) == f"Missing required '{missing}' field"
+
+
+def test_service_client_of_another_type_is_refused_with_both_md5sums() -> None:
+    why = check_service_client(service_client_header("/s", STRING.md5sum, "/client"), BOOL)
+    assert why == f"request from [/client]: md5sums do not match: [{STRING.md5sum}] vs. [{BOOL.md5sum}]"
+
+
+@pytest.mark.parametrize("missing", ["md5sum", "type"])
+def test_publisher_must_send(missing: str) -> None:
+    fields = publisher_header("/t", BOOL, "/pub", latch=False)
+    del fields[missing]
+    with pytest.raises(
+        HandshakeRefused, match=rf"publisher of \[/t\] sent a connection header without \[{missing}\]"
+    ):
+        check_publisher(fields, "/t", BOOL)
+
+
+@pytest.mark.parametrize("name", ["std_msgs/Bool", "*"])
+def test_publisher_of_another_definition_is_refused(name: str) -> None:
+    with pytest.raises(HandshakeRefused, match=r"topic \[/t\]: md5sums do not match: \[0\] vs\. \[8b94"):
+        check_publisher({"md5sum": "0", "type": name}, "/t", BOOL)
+
+
+def test_service_without_an_md5sum_is_refused() -> None:
+    with pytest.raises(WireError, match=r"header missing required field \[md5sum\]"):
+        check_service({"type": "std_msgs/Bool"})
