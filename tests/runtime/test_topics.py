@@ -660,15 +660,15 @@ def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
 ) -> None:
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.02) as (_, (a,)):
-            end, ask, looked = await offer(a, "publisher"), a.master, asyncio.Event()
+            end, call, looked = await offer(a, "publisher"), a._call_master, asyncio.Event()
 
-            async def end_first(method: str, *args: Any) -> Any:
+            async def end_first(method: str, *args: Any, **limits: float) -> Any:
                 if method == "lookupNode" and a.publications:
                     await end()
                     asyncio.get_running_loop().call_soon(looked.set)
-                return await ask(method, *args)
+                return await call(method, *args, **limits)
 
-            monkeypatch.setattr(a, "master", end_first)
+            monkeypatch.setattr(a, "_call_master", end_first)
             await looked.wait()
             await asyncio.sleep(0.05)
 

@@ -1,0 +1,64 @@
+"""docs/architecture.md is true: its rooms are those of the layer test, and each file that it names exists; links too."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.test_layers import DEPTH, LAYERS, PACKAGE
+
+ROOT = PACKAGE.parent
+TEXT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
+
+
+def paths() -> list[str]:
+    """Return what the page names in the folders of minirospy/ and tests/, diagrams included."""
+    found = re.findall(rf"(?<![\w/.])(?:{'|'.join(sorted(ROOMS | {'tests'}))})/[\w/]*\w(?:\.\w+)?", TEXT)
+    return sorted(set(found))
+
+
+def test_rooms_are_those_of_the_layer_test() -> None:
+    table = TEXT.partition("| room |")[2].partition("\n\n")[0]
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    rooms = [re.findall(r"`(\w+)(?:/|\.py)`", row) for row in rows]
+    assert [set(row) for row in rooms] == LAYERS
+    assert sum(map(len, rooms)) == len(DEPTH)
+
+
+@pytest.mark.parametrize("path", paths())
+def test_named_file_exists(path: str) -> None:
+    base = ROOT if path.startswith("tests/") else PACKAGE
+    # In the diagrams a module is named without its suffix.
+    assert any((base / candidate).exists() for candidate in (path, f"{path}.py"))
+
+
+def test_contributing_names_files_that_exist() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"(?:minirospy|tests|docs|benchmarks)/[\w/]+\.\w+", text))
+    made_up = {"minirospy/cli/ros/rosmine.py", "tests/cli/test_rosmine.py"}
+    assert len(named) > 15
+    assert not [path for path in named - made_up if not (ROOT / path).exists()]
+    (example,) = re.findall(r"pytest (tests/[\w/]+\.py)::(\w+)", text)
+    assert f"def {example[1]}(" in (ROOT / example[0]).read_text(encoding="utf-8")
+
+
+def test_named_functions_exist() -> None:
+    """`_hz` in `cli/ros/rostopic.py`, `Node.close` in `runtime/node.py`."""
+    named = re.findall(r"`([\w.]+)` in `([\w/]+/\w+\.py)`", TEXT)
+    assert len(named) >= 5
+    for name, path in named:
+        text = (PACKAGE / path).read_text(encoding="utf-8")
+        for part in name.split("."):
+            assert re.search(rf"^ *(?:async )?(?:def|class) {part}\b", text, re.MULTILINE), (name, path)
+
+
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md"), ROOT / "tests" / "README.md"])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_between_pages_lead_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / link).exists(), link
