@@ -171,6 +171,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
     port = str(split_uri(environ["ROS_MASTER_URI"], "http")[1])
     command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", port]
     if is_real:
+        environ = {name: value for name, value in environ.items() if name != "PYTHONPATH"}
         command = [shutil.which("rosmaster", path="/usr/bin") or "rosmaster", "--core", "-p", port]
     process = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
     # A real rosmaster may be busy for long.

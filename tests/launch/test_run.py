@@ -139,7 +139,7 @@ def test_a_node_is_guarded_and_watched_before_it_is_heard_of(
         os.utime(package / "wait.py", ns=(1, 1))
         return process
 
-    monkeypatch.setattr("minirospy.launch.runner.start_process", start_changed)
+    monkeypatch.setattr("minirospy.launch.node_start.start_process", start_changed)
     environment = Environment.read()
     launcher = Launcher(
         LaunchSpec(nodes=[node]), environment, Packages(environment), RunOptions(watch=True), Hearing()

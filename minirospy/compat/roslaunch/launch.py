@@ -111,7 +111,7 @@ class ROSLaunchRunner:
         """Wait until all nodes have ended, or a signal came; then end what is left. Without a node it does not wait."""
         monitor = self._monitor()
         try:
-            if self._launcher.is_anything_left():
+            if self._launcher.supervisor.is_anything_left:
                 monitor.mainthread_spin()
             elif not monitor.done:
                 Output(title=False).say("No processes to monitor", bold=True)

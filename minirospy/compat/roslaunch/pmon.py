@@ -71,7 +71,7 @@ class ApiLauncher(Launcher):
     @property
     def log_folder(self) -> str:
         """The folder of its nodes' log files."""
-        return str(self._log_folder)
+        return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
         process = super()._start_process(node, name)
@@ -166,7 +166,7 @@ class Process:
     def stop(self, errors: list[str] | None = None) -> None:
         """End it, and wait for that; it is not started again."""
         if self.process:
-            self._launcher.end_process(self.process)
+            self._launcher.supervisor.end_process(self.process)
 
     def get_info(self) -> dict[str, Any]:
         """Return pid, exit code and other facts about it."""
@@ -270,7 +270,7 @@ class ProcessMonitor:
 
     def registrations_complete(self) -> None:
         """Let the monitor end with the last process, as no further one will be registered."""
-        self._launcher.end_with_nodes()
+        self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
         """Notify a listener of each process that exits."""

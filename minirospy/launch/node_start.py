@@ -1,0 +1,63 @@
+"""A NodeSpec -> the process of that node: its command, environment, working folder and log files."""
+
+from __future__ import annotations
+
+import sys
+
+from minirospy.environment import Environment
+from minirospy.errors import MinirospyError
+from minirospy.launch.command import node_command, node_environment, node_folder
+from minirospy.launch.master import LaunchMaster
+from minirospy.launch.options import RunOptions
+from minirospy.launch.process import Process, start_process
+from minirospy.launch.spec import NodeSpec
+from minirospy.workspace.packages import Packages
+
+__all__ = ["NodeStarter"]
+
+
+class NodeStarter:
+    """Starts the nodes of one launch."""
+
+    def __init__(
+        self, environment: Environment, packages: Packages, options: RunOptions, master: LaunchMaster
+    ) -> None:
+        self._environment = environment
+        self._packages = packages
+        self._options = options
+        self._master = master
+
+    def start(self, node: NodeSpec, name: str) -> Process:
+        """Start a node as the process ``name``. Raises MinirospyError."""
+        command = node_command(node, self._packages)
+        folder = node_folder(node, self._packages, self._environment)
+        environ = node_environment(node, self._environment)
+        screen = self._uses_screen(node)
+        if not screen or not sys.stdout.isatty():
+            # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
+            # writes whole lines, which those of another node do not cut in two.
+            environ.setdefault("PYTHONUNBUFFERED", "1")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = error.strerror or error
+            raise MinirospyError(f"the folder {folder} cannot be made: {why}; set ROS_HOME") from error
+
+        log = self._master.log_folder / name.replace("/", "-")
+        process = start_process(
+            name,
+            [*command, f"__log:={log}.log"],
+            environ=environ,
+            folder=folder,
+            stdout_file=None if screen else log.with_name(f"{log.name}-stdout.log"),
+            log_errors=self._options.log_errors,
+        )
+        process.node = node
+        process.log_files = f"{log}*.log" if self._master.has_logs else "none"
+        return process
+
+    def _uses_screen(self, node: NodeSpec) -> bool:
+        """Return whether a node prints to the terminal instead of a file."""
+        if not self._master.has_logs:
+            return True
+        return (self._options.screen or node.output == "screen") and not self._options.log
