@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import socket
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -93,9 +92,10 @@ def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = No
 
 
 def anonymous_name(base: str) -> str:
-    """A name that no other node has: base, host, pid and time, in rospy's form."""
+    """Return a name that no other node has, different at each call: base, host, process id and a random number."""
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
-    return f"{base}_{host}_{os.getpid()}_{int(time.time() * 1000)}"
+    number = int.from_bytes(os.urandom(8), "big") >> 1
+    return f"{base}_{host}_{os.getpid()}_{number}"
 
 
 class Arguments(NamedTuple):

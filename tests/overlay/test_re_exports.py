@@ -10,6 +10,7 @@ import pytest
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 COMPAT = OVERLAY.with_name("compat")
 SHARED = {
+    "ros_names.py",
     "__init__.py",
     "rpi.py",
     "rospy/live.py",

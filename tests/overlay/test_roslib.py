@@ -1,4 +1,4 @@
-"""roslib as tutorials of old import it."""
+"""roslib as old tutorials import it."""
 
 from __future__ import annotations
 
@@ -51,10 +51,23 @@ def test_load_manifest_finds_the_sources_of_a_package_and_of_what_it_needs(packa
     assert sys.path[0] == before[0]
 
 
+def test_load_manifest_leaves_a_built_package_as_it_is_sourced(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The devel folder has the messages of the package, which its src folder lacks."""
+    built = tmp_path / "devel" / "beginner_tutorials"
+    (built / "msg").mkdir(parents=True)
+    (built / "__init__.py").touch()
+    monkeypatch.syspath_prepend(str(tmp_path / "devel"))
+    roslib.load_manifest("beginner_tutorials")
+    assert str(package / "src") not in sys.path
+    assert str(package.parent / "helper" / "src") in sys.path
+
+
 def test_load_manifest_in_a_script(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     script = str(package / "scripts" / "talker.py")
     assert subprocess.check_output([sys.executable, script], text=True) == "42\n"
-    # The package that the script lies in is found without any variable, too.
+    # The package that contains the script is also found without any variable.
     monkeypatch.delenv("ROS_PACKAGE_PATH")
     assert subprocess.check_output([sys.executable, script], text=True) == "42\n"
 

@@ -21,7 +21,7 @@ _MASKS = [
     (re.compile(r"http://[\w.-]+:\d+/?"), "<uri>"),
     (re.compile(r"rosrpc://[\w.-]+:\d+"), "<rosrpc>"),
     (re.compile(r"(?:127\.0\.0\.1|localhost)(?:'?, |:)\d+"), "<address>"),
-    (re.compile(r"_\d+_\d{13}"), "<anonymous>"),
+    (re.compile(r"_\d+_\d{13,19}"), "<anonymous>"),
     (re.compile(r"\b1[5-9]\d{8}\.\d+"), "<time>"),
     (re.compile(r"0x[0-9a-f]{6,}"), "<id>"),
     (re.compile(r"\d+\.\d+ms"), "<ms>"),

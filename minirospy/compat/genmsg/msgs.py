@@ -145,9 +145,9 @@ def is_valid_msg_type(x: str) -> bool:
     return bool(x) and re.match(r"[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
 
 
-def is_valid_msg_field_name(x: str) -> bool:
+def is_valid_msg_field_name(x: str | None) -> bool:
     """Return whether a text is a field's name."""
-    return re.match(r"[A-Za-z]\w*\Z", x, re.ASCII) is not None
+    return x is not None and re.match(r"[A-Za-z]\w*\Z", x, re.ASCII) is not None
 
 
 def is_valid_constant_type(x: str) -> bool:

@@ -20,4 +20,4 @@ class MsgGenerationException(MessageException):
 
 def is_simple(type_: str) -> bool:
     """Return whether ``struct`` packs a type."""
-    return type_ in SIMPLE_TYPES_DICT
+    return type_ in SIMPLE_TYPES

@@ -65,8 +65,8 @@ def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
 
 
 def isstring(s: object) -> bool:
-    """Return whether a value is text or bytes."""
-    return isinstance(s, str | bytes)
+    """Return whether a value is a str."""
+    return isinstance(s, str)
 
 
 def _checked(type_: str) -> str:

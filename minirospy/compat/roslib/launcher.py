@@ -16,7 +16,7 @@ __all__ = ["load_manifest"]
 
 
 def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
-    """Put the ``src`` folders of a package and of all that it needs on sys.path, as old scripts do.
+    """Add the ``src`` folders of a package and of all that it needs to sys.path, unless it can be imported already.
 
     The package that contains the script, or one that can be imported, need not be on ROS_PACKAGE_PATH.
     Raises ResourceNotFound.
@@ -32,11 +32,12 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
         folders = [own] if own else []
     except InvalidManifest:
         folders = [Path(rospack.get_path(package_name))]
-    for folder in reversed(folders):
+    for folder in folders:
         source = str(folder / "src")
-        if source not in sys.path and any(Path(source).glob("*/__init__.py")):
-            # After the script's own folder, as rospack's packages come before what is installed.
-            sys.path.insert(1, source)
+        modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
+        # Last, and only where a module is missing: a devel folder that is sourced also has the package's messages.
+        if source not in sys.path and not all(map(_is_importable, modules)):
+            sys.path.append(source)
 
 
 def _folder_of_script(package: str) -> Path | None:

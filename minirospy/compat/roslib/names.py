@@ -18,7 +18,7 @@ PRN_SEPARATOR = TYPE_SEPARATOR = "/"
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
     """Return ``package/name``, or the name alone in the package itself."""
-    return name if res_pkg_name == my_pkg else f"{res_pkg_name}{PRN_SEPARATOR}{name}"
+    return name if res_pkg_name == my_pkg else res_pkg_name + PRN_SEPARATOR + name
 
 
 def resource_name_base(name: str) -> str:

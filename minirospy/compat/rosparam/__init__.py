@@ -10,8 +10,8 @@ from typing import Any
 
 import yaml
 
+from minirospy.compat.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.compat.rosgraph.masterapi import Master, MasterError
-from minirospy.compat.rosgraph.names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph

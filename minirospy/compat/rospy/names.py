@@ -5,35 +5,23 @@ Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from minirospy import names
 from minirospy.client.process import process
+from minirospy.compat.ros_names import is_global, is_private
 from minirospy.errors import ROSException
 
 __all__ = [
     "ANYTYPE",
-    "GLOBALNS",
-    "REMAP",
-    "SEP",
     "SERVICE_ANYTYPE",
     "TOPIC_ANYTYPE",
     "ParameterInvalid",
-    "canonicalize_name",
     "get_mappings",
     "get_resolved_mappings",
-    "get_ros_namespace",
     "global_name",
     "initialize_mappings",
-    "is_global",
-    "is_private",
-    "isstring",
-    "load_mappings",
-    "make_global_ns",
-    "namespace",
-    "ns_join",
     "reload_mappings",
     "resolve_name_without_node_name",
     "scoped_name",
@@ -44,8 +32,6 @@ __all__ = [
 
 _set_caller_id = process.be_called
 
-SEP = GLOBALNS = "/"
-REMAP = ":="
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
 Validator = Callable[[Any, str], str]
@@ -73,12 +59,6 @@ def get_resolved_mappings() -> dict[str, str]:
     return {**process.remappings, **process.arguments.special} if process.initialized else {}
 
 
-def load_mappings(argv: Sequence[str]) -> dict[str, str]:
-    """Return the remappings in a command line, as they are spelled, without private parameters."""
-    arguments = names.parse_arguments(argv)
-    return {**arguments.remappings, **arguments.special}
-
-
 def reload_mappings(argv: Sequence[str]) -> None:
     """Use ``argv`` as this node's command line."""
     process.reload_arguments(argv)
@@ -91,56 +71,9 @@ def initialize_mappings(node_name: str) -> None:
 
 def resolve_name_without_node_name(name: str) -> str:
     """Return the global name of a topic before init_node. Raises ValueError on a private one."""
-    if names.is_private(name):
+    if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
-    return process.resolve_topic(name)
-
-
-def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the namespace of a process, with slashes around it: ``__ns:=`` of its command line, or ROS_NAMESPACE."""
-    special = process.arguments.special if argv is None else names.parse_arguments(argv).special
-    return make_global_ns(
-        special.get("__ns") or (os.environ if env is None else env).get("ROS_NAMESPACE", "/")
-    )
-
-
-def make_global_ns(name: str) -> str:
-    """Return ``name`` as a namespace, with slashes around it. Raises ValueError on a private name."""
-    if names.is_private(name):
-        raise ValueError(f"cannot turn [{name}] into a global name")
-    return ("" if names.is_global(name) else "/") + name + ("" if name.endswith("/") or not name else "/")
-
-
-def namespace(name: str) -> str:
-    """Return the namespace of ``name``, with a trailing slash. Raises ValueError on None."""
-    if name is None:
-        raise ValueError("name")
-    return names.namespace_of(name)
-
-
-def ns_join(ns: str, name: str) -> str:
-    """Return ``name`` below ``ns``; global and private names stay what they are."""
-    return names.join(ns, name)
-
-
-def canonicalize_name(name: str) -> str:
-    """Return ``name`` without doubled or trailing slashes."""
-    return names.canonicalize(name)
-
-
-def is_global(name: str) -> bool:
-    """Return whether ``name`` starts at the root."""
-    return bool(name) and names.is_global(name)
-
-
-def is_private(name: str) -> bool:
-    """Return whether ``name`` starts with ``~``."""
-    return bool(name) and names.is_private(name)
-
-
-def isstring(s: object) -> bool:
-    """Return whether ``s`` is a str."""
-    return isinstance(s, str)
+    return process.resolve_topic(name or "")
 
 
 def scoped_name(caller_id: str, name: str) -> str:

@@ -1,20 +1,12 @@
 """rospy.names, provided by minirospy: remappings, and the validation of a call's arguments."""
 
 from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
-from minirospy.compat.rospy.names import (
-    ANYTYPE,
+from minirospy.compat.ros_names import (
     GLOBALNS,
     REMAP,
     SEP,
-    SERVICE_ANYTYPE,
-    TOPIC_ANYTYPE,
-    ParameterInvalid,
     canonicalize_name,
-    get_mappings,
-    get_resolved_mappings,
     get_ros_namespace,
-    global_name,
-    initialize_mappings,
     is_global,
     is_private,
     isstring,
@@ -22,6 +14,16 @@ from minirospy.compat.rospy.names import (
     make_global_ns,
     namespace,
     ns_join,
+)
+from minirospy.compat.rospy.names import (
+    ANYTYPE,
+    SERVICE_ANYTYPE,
+    TOPIC_ANYTYPE,
+    ParameterInvalid,
+    get_mappings,
+    get_resolved_mappings,
+    global_name,
+    initialize_mappings,
     reload_mappings,
     resolve_name_without_node_name,
     scoped_name,

@@ -1,0 +1,75 @@
+"""The functions that rosgraph.names and rospy.names share.
+
+Source: http://wiki.ros.org/Names and the behaviour of rosgraph.names, also for None and other types.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+
+from minirospy import names
+
+__all__ = [
+    "GLOBALNS", "PRIV_NAME", "REMAP", "SEP", "canonicalize_name", "get_ros_namespace", "is_global", "is_private",
+    "isstring", "load_mappings", "make_global_ns", "namespace", "ns_join",
+]  # fmt: skip
+
+PRIV_NAME = "~"
+SEP = GLOBALNS = "/"
+REMAP = ":="
+
+
+def isstring(s: object) -> bool:
+    """Return whether a value is a str."""
+    return isinstance(s, str)
+
+
+def is_global(name: str | None) -> bool:
+    """Return whether a name starts at the root."""
+    return name is not None and name[:1] == SEP
+
+
+def is_private(name: str | None) -> bool:
+    """Return whether a name starts with ``~``."""
+    return name is not None and name[:1] == PRIV_NAME
+
+
+def namespace(name: str) -> str:
+    """Return the namespace of a name, with a trailing slash. Raises ValueError on None, TypeError on another type."""
+    if name is None:
+        raise ValueError("name")
+    if not isinstance(name, str):
+        raise TypeError("name")
+    return names.namespace_of(name)
+
+
+def ns_join(ns: str | None, name: str) -> str:
+    """Return a name below a namespace; global and private names stay what they are."""
+    return names.join(ns, name) if ns else name
+
+
+def canonicalize_name(name: str) -> str:
+    """Return a name without doubled or trailing slashes; None and an empty name as they are."""
+    return names.canonicalize(name) if name else name
+
+
+def load_mappings(argv: Sequence[str]) -> dict[str, str]:
+    """Return the remappings in a command line, as they are spelled, without private parameters."""
+    arguments = names.parse_arguments(argv)
+    return {**arguments.remappings, **arguments.special}
+
+
+def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
+    """Return the namespace of the command line (``__ns:=``), else of the environment, with slashes around it."""
+    named = names.parse_arguments(sys.argv if argv is None else argv).special.get("__ns")
+    return make_global_ns(named or (os.environ if env is None else env).get("ROS_NAMESPACE") or GLOBALNS)
+
+
+def make_global_ns(name: str) -> str:
+    """Return a name as a namespace, with a slash on both ends. Raises ValueError on a private one."""
+    if is_private(name):
+        raise ValueError(f"cannot turn [{name}] into a global name")
+    name = name if is_global(name) else SEP + name
+    return name if name.endswith(SEP) else name + SEP

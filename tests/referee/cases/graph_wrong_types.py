@@ -1,0 +1,46 @@
+"""The functions on names with None, bytes and other types, as programs pass them by mistake."""
+
+import genmsg.msgs
+import genpy.message
+import rosgraph.names as names
+import roslib.names
+import rospy.names
+from referee import show
+
+VALUES = (None, "", "a", "/a", "~a", "a b", "-a:=b", "~a:=b", 5, b"/a")
+
+
+def result(function, *arguments):
+    """What a call gives, or the type of what it raises; what is false is False."""
+    try:
+        return repr(function(*arguments) or False)
+    except (TypeError, AttributeError):
+        # Which of the two depends on the first thing that is tried with the argument.
+        return "wrong type"
+    except Exception as error:  # noqa: BLE001 - whatever it is
+        return f"{type(error).__name__} {error}"
+
+
+for function in (
+    names.isstring, names.is_global, names.is_private, names.is_legal_remap, names.is_legal_name, names.is_legal_base_name,
+    names.namespace, names.canonicalize_name, names.make_global_ns, names.make_caller_id, rospy.names.is_global,
+    rospy.names.is_private, rospy.names.namespace, rospy.names.canonicalize_name, rospy.names.make_global_ns,
+    roslib.names.resource_name_base, roslib.names.resource_name_package, roslib.names.package_resource_name,
+    roslib.names.is_legal_resource_name, roslib.names.is_legal_resource_base_name, genmsg.msgs.is_valid_msg_field_name,
+    genmsg.msgs.is_valid_msg_type, genmsg.msgs.is_builtin, genmsg.msgs.is_header_type, genmsg.msgs.bare_msg_type,
+    genpy.message.isstring, genpy.message.is_simple,
+):  # fmt: skip
+    show(function.__name__, *(result(function, value) for value in VALUES))
+for namespace in (None, "", "/", "/ns", "ns"):
+    for value in (None, "", "a", "/a", "~a"):
+        show(
+            repr(namespace),
+            repr(value),
+            result(names.ns_join, namespace, value),
+            result(rospy.names.ns_join, namespace, value),
+            result(names.resolve_name, value, namespace),
+            result(names.script_resolve_name, namespace, value),
+            result(roslib.names.resource_name, namespace, value),
+        )
+show(sorted(names.load_mappings(["a:=b", "~p:=1", "_q:=2", "__name:=n", "-x:=y", "/c:=d", "e"]).items()))
+show(names.anonymous_name("a") == names.anonymous_name("a"))
