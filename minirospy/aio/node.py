@@ -15,7 +15,7 @@ from minirospy import names
 from minirospy.aio.log import RosoutHandler, TerminalHandler
 from minirospy.aio.services import Service, ServiceClass, ServiceProxy
 from minirospy.aio.time import Rate, SimulatedTime
-from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription, interface_type
+from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription
 from minirospy.environment import Environment
 from minirospy.errors import (
     MasterUnreachableError,
@@ -32,7 +32,7 @@ from minirospy.runtime.node import Node as RuntimeNode
 from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.topics import Publication
 from minirospy.times import Duration, Time
-from minirospy.wire.tcpros import ANY
+from minirospy.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Node"]
 
@@ -243,7 +243,7 @@ class Node:
         if state is None:
             publication = Publication(
                 resolved,
-                interface_type(message_class),
+                InterfaceType.of(message_class),
                 queue_size=queue_size or 0,
                 latch=latch,
                 headers=headers,

@@ -150,7 +150,7 @@ class Service(Handle):
         is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(
             getattr(handler, "__call__", None)  # noqa: B004 - an object whose __call__ is a coroutine function
         )
-        type_ = InterfaceType(service_class._type, service_class._md5sum)
+        type_ = InterfaceType.of(service_class)
         types = {"request_type": self._request_class._type, "response_type": self._response_class._type}
         self._server: ServiceServer
         if is_async:

@@ -216,7 +216,7 @@ class SubscribedTopic:
         self._handles: weakref.WeakSet[Subscription[Any]] = weakref.WeakSet()
         runtime = node._node
         self.subscription: RuntimeSubscription = runtime.make_subscription(
-            topic, interface_type(message_class), self._deliver, on_loop=True
+            topic, InterfaceType.of(message_class), self._deliver, on_loop=True
         )
         self._registration = node._spawn(
             registered(runtime.subscribe, self.subscription, f"subscription [{topic}]", node.log)
@@ -310,8 +310,3 @@ class PublishedTopic:
     async def next_change(self) -> None:
         """Return when a subscriber has come or gone."""
         await self._changed.wait()
-
-
-def interface_type(message_class: Any) -> InterfaceType:
-    text = getattr(message_class, "_full_text", "")
-    return InterfaceType(message_class._type, message_class._md5sum, text)

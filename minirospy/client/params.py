@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.process import process
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
+from minirospy.graph.parameter_cache import NOT_SET
 
 __all__ = [
     "UNSPECIFIED",
@@ -51,7 +52,7 @@ def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
     Raises KeyError where it is not set and there is no default, ROSException where the master fails.
     """
     value = _get(process.resolve(param_name))
-    if value is not KeyError:
+    if value is not NOT_SET:
         return _as_rospy(value)
     if default is UNSPECIFIED:
         raise KeyError(param_name)
@@ -74,7 +75,7 @@ def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
         value = _get(name)
         with process.lock:
             cache.store(name, value, changes)
-    if value is not KeyError:
+    if value is not NOT_SET:
         return _as_rospy(copy.deepcopy(value))
     if default is UNSPECIFIED:
         raise KeyError(param_name)
@@ -174,12 +175,12 @@ def get_param_server_cache() -> KeptParameters:
 
 
 def _get(name: str) -> Any:
-    """The value, or KeyError (the class) where it is not set."""
+    """Return the value, or NOT_SET."""
     try:
         return _ask("get", name, lambda: process.master.get_param(name))
     except ROSException as error:
         if isinstance(error.__cause__, RpcRefused):
-            return KeyError
+            return NOT_SET
         raise
 
 

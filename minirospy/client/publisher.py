@@ -16,7 +16,6 @@ from minirospy.client.topic import (
     AnyMsg,
     Shared,
     Topic,
-    interface_type,
     register_with_master,
     unregister_from_master,
 )
@@ -25,7 +24,7 @@ from minirospy.errors import ROSException, ROSSerializationException, Serializat
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.runtime.workers import InOrder
 from minirospy.wire.framing import LargeFrame, Pieces
-from minirospy.wire.tcpros import ANY
+from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.runtime.links import OutLink
@@ -126,7 +125,7 @@ class Published(Shared):
         from minirospy.runtime.topics import Publication
 
         super().__init__(topic, data_class)
-        self.publication = Publication(topic, interface_type(data_class), on_link=self._on_link)
+        self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Any]] = set()
         self.subscriber_listeners: list[SubscribeListener] = []
         """Who is told of subscribers; a program may add and remove."""

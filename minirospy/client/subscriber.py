@@ -11,12 +11,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from minirospy.client.process import process
-from minirospy.client.topic import Shared, Topic, interface_type, register_with_master, unregister_from_master
+from minirospy.client.topic import Shared, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.runtime.complaints import Complaints
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.client.statistics import StatisticsPublisher
@@ -208,7 +209,7 @@ class Subscribed(Shared):
             self._registered = True
             self.subscription = node.make_subscription(
                 self.resolved_name,
-                interface_type(self.data_class),
+                InterfaceType.of(self.data_class),
                 self._deliver,
                 newest=self._newest(),
                 tcp_nodelay=self._tcp_nodelay,

@@ -13,9 +13,9 @@ from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.process import process
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.idl.message import Message
-from minirospy.wire.tcpros import ANY, InterfaceType
+from minirospy.wire.tcpros import ANY
 
-__all__ = ["AnyMsg", "Shared", "Topic", "interface_type", "register_with_master", "unregister_from_master"]
+__all__ = ["AnyMsg", "Shared", "Topic", "register_with_master", "unregister_from_master"]
 
 _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Any)
@@ -118,11 +118,6 @@ class Shared:
     def has_connection(self, endpoint_id: str) -> bool:
         """Whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""
         raise NotImplementedError
-
-
-def interface_type(data_class: type[Any]) -> InterfaceType:
-    """What a connection header tells of a message class."""
-    return InterfaceType(data_class._type, data_class._md5sum, getattr(data_class, "_full_text", ""))
 
 
 def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:

@@ -7,13 +7,22 @@ Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
 
 from __future__ import annotations
 
-from typing import Any
+from enum import Enum
+from typing import Any, Final
 
-__all__ = ["ParameterCache"]
+__all__ = ["NOT_SET", "ParameterCache"]
+
+
+class _Missing(Enum):
+    NOT_SET = "not set"
+
+
+NOT_SET: Final = _Missing.NOT_SET
+"""In place of the value of a parameter that is not set; None could be a value."""
 
 
 class ParameterCache:
-    """Values by global name; ``KeyError`` as a value says that a parameter is not set.
+    """Values by global name; the value NOT_SET says that the master has none.
 
     :meth:`store` and :meth:`changed` from several threads want a lock around them.
     """

@@ -165,7 +165,7 @@ class ToolNode:
         self, topic: str, message_class: type[Message], *, latch: bool, queue_size: int = 100
     ) -> TopicPublisher:
         """Publish a topic of an installed message class from now on."""
-        type_ = InterfaceType(message_class._type, message_class._md5sum, message_class._full_text)
+        type_ = InterfaceType.of(message_class)
         publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
         self._loop.run(self._node.advertise(publication))
         return TopicPublisher(publication)

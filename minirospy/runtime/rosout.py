@@ -65,7 +65,7 @@ class RosoutNode:
                 _log.warning("%s cannot be written: %s", self._log_file, error.strerror or error)
             else:
                 self._file.text(f"\n\n{time.time():.9f}  Node Startup")
-        type_ = InterfaceType(Log._type, Log._md5sum, Log._full_text)
+        type_ = InterfaceType.of(Log)
         await self.node.start()
         self._aggregated = Publication("/rosout_agg", type_, queue_size=1000)
         await self.node.advertise(self._aggregated)
@@ -109,7 +109,7 @@ class RosoutNode:
         await self.node.serve(
             LoopServiceServer(
                 f"/rosout/{name}",
-                InterfaceType(class_._type, class_._md5sum),
+                InterfaceType.of(class_),
                 self.node.name,
                 handler,
                 request_type=class_._request_class._type,

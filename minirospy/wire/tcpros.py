@@ -7,7 +7,7 @@ Source: http://wiki.ros.org/ROS/TCPROS, http://wiki.ros.org/ROS/Connection%20Hea
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from minirospy.errors import HandshakeRefused, WireError
 from minirospy.escape import escaped, has_controls
@@ -38,6 +38,11 @@ class InterfaceType(NamedTuple):
     name: str
     md5sum: str
     definition: str = ""
+
+    @classmethod
+    def of(cls, described: Any) -> InterfaceType:
+        """Return the type of a message's or service's class; a service's class has no full text."""
+        return cls(described._type, described._md5sum, getattr(described, "_full_text", ""))
 
 
 def subscriber_header(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.graph.parameter_cache import ParameterCache
+from minirospy.graph.parameter_cache import NOT_SET, ParameterCache
 from minirospy.graph.parameters import ParameterTree
 
 KEYS = ["/", "/a", "/a/b", "/a/b/c", "/ab", "/x"]
@@ -64,7 +64,7 @@ def test_what_it_knows_is_what_the_master_says(program: list[tuple[str, str, obj
             if key not in subscribed:
                 tree.subscribe(key, "/reader", "http://reader")
                 subscribed.add(key)
-            truth = tree.get(key) if tree.has(key) else KeyError
+            truth = tree.get(key) if tree.has(key) else NOT_SET
             try:
                 assert cache.get(key) == truth
             except LookupError:

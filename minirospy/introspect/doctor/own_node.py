@@ -90,7 +90,7 @@ class DoctorNode:
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
             name,
-            InterfaceType(type_._type, type_._md5sum),
+            InterfaceType.of(type_),
             handler,
             request_type=type_._request_class._type,
             response_type=type_._response_class._type,
@@ -107,13 +107,11 @@ class DoctorNode:
         # In this order the master has to tell us of ourselves.
         await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
         text = message_class("std_msgs/String")
-        letter = Publication(
-            self.letter, InterfaceType(text._type, text._md5sum, text._full_text), latch=True
-        )
+        letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
         letter.publish(serialize_frame(len(body).to_bytes(4, "little") + body))
         log = message_class("rosgraph_msgs/Log")
-        type_ = InterfaceType(log._type, log._md5sum, log._full_text)
+        type_ = InterfaceType.of(log)
         await self.node.advertise(letter)
         await self.node.advertise(Publication("/rosout", type_, on_link=self._link_changed))
 
