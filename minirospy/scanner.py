@@ -64,7 +64,7 @@ class Scan(NamedTuple):
         return min(self.ranges)
 
     def fields(self) -> tuple[bool, bool]:
-        """Whether the warning field and the protective field are free."""
+        """Return whether the warning field and the protective field are free."""
         nearest = self.nearest
         return nearest >= FIELDS[0], nearest >= FIELDS[1]
 
@@ -90,7 +90,7 @@ class Room:
         self._walls = [_nearest_wall(_angle(beam), walls) for beam in range(BEAMS)]
 
     def scan(self, noise: float = NOISE) -> Scan:
-        """What the scanner sees now."""
+        """Return what the scanner sees now."""
         ranges, intensities, reflectors = [], [], []
         gauss = self._noise.gauss
         person = self._person_ranges()
@@ -134,7 +134,7 @@ def _angle(beam: int) -> float:
 
 
 def _nearest_wall(angle: float, walls: Sequence[Wall]) -> tuple[float, float, bool]:
-    """The distance, brightness and kind of what a beam meets first."""
+    """Return the distance, brightness and kind of what a beam meets first."""
     dx, dy = math.cos(angle), math.sin(angle)
     nearest: tuple[float, float, bool] = (math.inf, 0.0, False)
     for wall in walls:

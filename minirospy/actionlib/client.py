@@ -97,11 +97,11 @@ class ActionClient:
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """The older name of :meth:`wait_for_server`."""
+        """Return the older name of :meth:`wait_for_server`."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever)."""
+        """Return whether a server is connected by all five topics, within ``timeout`` (a zero Duration: whenever)."""
         for subscriber in (self.result_sub, self.feedback_sub):
             subscription = subscriber.impl and subscriber.impl.subscription
             if subscription and self._news.notify not in subscription.on_connected:
@@ -141,7 +141,7 @@ class ActionClient:
 
 
 class _Listener(rospy.SubscribeListener):
-    """Tells of subscribers that come."""
+    """Notifies of new subscribers."""
 
     def __init__(self, tell: Callable[[], None]) -> None:
         self._tell = tell
@@ -149,7 +149,7 @@ class _Listener(rospy.SubscribeListener):
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """A subscriber has come."""
+        """Notify of a new subscriber."""
         self._tell()
 
 

@@ -24,6 +24,6 @@ class GoalIDGenerator:
         self.name = name
 
     def generate_ID(self) -> GoalID:
-        """A GoalID that no other goal of this process has, stamped with the present. Raises ROSInitException."""
+        """Return a GoalID that no other goal of this process has, stamped with the present. Raise ROSInitException."""
         now = rospy.Time.now()
         return GoalID(stamp=now, id=f"{self.name}-{next(self._numbers)}-{now.secs}.{now.nsecs}")

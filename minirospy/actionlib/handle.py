@@ -60,12 +60,12 @@ class StatusTracker:
         return rospy.Time(nsecs=self.ended_at)
 
     def end(self) -> None:
-        """The goal has ended: from now on it is told of for a while only."""
+        """Record that the goal has ended: its status is published for a while longer only."""
         self.ended_at = rospy.Time.now().to_nsec()
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """The status as it travels. Once the goal has ended, it changes no more."""
+        """Return the status as it travels. Once the goal has ended, it changes no more."""
         if self._bytes is not None:
             return self._bytes
         told = status_bytes(self.status)
@@ -115,17 +115,17 @@ class ServerGoalHandle:
         return hash(self.get_goal_id().id)
 
     def get_default_result(self) -> Message | None:
-        """A result with nothing in it."""
+        """Return a result with nothing in it."""
         return self.action_server.ActionResultType() if self.action_server else None
 
     def set_accepted(self, text: str = "") -> None:
-        """Begin with the goal."""
+        """Accept the goal."""
         self._tell("Accepting goal, id: %s, stamp: %.2f")
         if self._step(GoalEvent.ACCEPT, text) and self.action_server:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """The goal ends because it was asked to: RECALLED where it had not begun, else PREEMPTED."""
+        """End the goal at a client's request: RECALLED where it had not been accepted, else PREEMPTED."""
         self._tell("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
@@ -135,17 +135,17 @@ class ServerGoalHandle:
         self._finish(GoalEvent.REJECT, result, text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """The goal has failed."""
+        """End the goal: it has failed."""
         self._tell("Setting status to aborted on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.ABORT, result, text)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """The goal is reached."""
+        """End the goal: it is reached."""
         self._tell("Setting status to succeeded on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.SUCCEED, result, text)
 
     def set_cancel_requested(self) -> bool:
-        """A client wants the goal canceled; whether that changes anything."""
+        """Return a client wants the goal canceled; whether that changes anything."""
         self._tell("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
         tracker = self.status_tracker
         if not self.goal or tracker is None or self.action_server is None:
@@ -168,18 +168,18 @@ class ServerGoalHandle:
             self.action_server.publish_feedback(self.status_tracker.status, feedback)
 
     def get_goal(self) -> Any:
-        """The goal; None where the handle holds none."""
+        """Return the goal; None where the handle holds none."""
         return self.goal.goal if self.goal else None
 
     def get_goal_id(self) -> GoalID:
-        """The goal's id and stamp."""
+        """Return the goal's id and stamp."""
         if not self.goal or self.status_tracker is None:
             rospy.logerr("Attempt to get a goal id on an uninitialized ServerGoalHandle")
             return GoalID()
         return self.status_tracker.status.goal_id
 
     def get_goal_status(self) -> GoalStatus:
-        """The goal's status and text."""
+        """Return the goal's status and text."""
         if not self.goal or self.status_tracker is None:
             rospy.logerr("Attempt to get goal status on an uninitialized ServerGoalHandle")
             return GoalStatus()

@@ -60,29 +60,29 @@ class ClientGoalHandle:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 
     def get_comm_state(self) -> int:
-        """How far the goal is: one of CommState."""
+        """Return how far the goal is: one of CommState."""
         machine = self._machine("get_comm_state")
         return machine.state if machine else CommState.LOST
 
     def get_goal_status(self) -> int:
-        """What the server told last of the goal: one of GoalStatus."""
+        """Return what the server told last of the goal: one of GoalStatus."""
         machine = self._machine("get_goal_status")
         return machine.latest_goal_status.status if machine else GoalStatus.PENDING
 
     def get_goal_status_text(self) -> str:
-        """The text that the server told with it."""
+        """Return the text that the server told with it."""
         machine = self._machine("get_goal_status_text")
         if machine is None:
             return "ERROR: Trying to get_goal_status_text on an inactive ClientGoalHandle."
         return machine.latest_goal_status.text
 
     def get_result(self) -> Any:
-        """The goal's result; None while there is none."""
+        """Return the goal's result; None while there is none."""
         machine = self._machine("get_result")
         return machine.latest_result.result if machine and machine.latest_result else None
 
     def get_terminal_state(self) -> int:
-        """How the goal ended: one of TerminalState. LOST, and a line in the log, where it has not."""
+        """Return how the goal ended: one of TerminalState. LOST, and a line in the log, where it has not."""
         machine = self._machine("get_terminal_state")
         if machine is None:
             return TerminalState.LOST
@@ -157,7 +157,7 @@ class CommStateMachine:
             self.transition_cb(ClientGoalHandle(self))
 
     def update_status(self, status_array: GoalStatusArray) -> None:
-        """A list of statuses has come."""
+        """Process a list of statuses."""
         with self.mutex:
             if self.state == _DONE:
                 return
@@ -169,7 +169,7 @@ class CommStateMachine:
                 self._mark_as_lost()
 
     def update_result(self, action_result: ActionResult) -> None:
-        """A result has come, perhaps another goal's."""
+        """Process a result, perhaps another goal's."""
         if self.action_goal.goal_id.id != action_result.status.goal_id.id:
             return
         with self.mutex:
@@ -185,7 +185,7 @@ class CommStateMachine:
                 self.transition_to(_DONE)
 
     def update_feedback(self, action_feedback: ActionFeedback) -> None:
-        """Feedback has come, perhaps another goal's."""
+        """Process feedback, perhaps another goal's."""
         if self.action_goal.goal_id.id != action_feedback.status.goal_id.id:
             return
         with self.mutex:
@@ -237,11 +237,11 @@ class GoalManager:
         self.ActionFeedback = types.action_feedback
 
     def register_send_goal_fn(self, fn: Callable[[ActionGoal], object]) -> None:
-        """What sends a goal with its header."""
+        """Set the function that sends a goal with its header."""
         self.send_goal_fn = fn
 
     def register_cancel_fn(self, fn: Callable[[GoalID], object]) -> None:
-        """What sends a cancel."""
+        """Set the function that sends a cancel."""
         self.cancel_fn = fn
 
     def init_goal(
@@ -262,17 +262,17 @@ class GoalManager:
         return ClientGoalHandle(machine)
 
     def update_statuses(self, status_array: GoalStatusArray) -> None:
-        """A list of statuses has come."""
+        """Process a list of statuses."""
         for machine in self._get_live_statuses():
             machine.update_status(status_array)
 
     def update_results(self, action_result: ActionResult) -> None:
-        """A result has come."""
+        """Process a result."""
         for machine in self._get_live_statuses():
             machine.update_result(action_result)
 
     def update_feedbacks(self, action_feedback: ActionFeedback) -> None:
-        """Feedback has come."""
+        """Process feedback."""
         for machine in self._get_live_statuses():
             machine.update_feedback(action_feedback)
 
@@ -293,4 +293,4 @@ class GoalManager:
 
 
 def _no_cancel(goal_id: GoalID) -> None:
-    """What a manager without a client does with a cancel: nothing."""
+    """Do nothing: a manager without a client cannot cancel."""

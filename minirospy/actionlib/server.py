@@ -51,7 +51,7 @@ _SECONDS_A_STATUS = 1e-4
 
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
-    """The cancel callback of a server that has none."""
+    """Do nothing: the cancel callback of a server that has none."""
 
 
 _M = TypeVar("_M", bound=Message)
@@ -217,7 +217,7 @@ class ActionServer:
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        """A client wants goals canceled: the one of the id, all up to a stamp, or all."""
+        """Cancel goals for a client: the one of the id, all up to a stamp, or all."""
         time.sleep(CANCEL_SECONDS)
         with self.lock:
             if not self.started:
@@ -239,7 +239,7 @@ class ActionServer:
             self.last_cancel = max(self.last_cancel, goal_id.stamp)
 
     def internal_goal_callback(self, goal: ActionGoal) -> None:
-        """A client has sent a goal."""
+        """Take a goal that a client has sent."""
         header = getattr(goal, "_connection_header", None) or {}
         if not TAKES_FAST_ANSWERS.items() <= header.items():
             time.sleep(SEND_SECONDS)
@@ -261,7 +261,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """A goal has come whose id is known: a second time, or after its cancel."""
+        """Take a goal whose id is known: it comes a second time, or after its cancel."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -330,7 +330,7 @@ class _Teller:
 
 
 def _status_frequency(name: str) -> float:
-    """How often a server tells all statuses, in Hz. Raises ActionException."""
+    """Return how often a server tells all statuses, in Hz. Raise ActionException."""
     if rospy.has_param(name + "/status_frequency"):
         rospy.logwarn(
             "You're using the deprecated status_frequency parameter, please switch to "

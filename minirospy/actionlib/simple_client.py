@@ -45,7 +45,7 @@ class SimpleActionClient:
         self._news = Waiting()
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Whether a server is connected, within ``timeout`` (a zero Duration: whenever)."""
+        """Return whether a server is connected, within ``timeout`` (a zero Duration: whenever)."""
         return self.action_client.wait_for_server(timeout)
 
     def send_goal(
@@ -94,7 +94,7 @@ class SimpleActionClient:
         return self.get_state()
 
     def wait_for_result(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Whether the goal comes to its end, its done callback done, within ``timeout`` (zero: whenever)."""
+        """Return whether the goal comes to its end, its done callback done, within ``timeout`` (zero: whenever)."""
         waited_for = self.gh
         if waited_for is None:
             rospy.logerr("Called wait_for_result when no goal exists")
@@ -109,19 +109,19 @@ class SimpleActionClient:
         return self._news.wait_for(is_over, timeout) and self.gh is not None
 
     def get_result(self) -> Any:
-        """The goal's result; None while there is none."""
+        """Return the goal's result; None while there is none."""
         if self.gh is None:
             rospy.logerr("Called get_result when no goal is running")
             return None
         return self.gh.get_result()
 
     def get_state(self) -> int:
-        """The goal's state, one of GoalStatus; LOST where there is no goal."""
+        """Return the goal's state, one of GoalStatus; LOST where there is no goal."""
         gh = self.gh
         return visible_state(gh.get_goal_status()) if gh else GoalStatus.LOST
 
     def get_goal_status_text(self) -> str:
-        """The text that the server told with the state."""
+        """Return the text that the server told with the state."""
         if self.gh is None:
             rospy.logerr("Called get_goal_status_text when no goal is running")
             return "ERROR: Called get_goal_status_text when no goal is running"
@@ -169,7 +169,7 @@ class SimpleActionClient:
             self._tell_wrong(comm_state)
 
     def _finish(self, tracked: ClientGoalHandle | None) -> None:
-        """The goal and its done callback are over; whoever waits for it goes on."""
+        """Wake the threads that wait for the goal: it and its done callback are over."""
         with self._lock:
             self._finished = tracked
             if self.gh is tracked:

@@ -91,31 +91,31 @@ class SimpleActionServer:
             return self.current_goal.get_goal()
 
     def is_new_goal_available(self) -> bool:
-        """Whether a goal waits."""
+        """Return whether a goal waits."""
         return self.new_goal
 
     def is_preempt_requested(self) -> bool:
-        """Whether the goal that runs is to make way: it was canceled, or another one waits."""
+        """Return whether the goal that runs is to make way: it was canceled, or another one waits."""
         return self.preempt_request
 
     def is_active(self) -> bool:
-        """Whether a goal runs."""
+        """Return whether a goal runs."""
         if not self.current_goal.get_goal():
             return False
         return self.current_goal.get_goal_status().status in (GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """The goal that runs is reached."""
+        """End the current goal: it is reached."""
         with self.lock:
             self.current_goal.set_succeeded(result or self.get_default_result(), text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """The goal that runs has failed."""
+        """End the current goal: it has failed."""
         with self.lock:
             self.current_goal.set_aborted(result or self.get_default_result(), text)
 
     def set_preempted(self, result: Message | None = None, text: str = "") -> None:
-        """The goal that runs has made way."""
+        """End the current goal: it was preempted."""
         with self.lock:
             rospy.logdebug("Setting the current goal as canceled")
             self.current_goal.set_canceled(result or self.get_default_result(), text)
@@ -125,7 +125,7 @@ class SimpleActionServer:
         self.current_goal.publish_feedback(feedback)
 
     def get_default_result(self) -> Message | None:
-        """A result with nothing in it."""
+        """Return a result with nothing in it."""
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
@@ -143,7 +143,7 @@ class SimpleActionServer:
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
-        """The server has a new goal."""
+        """Take a new goal."""
         with self.lock:
             rospy.logdebug(
                 "A new goal %s has been received by the single goal action server", goal.get_goal_id().id
@@ -168,7 +168,7 @@ class SimpleActionServer:
             self.execute_condition.notify_all()
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:
-        """A client wants a goal canceled."""
+        """Take a client's request to cancel a goal."""
         with self.lock:
             rospy.logdebug("A preempt has been received by the SimpleActionServer")
             if preempt == self.current_goal:
@@ -183,7 +183,7 @@ class SimpleActionServer:
                 self.new_goal_preempt_request = True
 
     def executeLoop(self) -> None:
-        """The thread of the execute callback."""
+        """Run the execute callback for each goal, in its thread."""
         with process.interrupting(self._wake_soon):
             while True:
                 with self.execute_condition:

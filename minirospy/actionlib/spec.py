@@ -43,7 +43,7 @@ class ActionTypes(NamedTuple):
 
 
 def action_types(action: type[Action]) -> ActionTypes:
-    """The message classes of an action's class, such as ``runningLedAction``. Raises ActionException."""
+    """Return the message classes of an action's class, such as ``runningLedAction``. Raise ActionException."""
     try:
         parts = action()
         goal, result, feedback = parts.action_goal, parts.action_result, parts.action_feedback

@@ -8,7 +8,7 @@ __all__ = ["CommState", "SimpleGoalState", "TerminalState", "get_name_of_constan
 
 
 def get_name_of_constant(C: type, n: int) -> str:
-    """The name of the constant of a class that has this value, as ``NO_SUCH_STATE_77`` where it has none."""
+    """Return the name of the constant of a class that has this value, as ``NO_SUCH_STATE_77`` where it has none."""
     for name, value in vars(C).items():
         # A bool is an int, too: a message class has such constants.
         if type(value) is int and value == n and not name.startswith("_"):
@@ -31,7 +31,7 @@ class CommState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """The name of a state."""
+        """Return the name of a state."""
         return get_name_of_constant(cls, n)
 
 
@@ -47,7 +47,7 @@ class TerminalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """The name of a state."""
+        """Return the name of a state."""
         return get_name_of_constant(cls, n)
 
 
@@ -60,5 +60,5 @@ class SimpleGoalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """The name of a state."""
+        """Return the name of a state."""
         return get_name_of_constant(cls, n)

@@ -22,7 +22,7 @@ _STATUS_AND_LENGTH = struct.Struct("<BI")
 
 
 def status_bytes(status: GoalStatus) -> bytes:
-    """A status as it travels."""
+    """Return a status as it travels."""
     buffer = BytesIO()
     status.serialize(buffer)
     return buffer.getvalue()
@@ -54,7 +54,7 @@ class StatusList(GoalStatusArray):
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:
-        """The status of a goal; None where the list does not tell of it."""
+        """Return the status of a goal; None where the list does not tell of it."""
         name = id.encode()
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
@@ -66,7 +66,7 @@ class StatusList(GoalStatusArray):
         return None
 
     def serialize(self, buff: Writer) -> None:
-        """Write the message. Raises genpy.SerializationError."""
+        """Write the message. Raise genpy.SerializationError."""
         if self._read is not None:
             self._parts = [status_bytes(status) for status in self._read]
         stamp = self.header.stamp
@@ -77,7 +77,7 @@ class StatusList(GoalStatusArray):
         buff.write(b"".join(self._parts))
 
     def deserialize(self, data: Buffer) -> StatusList:
-        """Take the message's bytes. Raises genpy.DeserializationError."""
+        """Take the message's bytes. Raise genpy.DeserializationError."""
         data = bytes(data)
         try:
             seq, secs, nsecs, length = _HEADER.unpack_from(data)
@@ -93,7 +93,7 @@ class StatusList(GoalStatusArray):
         return self
 
     def _bounds(self) -> list[tuple[int, int]]:
-        """Where each status begins and ends."""
+        """Return where each status begins and ends."""
         bounds = []
         data, end = self._data, self._start
         try:
@@ -117,7 +117,7 @@ class StatusList(GoalStatusArray):
 
 
 def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
-    """The status of a goal in a GoalStatusArray; None where it does not tell of it."""
+    """Return the status of a goal in a GoalStatusArray; None where it does not tell of it."""
     if isinstance(statuses, StatusList):
         return statuses.find(id)
     for status in statuses.status_list:

@@ -29,7 +29,7 @@ class Waiting:
             event.set()
 
     def wait_for(self, condition: Callable[[], bool], timeout: times.Duration) -> bool:
-        """Whether ``condition()`` came to hold within ``timeout`` (zero: whenever) and before a shutdown."""
+        """Return whether ``condition()`` came to hold within ``timeout`` (zero: whenever) and before a shutdown."""
         deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
         if condition():
             return True

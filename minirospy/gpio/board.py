@@ -29,15 +29,18 @@ __all__ = ["Board", "BoardState", "Edge"]
 
 @dataclass(frozen=True)
 class BoardState:
-    """The board at one moment: ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person``: metres from the
-    scanner, ahead and to the left, None for nobody there."""
+    """The board at one moment.
+
+    ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person``: metres from the scanner, ahead and to the left,
+    None for nobody there.
+    """
 
     name: str
     pins: tuple[Pin, ...]
     person: Position | None = None
 
     def level(self, pin: int) -> int:
-        """The level of ``pin``: 0 or 1."""
+        """Return the level of ``pin``: 0 or 1."""
         return self.pins[pin].level
 
 
@@ -98,7 +101,7 @@ class Board:
         self.move_person(None)
 
     def get(self, pin: int) -> int:
-        """The level of ``pin``: 0 or 1."""
+        """Return the level of ``pin``: 0 or 1."""
         return self._link.levels[_checked(pin)]
 
     def levels(self) -> dict[int, int]:
@@ -106,11 +109,11 @@ class Board:
         return dict(enumerate(self._link.levels))
 
     def state(self) -> BoardState:
-        """A snapshot that does not change any more."""
+        """Return a snapshot that does not change any more."""
         return BoardState(self.name, tuple(self._link.states), self._link.person)
 
     def watch(self, pins: Iterable[int] | None = None, timeout: float | None = None) -> Iterator[Edge]:
-        """The edges of ``pins`` (default: all) from this call on, as they come.
+        """Yield the edges of ``pins`` (default: all) from this call on, as they come.
 
         Ends when ``timeout`` seconds have passed in all (None: never).
         """

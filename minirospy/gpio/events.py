@@ -41,7 +41,7 @@ class Detector:
         self._occurred = threading.Event()
 
     def see(self, level: int, now: float) -> bool:
-        """Whether an edge to ``level`` at ``now`` (seconds of a clock that never goes back) counts."""
+        """Return whether an edge to ``level`` at ``now`` (seconds of a clock that never goes back) counts."""
         if self.slope is not Slope.BOTH and (self.slope is Slope.RISING) != bool(level):
             return False
         if self._bouncetime is not None and self._last is not None and now - self._last <= self._bouncetime:
@@ -51,12 +51,12 @@ class Detector:
         return True
 
     def excludes(self, waiter: Detector) -> bool:
-        """Whether nobody may wait with ``waiter`` while this one watches the channel."""
+        """Return whether nobody may wait with ``waiter`` while this one watches the channel."""
         same = waiter.slope is self.slope
         return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
 
     def take(self) -> bool:
-        """Whether an edge counted since the last call."""
+        """Return whether an edge counted since the last call."""
         occurred = self._occurred.is_set()
         self._occurred.clear()
         return occurred

@@ -71,8 +71,10 @@ class Edge(NamedTuple):
 
 
 class Link:
-    """One connection. ``levels`` mirrors every pin's level and is always the same list: reading it is the
-    fast way to read a pin. ``on_edge`` is called on the reader thread, for every edge on the board.
+    """One connection.
+
+    ``levels`` mirrors every pin's level and is always the same list: reading it is the fast way to read a pin.
+    ``on_edge`` is called on the reader thread, for every edge on the board.
 
     Raises BoardError when no server can be started.
     """
@@ -100,7 +102,7 @@ class Link:
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
         """Carry ``operation`` out; when this returns, the mirror shows it. None only waits for what was sent.
 
-        Raises BoardError when the board refuses or does not answer within ``timeout`` seconds.
+        Raise BoardError when the board refuses or does not answer within ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)
@@ -244,7 +246,7 @@ class _Connection:
             self._socket.sendall(data)
 
     def incoming(self) -> Iterator[list[Message]]:
-        """The batches of messages that arrive until the connection ends."""
+        """Yield the batches of messages that arrive until the connection ends."""
         if self._more:
             yield self._more
         with contextlib.suppress(OSError, ProtocolError):
@@ -280,7 +282,7 @@ def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
 
 
 def _connect(place: Place) -> _Connection | None:
-    """The connection, after Hello and Welcome, or None when nobody answers."""
+    """Return the connection, after Hello and Welcome, or None when nobody answers."""
     token = ""
     try:
         if sys.platform != "win32" and place.uses_unix_socket:
@@ -316,7 +318,7 @@ def _connect(place: Place) -> _Connection | None:
 
 
 def _start_server(place: Place) -> subprocess.Popen[bytes]:
-    """A server process of its own session, which outlives this one as long as the board has users."""
+    """Return a server process of its own session, which outlives this one as long as the board has users."""
     import subprocess
 
     if not sys.executable:

@@ -135,7 +135,7 @@ class BoardModel:
         self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
-        """Carry one operation out whole; the pins that differ. Raises OperationError and changes nothing."""
+        """Carry one operation out whole; the pins that differ. Raise OperationError and changes nothing."""
         match operation:
             case Setup(pin, function, pull, initial):
                 wanted = self._set_up(_pin(pin), function, pull, initial)
@@ -160,7 +160,7 @@ class BoardModel:
         return changes
 
     def move_person(self, position: Position | None) -> bool:
-        """Put the person there, None being out of the room; whether that is elsewhere. Raises OperationError."""
+        """Put the person there, None being out of the room; whether that is elsewhere. Raise OperationError."""
         if position is not None and not all(map(math.isfinite, position)):
             raise OperationError(f"a position is two lengths in metres, not {position}")
         moved = position != self.person

@@ -33,9 +33,9 @@ class Place:
 
     @classmethod
     def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> Place:
-        """The place of board ``name`` (default: what the environment says).
+        """Return the place of board ``name`` (default: what the environment says).
 
-        Raises BoardError on a name that is no file name.
+        Raise BoardError on a name that is no file name.
         """
         environ = os.environ if environ is None else environ
         name = name or environ.get("MINIROSPY_BOARD") or "default"
@@ -48,7 +48,7 @@ class Place:
         return cls(name, folder.absolute())
 
     def names(self) -> list[str]:
-        """The boards of this folder, sorted."""
+        """Return the boards of this folder, sorted."""
         return sorted(path.name.removesuffix(".lock") for path in self.folder.glob("*.lock"))
 
     def prepare(self) -> None:

@@ -117,7 +117,7 @@ _OPERATION_NUMBER = {kind: number for number, kind in enumerate(_OPERATIONS)}
 
 
 def serialize(message: Message) -> bytes:
-    """The bytes of one message."""
+    """Return the bytes of one message."""
     fields: tuple[object, ...] = message
     if isinstance(message, Request):
         operation = message.operation
@@ -134,7 +134,7 @@ class Stream:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
 
     def feed(self, data: bytes) -> Iterator[Message]:
-        """The messages that ``data`` completes; raises ProtocolError."""
+        """Yield the messages that ``data`` completes; raises ProtocolError."""
         try:
             self._unpacker.feed(data)
             for item in self._unpacker:
@@ -144,12 +144,12 @@ class Stream:
 
 
 def encode_board(pins: list[Pin], person: Position | None) -> bytes:
-    """A board as one block, for the file that keeps it."""
+    """Return a board as one block, for the file that keeps it."""
     return serialize(Welcome(VERSION, pins, person))
 
 
 def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
-    """The pins and the person of :func:`encode_board`; raises ProtocolError."""
+    """Return the pins and the person of :func:`encode_board`; raises ProtocolError."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
         raise ProtocolError("not a saved board")

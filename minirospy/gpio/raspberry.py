@@ -11,7 +11,7 @@ _MODEL_FILE = Path("/proc/device-tree/model")
 
 
 def model_name(file: Path = _MODEL_FILE) -> str | None:
-    """The Raspberry Pi's model, or None on any other computer."""
+    """Return the Raspberry Pi's model, or None on any other computer."""
     try:
         name = file.read_bytes().rstrip(b"\0").decode(errors="replace")
     except OSError:
@@ -20,7 +20,7 @@ def model_name(file: Path = _MODEL_FILE) -> str | None:
 
 
 def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
-    """One line on stderr when this is a Raspberry Pi: here only its virtual twin moves."""
+    """Print one line on stderr when this is a Raspberry Pi: here only its virtual twin moves."""
     name = model_name(file)
     if name is not None:
         print(

@@ -150,7 +150,7 @@ class Gpio:
         return self._mode
 
     def setwarnings(self, flag: bool) -> None:
-        """Whether RuntimeWarnings are given."""
+        """Set whether RuntimeWarnings are given."""
         self._warns = bool(flag)
 
     def setup(
@@ -182,7 +182,7 @@ class Gpio:
             self._linked().write(((pin, level),))
 
     def input(self, channel: int) -> int:
-        """The level of a channel that is set up, output or input: 0 or 1."""
+        """Return the level of a channel that is set up, output or input: 0 or 1."""
         try:
             return self._levels[self._readable[channel]]
         except (KeyError, TypeError):
@@ -192,7 +192,7 @@ class Gpio:
             raise RuntimeError("You must setup() the GPIO channel first") from None
 
     def gpio_function(self, channel: int) -> int:
-        """What the pin does now, whoever set it up: IN or OUT."""
+        """Return what the pin does now, whoever set it up: IN or OUT."""
         pin = self._pin(channel)
         return int(self._linked().states[pin].function)
 
@@ -248,7 +248,7 @@ class Gpio:
             self._detectors[pin] = detector
 
     def add_event_callback(self, gpio: int, callback: Callback) -> None:
-        """One more callback for a channel that add_event_detect watches."""
+        """Add a callback for a channel that add_event_detect watches."""
         if not callable(callback):
             raise TypeError("Parameter must be callable")
         pin = self._input_pin(gpio)
@@ -280,7 +280,7 @@ class Gpio:
                 self._waiting.pop(pin, None)
 
     def event_detected(self, channel: int) -> bool:
-        """Whether an edge came since the last call."""
+        """Return whether an edge came since the last call."""
         detector = self._detectors.get(self._pin(channel))
         return detector is not None and detector.take()
 
@@ -305,7 +305,7 @@ class Gpio:
         atexit.unregister(self.close)
 
     def output_pin(self, channel: int) -> int:
-        """The BCM pin of a channel, for a PWM; raises what PWM() raises."""
+        """Return the BCM pin of a channel, for a PWM; raises what PWM() raises."""
         pin = self._pin(channel)
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")
@@ -318,7 +318,7 @@ class Gpio:
         self._waves[wave.pin] = weakref.ref(wave)
 
     def unregister_wave(self, wave: Wave) -> None:
-        """The pin is free for another PWM."""
+        """Free the pin for another PWM."""
         self._waves.pop(wave.pin, None)
 
     def write(self, pin: int, level: int) -> None:
@@ -529,7 +529,7 @@ class PWM:
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:
-        """The channel goes low."""
+        """Stop, and set the channel low."""
         self._running.stop()
 
     @property

@@ -120,7 +120,7 @@ class _Server:
         return Done(request.number)
 
     def _apply(self, operation: Operation | MovePerson) -> list[Message]:
-        """What everybody is to hear. Raises OperationError."""
+        """Return what everybody is to hear. Raise OperationError."""
         if isinstance(operation, MovePerson):
             return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
         now = time.time()
@@ -208,7 +208,7 @@ def _write_private(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _locked(place: Place) -> Iterator[bool]:
-    """Whether this process got the board's lock; waits a little for one that is about to end."""
+    """Yield whether this process got the board's lock; waits a little for one that is about to end."""
     deadline = time.monotonic() + LOCK_PATIENCE
     with os.fdopen(private_files.open_file(place.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b") as file:
         while not (owned := _try_lock(file.fileno())):

@@ -39,9 +39,9 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 @lru_cache(maxsize=256)
 def numpy_class(message_class: type[_M]) -> type[_M]:
-    """The class of a message whose arrays are numpy arrays: the same type to every peer.
+    """Return the class of a message whose arrays are numpy arrays: the same type to every peer.
 
-    Raises NumpyMissingError.
+    Raise NumpyMissingError.
     """
     try:
         import numpy
@@ -72,7 +72,7 @@ def numpy_class(message_class: type[_M]) -> type[_M]:
 
 
 def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
-    """The message, just read from bytes, with each of its arrays of numbers as a numpy array."""
+    """Return the message, just read from bytes, with each of its arrays of numbers as a numpy array."""
     raw = getattr(message, "_raw", {})
     for name, base, is_array in _fields(_class_of(message)):
         dtype = _DTYPES.get(base)
@@ -120,7 +120,7 @@ class _Field(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
-    """The fields of a class that are arrays of numbers, or messages."""
+    """Return the fields of a class that are arrays of numbers, or messages."""
     found = []
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
         base, array, _ = type_.partition("[")
@@ -130,7 +130,7 @@ def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
 
 
 def _is_plain(message: Message) -> bool:
-    """Whether no message of this one's type can hold an array of numbers."""
+    """Return whether no message of this one's type can hold an array of numbers."""
     return all(
         field.base not in _DTYPES and not field.is_array and _is_plain(getattr(message, field.name))
         for field in _fields(_class_of(message))

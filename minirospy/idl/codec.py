@@ -48,13 +48,13 @@ class _Leaf(NamedTuple):
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
-        """The expressions of what ``struct`` holds of it."""
+        """Return the expressions of what ``struct`` holds of it."""
         if self.type.base in _TIMES:
             return [f"{self.path}.secs", f"{self.path}.nsecs"]
         return [self.path]
 
     def packed(self) -> list[str]:
-        """The same, for ``struct`` to pack: a bool of numpy is no integer to it, a sum with one is."""
+        """Return the same, for ``struct`` to pack: a bool of numpy is no integer to it, a sum with one is."""
         return [f"{self.path} + 0"] if self.type.base == "bool" and not self.type.is_array else self.values()
 
 
@@ -66,7 +66,7 @@ class _Chunk(NamedTuple):
 
 
 def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Whether a message may be large and mostly bytes, so that a copy of all of it is to be avoided."""
+    """Return whether a message may be large and mostly bytes, so that a copy of all of it is to be avoided."""
     return any(
         (field.type.is_array and field.type.base in ("uint8", "char", "int8", "byte"))
         or (not field.type.is_primitive and keeps_buffer(lookup(field.type.base), lookup))
@@ -75,7 +75,7 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
-    """The fields that stay bytes until they are read, arrays of numbers of any length -> their letter."""
+    """Return the fields that stay bytes until they are read, arrays of numbers of any length -> their letter."""
     return {
         python_name(field.name): PRIMITIVES[field.type.base]
         for field in spec.fields
@@ -140,13 +140,13 @@ def _chunks(fields: tuple[Field, ...], path: str, lookup: Lookup) -> Iterator[_C
 
 
 def _is_fixed(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Whether a message is one run, so that its size is known, and is not nothing."""
+    """Return whether a message is one run, so that its size is known, and is not nothing."""
     leaves = list(_leaves(spec.fields, "", lookup))
     return bool(leaves) and all(leaf.letters for leaf in leaves)
 
 
 def _size(letters: str) -> int:
-    """The bytes of some letters; a number before ``s`` counts bytes."""
+    """Return the bytes of some letters; a number before ``s`` counts bytes."""
     size, count = 0, ""
     for letter in letters:
         if letter.isdigit():
@@ -157,7 +157,7 @@ def _size(letters: str) -> int:
 
 
 def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
-    """The bytes that a message takes at least."""
+    """Return the bytes that a message takes at least."""
     size = 0
     for leaf in _leaves(spec.fields, "", lookup):
         if leaf.letters:
@@ -213,7 +213,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """The call that packs values; an inner message that several of them come from is fetched once."""
+        """Return the call that packs values; an inner message that several of them come from is fetched once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -230,7 +230,7 @@ class _Writer:
         return f"{self._source.struct(letters)}.pack({', '.join(arguments)})"
 
     def _fixed(self, leaf: _Leaf) -> list[str]:
-        """The values of a leaf of fixed size; of an array of bytes its length is checked, which struct does not."""
+        """Return the values of a leaf of fixed size; of an array of bytes its length is checked, which struct does not."""
         if not leaf.type.is_array:
             return leaf.packed()
         name = self._bytes(leaf)
@@ -242,7 +242,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """A local name that holds a leaf's value, ready to be counted."""
+        """Return a local name that holds a leaf's value, ready to be counted."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])
@@ -422,7 +422,7 @@ class _Reader:
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
-        """The next bytes; ``whole`` where they are kept, so that they must not hold on to the buffer."""
+        """Return the next bytes; ``whole`` where they are kept, so that they must not hold on to the buffer."""
         self._slices = True
         part = f"data[end : (end := end + {size})]"
         return f"bytes({part})" if whole and self._keeps_buffer else part

@@ -29,25 +29,25 @@ _SEPARATOR = "=" * 80
 
 
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """What the md5sum counts: constants, then fields, nested types replaced by their md5sums.
+    """Return what the md5sum counts: constants, then fields, nested types replaced by their md5sums.
 
-    Raises DefinitionError where a message contains itself.
+    Raise DefinitionError where a message contains itself.
     """
     return _md5_text(spec, lookup, ())
 
 
 def message_md5(spec: MessageSpec, lookup: Lookup) -> str:
-    """A message's md5sum. Raises DefinitionError where it contains itself."""
+    """Return a message's md5sum. Raise DefinitionError where it contains itself."""
     return _md5(md5_text(spec, lookup))
 
 
 def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
-    """A service's md5sum: over request and response together."""
+    """Return a service's md5sum: over request and response together."""
     return _md5(md5_text(spec.request, lookup) + md5_text(spec.response, lookup))
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
-    """All types that a message needs, each once, a type before those that it needs itself."""
+    """Return all types that a message needs, each once, a type before those that it needs itself."""
     found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:
@@ -61,12 +61,12 @@ def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
 
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """A message's text and that of all types that it needs, each after a line of 80 ``=``."""
+    """Return a message's text and that of all types that it needs, each after a line of 80 ``=``."""
     return joined_texts(spec.text, ((name, lookup(name).text) for name in dependencies(spec, lookup)))
 
 
 def joined_texts(text: str, needed: Iterable[tuple[str, str]]) -> str:
-    """A text, and the name and text of each type that it needs."""
+    """Return a text, and the name and text of each type that it needs."""
     return "\n".join((text, *(f"{_SEPARATOR}\nMSG: {name}\n{inner}" for name, inner in needed)))
 
 

@@ -327,7 +327,7 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Whether ``struct`` puts no padding between these letters, some of which are floats."""
+    """Return whether ``struct`` puts no padding between these letters, some of which are floats."""
     kinds = {letter for letter in letters if letter.isalpha()}
     return ("f" in kinds and kinds <= set("fiI")) or ("d" in kinds and kinds <= set("dqQ"))
 

@@ -62,7 +62,7 @@ class Catalogue:
 
     @classmethod
     def below(cls, *roots: Path) -> Catalogue:
-        """Every folder in ``roots`` that holds definitions; an earlier root hides a later one's package."""
+        """Return every folder in ``roots`` that holds definitions; an earlier root hides a later one's package."""
         found: dict[str, Path] = {}
         for root in roots:
             for folder in sorted(root.iterdir()) if root.is_dir() else []:
@@ -71,7 +71,7 @@ class Catalogue:
         return cls(found)
 
     def files(self, package: str, kind: str) -> dict[str, Path]:
-        """A package's definitions of a kind (msg, srv, action): name -> file."""
+        """Return a package's definitions of a kind (msg, srv, action): name -> file."""
         found: Iterable[Path]
         if package in self._definitions:
             found = (path for path in self._definitions[package] if path.suffix == f".{kind}")
@@ -80,20 +80,20 @@ class Catalogue:
         return {path.stem: path for path in sorted(found)}
 
     def message(self, full_name: str) -> MessageSpec:
-        """The spec of ``pkg/Name``. Raises NotFoundError, DefinitionError."""
+        """Return the spec of ``pkg/Name``. Raise NotFoundError, DefinitionError."""
         if full_name not in self._specs:
             self._specs[full_name] = self._parse_message(full_name)
         return self._specs[full_name]
 
     def messages(self, package: str) -> list[MessageSpec]:
-        """All messages of a package, those of its actions included, by name."""
+        """Return all messages of a package, those of its actions included, by name."""
         names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
         return [self.message(f"{package}/{name}") for name in sorted(names)]
 
     def services(self, package: str) -> list[ServiceSpec]:
-        """All services of a package, by name."""
+        """Return all services of a package, by name."""
         from minirospy.idl.parse import parse_service
 
         return [
@@ -102,7 +102,7 @@ class Catalogue:
         ]
 
     def actions(self, package: str) -> list[ActionSpec]:
-        """All actions of a package, by name."""
+        """Return all actions of a package, by name."""
         from minirospy.idl.parse import parse_action
 
         found = []
@@ -132,7 +132,7 @@ class Catalogue:
 
 
 def read_definition(path: Path) -> str:
-    """The text of a definition's file. Raises DefinitionError where it cannot be read."""
+    """Return the text of a definition's file. Raise DefinitionError where it cannot be read."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -140,10 +140,10 @@ def read_definition(path: Path) -> str:
 
 
 def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
-    """A package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
+    """Return a package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
 
     With them goes the empty ``py.typed``, which tells mypy to believe the annotations (PEP 561).
-    Raises DefinitionError, NotFoundError.
+    Raise DefinitionError, NotFoundError.
     """
     from minirospy.idl.emit import emit_message, emit_package, emit_service
 
@@ -165,7 +165,7 @@ def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
 def write_package(catalogue: Catalogue, package: str, root: Path) -> list[Path]:
     """Compile a package's definitions into ``root``/<package>/{msg,srv}; the files that were written.
 
-    A file whose text would be the same is left alone. Raises DefinitionError, NotFoundError.
+    A file whose text would be the same is left alone. Raise DefinitionError, NotFoundError.
     """
     sources = compile_package(catalogue, package)
     folder = root / package
@@ -214,7 +214,7 @@ def service_class(name: str) -> ServiceClass:
 
 
 def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
-    """The specs in a full text: the message's own, and those of all types that it needs. Raises DefinitionError."""
+    """Return the specs in a full text: the message's own, and those of all types that it needs. Raise DefinitionError."""
     from minirospy.idl.parse import parse_message
 
     if len(text) > MOST_TEXT:
@@ -320,7 +320,7 @@ def _has_definitions(package: str, kind: str) -> bool:
 
 
 def _known(kind: str) -> Iterable[str]:
-    """The types of all packages on sys.path that hold generated modules."""
+    """Return the types of all packages on sys.path that hold generated modules."""
     for entry in sys.path:
         folder = Path(entry or ".")
         for module in folder.glob(f"*/{kind}/_*.py"):

@@ -65,9 +65,9 @@ class Message:
     _connection_header: dict[str, str]
 
     def __init__(self, *args: object, **kwds: object) -> None:
-        """All fields in order, or some by name; None stands for a field's default.
+        """Set all fields in order, or some by name; None represents a field's default.
 
-        Raises TypeError on a wrong number of values, AttributeError on a name that is not a field.
+        Raise TypeError on a wrong number of values, AttributeError on a name that is not a field.
         """
         if args and kwds:
             raise TypeError("Message constructor may only use args OR keywords, not both")
@@ -176,7 +176,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
     """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
 
-    ``keys`` are words that stand for values ("now", "auto"). Raises MessageException where a name or a number
+    ``keys`` are words that stand for values ("now", "auto"). Raise MessageException where a name or a number
     of values does not fit, ValueError on values that cannot be fields.
     """
     if not is_message(msg):
@@ -197,7 +197,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: object = None, prefix: str = "") -> str:
-    """The names of a message's fields in order, nested ones with dots."""
+    """Return the names of a message's fields in order, nested ones with dots."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -220,7 +220,7 @@ def strify_message(
     field_filter: Callable[[protocols.Message], Sequence[str]] | None = None,
     fixed_numeric_width: int | None = None,
 ) -> str:
-    """The text of a value as `rostopic echo` prints it: YAML.
+    """Return the text of a value as `rostopic echo` prints it: YAML.
 
     ``field_filter`` chooses the fields of a message; ``fixed_numeric_width`` pads numbers;
     ``time_offset`` is taken off times.
@@ -303,7 +303,7 @@ def _quoted(text: str) -> str:
 
 
 def _items(texts: Sequence[object]) -> list[str]:
-    """The lines of a list of strings, as YAML writes it."""
+    """Return the lines of a list of strings, as YAML writes it."""
     if all(
         isinstance(text, str) and _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN for text in texts
     ):

@@ -32,12 +32,12 @@ _RANGES = {
 
 
 def parse_message(text: str, package: str, name: str, where: str = "") -> MessageSpec:
-    """A .msg text. ``where`` names it in errors (default: the type). Raises DefinitionError."""
+    """Return a .msg text. ``where`` names it in errors (default: the type). Raise DefinitionError."""
     return _parse(text, package, name, where or f"{package}/{name}", 1)
 
 
 def parse_service(text: str, package: str, name: str, where: str = "") -> ServiceSpec:
-    """A .srv text. Raises DefinitionError."""
+    """Return a .srv text. Raise DefinitionError."""
     where = where or f"{package}/{name}"
     parts = _split(text, 2, where, "request --- response")
     request, response = (
@@ -48,7 +48,7 @@ def parse_service(text: str, package: str, name: str, where: str = "") -> Servic
 
 
 def parse_action(text: str, package: str, name: str, where: str = "") -> ActionSpec:
-    """A .action text. Raises DefinitionError."""
+    """Return a .action text. Raise DefinitionError."""
     where = where or f"{package}/{name}"
     parts = _split(text, 3, where, "goal --- result --- feedback")
     status = "\nHeader header\nactionlib_msgs/GoalStatus status\n"
@@ -74,7 +74,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 
 
 def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]]:
-    """The parts between lines that start with ``---``, each with the number of its first line.
+    """Return the parts between lines that start with ``---``, each with the number of its first line.
 
     Every line of a part ends with a newline, the last one of the text too: so genmsg has it in full texts.
     """

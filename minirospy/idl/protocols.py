@@ -50,13 +50,13 @@ class Message(Protocol):
     _connection_header: dict[str, str]
 
     def __init__(self, *args: object, **kwds: object) -> None:
-        """All fields in order, or some by name."""
+        """Set all fields in order, or some by name."""
 
     def serialize(self, buff: Writer) -> None:
-        """Write the message. Raises genpy.SerializationError."""
+        """Write the message. Raise genpy.SerializationError."""
 
     def deserialize(self, data: Buffer) -> Message:
-        """Read the message from bytes, and return it. Raises genpy.DeserializationError."""
+        """Read the message from bytes, and return it. Raise genpy.DeserializationError."""
 
 
 class GoalID(Message, Protocol):

@@ -11,10 +11,10 @@ __all__ = ["to_response"]
 
 
 def to_response(response_class: type[Message], returned: object) -> Message:
-    """Return a response of ``response_class`` from what a handler may return: a response, a dictionary of some of its
-    fields, a list or tuple of all their values, or the value of its only field.
+    """Return a response of ``response_class`` made from what a handler returned.
 
-    Raise ServiceException with rospy's words.
+    That is a response, a dictionary of some of its fields, a list or tuple of all their values, or the value of its
+    only field. Raise ServiceException with rospy's words.
     """
     # A class of the same type may come from elsewhere: a reloaded module, a foreign generator.
     if getattr(type(returned), "_type", None) == response_class._type:

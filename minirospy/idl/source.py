@@ -14,7 +14,7 @@ _RESERVED = {*keyword.kwlist, "self", "serialize", "deserialize"}
 
 
 def python_name(field: str) -> str:
-    """A field's name in Python: a word that Python keeps for itself gets an underscore."""
+    """Return a field's name in Python: a word that Python keeps for itself gets an underscore."""
     return field + "_" if field in _RESERVED else field
 
 
@@ -47,13 +47,13 @@ class Source:
 
     @contextmanager
     def function(self, head: str) -> Iterator[None]:
-        """A block with local names of its own."""
+        """Yield a block with local names of its own."""
         self._taken, self._last = set(), {}
         with self.block(head):
             yield
 
     def struct(self, letters: str) -> str:
-        """The name of the compiled struct of these letters (``If``: an unsigned int, then a float)."""
+        """Return the name of the compiled struct of these letters (``If``: an unsigned int, then a float)."""
         short = _SAME.sub(lambda match: f"{len(match[0])}{match[1]}", letters)
         return self.structs.setdefault(short, f"_struct_{short}")
 
@@ -73,7 +73,7 @@ class Source:
         return self.classes[full_name]
 
     def local(self, stem: str) -> str:
-        """A local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
+        """Return a local name that is not in use in this function. It ends in a digit, so that it hides nothing else."""
         number = self._last.get(stem, 0) + 1
         while f"{stem}{number}" in self._taken:
             number += 1

@@ -34,14 +34,14 @@ class Step(NamedTuple):
 
 
 def parse_path(path: str) -> tuple[Step, ...]:
-    """The steps of a path; the empty path is the message itself. Raises UsageError."""
+    """Return the steps of a path; the empty path is the message itself. Raise UsageError."""
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 
 def field_value(message: object, steps: tuple[Step, ...]) -> object:
-    """The value at a path; a slice of messages followed by a field gives a list of that field's values.
+    """Return the value at a path; a slice of messages followed by a field gives a list of that field's values.
 
-    Raises NotFoundError where a field is not there, IndexError where an array is too short.
+    Raise NotFoundError where a field is not there, IndexError where an array is too short.
     """
     value: object = message
     for at, (name, index) in enumerate(steps):
@@ -64,9 +64,9 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
 
 
 def field_type(message_class: type[Message], path: str) -> str:
-    """The ROS type of the field at a path of a message class.
+    """Return the ROS type of the field at a path of a message class.
 
-    Raises NotFoundError where there is no such field or the class of an inner message is not installed.
+    Raise NotFoundError where there is no such field or the class of an inner message is not installed.
     """
     from minirospy.idl.load import message_class as load_class
 

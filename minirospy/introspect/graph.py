@@ -61,9 +61,9 @@ class Graph:
     def open(
         cls, tool: str, environ: Mapping[str, str] | None = None, arguments: names.Arguments | None = None
     ) -> Graph:
-        """The graph that the environment names, and the command line where ``arguments`` were taken out of it.
+        """Return the graph that the environment names, and the command line where ``arguments`` were taken out of it.
 
-        Raises UsageError on a bad ROS_MASTER_URI.
+        Raise UsageError on a bad ROS_MASTER_URI.
         """
         given = arguments or names.parse_arguments(())
         master_uri, namespace = master_and_namespace(
@@ -84,15 +84,15 @@ class Graph:
         self.master.close()
 
     def resolve(self, name: str) -> str:
-        """The global name of ``name``."""
+        """Return the global name of ``name``."""
         return names.resolve(name, self._node_name, self._remappings)
 
     def state(self) -> SystemState:
-        """Who publishes, subscribes and serves what."""
+        """Return who publishes, subscribes and serves what."""
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """The URI of a node's Slave API (asked once a node); None where the master does not know it."""
+        """Return the URI of a node's Slave API (asked once a node); None where the master does not know it."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
@@ -101,12 +101,12 @@ class Graph:
         return self._uris[node]
 
     def addresses(self, nodes: Iterable[str]) -> list[NodeAddress]:
-        """Each node with its URI."""
+        """Return each node with its URI."""
         return [NodeAddress(node, self.node_uri(node)) for node in nodes]
 
 
 def why_illegal(name: str) -> str:
-    """What is wrong with the global name of a topic or service; "" where nothing is.
+    """Return what is wrong with the global name of a topic or service; "" where nothing is.
 
     rospy takes such names all the same, roscpp does not. The path of a field may stand behind a topic's: /points[0]/x.
     """
@@ -115,23 +115,23 @@ def why_illegal(name: str) -> str:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Whether a global name is ``namespace`` or lies below it; the root holds all."""
+    """Return whether a global name is ``namespace`` or lies below it; the root holds all."""
     return namespace in ("", "/") or name == namespace or name.startswith(namespace.rstrip("/") + "/")
 
 
 def node_host(uri: str | None) -> str | None:
-    """The host name in a node's URI."""
+    """Return the host name in a node's URI."""
     if not uri:
         return None
     return uri.partition("://")[2].partition("/")[0].rpartition(":")[0] or None
 
 
 def unknown_topic(graph: Graph, topic: str) -> NotFoundError:
-    """The error for a topic that nobody publishes or subscribes to, with the nearest that are there."""
+    """Return the error for a topic that nobody publishes or subscribes to, with the nearest that are there."""
     state = graph.state()
     return NotFoundError("topic", topic, [*state.publishers, *state.subscribers])
 
 
 def unknown_service(graph: Graph, service: str) -> NotFoundError:
-    """The error for a service that nobody offers, with the nearest that are there."""
+    """Return the error for a service that nobody offers, with the nearest that are there."""
     return NotFoundError("service", service, graph.state().services)

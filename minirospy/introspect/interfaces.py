@@ -41,16 +41,16 @@ class Interfaces:
         self._catalogue = Catalogue(packages.folders())
 
     def packages(self) -> list[str]:
-        """The sorted names of the packages that define any."""
+        """Return the sorted names of the packages that define any."""
         return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:
-        """The sorted types (``pkg/Name``) that a package defines. Raises NotFoundError."""
+        """Return the sorted types (``pkg/Name``) that a package defines. Raise NotFoundError."""
         self._packages.find(package)
         return [f"{package}/{name}" for name in self._names(package)]
 
     def all(self) -> list[str]:
-        """Every type, sorted by package, then name."""
+        """Return every type, sorted by package, then name."""
         return [
             f"{package}/{name}"
             for package in sorted(self._catalogue.packages)
@@ -58,9 +58,9 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """The types that ``name`` stands for: itself where it has a package, else those of that bare name.
+        """Return the types that ``name`` stands for: itself where it has a package, else those of that bare name.
 
-        Raises NotFoundError with the nearest names where there is none.
+        Raise NotFoundError with the nearest names where there is none.
         """
         everything = self.all()
         by_itself = "/" not in name
@@ -71,15 +71,15 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """The definition of a type, as it stands in its file. Raises NotFoundError."""
+        """Return the definition of a type, as it stands in its file. Raise NotFoundError."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """The constants and fields of a type, inner types unfolded. Raises NotFoundError."""
+        """Return the constants and fields of a type, inner types unfolded. Raise NotFoundError."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
-        """The md5sum of a type. Raises NotFoundError."""
+        """Return the md5sum of a type. Raise NotFoundError."""
         spec = self._spec(type_)
         if isinstance(spec, ServiceSpec):
             return service_md5(spec, self._catalogue.message)
@@ -96,7 +96,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """The sorted names of the types of a package, by its files; an action stands for seven messages."""
+        """Return the sorted names of the types of a package, by its files; an action stands for seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}
@@ -106,7 +106,7 @@ class Interfaces:
 
 
 def describe(spec: MessageSpec | ServiceSpec, lookup: Lookup) -> str:
-    """A type as `rosmsg show` prints it: a line for each constant and field, inner types indented below."""
+    """Return a type as `rosmsg show` prints it: a line for each constant and field, inner types indented below."""
     if isinstance(spec, ServiceSpec):
         lines = [*_lines(spec.request, lookup, ""), "---", *_lines(spec.response, lookup, "")]
     else:

@@ -24,14 +24,14 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
     """Logger -> level (in small letters) of a node (global name).
 
-    Raises NotFoundError, NodeUnreachableError, and MinirospyError where it tells nothing of its loggers.
+    Raise NotFoundError, NodeUnreachableError, and MinirospyError where it tells nothing of its loggers.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
     return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """The level of one logger. Raises as :func:`logger_levels`, and NotFoundError where there is no such logger."""
+    """Return the level of one logger. Raise as :func:`logger_levels`, and NotFoundError where there is no such logger."""
     levels = logger_levels(graph, node)
     if logger not in levels:
         raise NotFoundError(f"logger of node {node}", logger, levels)
@@ -39,14 +39,14 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
-    """Set the level of a logger. Raises as :func:`logger_level`."""
+    """Set the level of a logger. Raise as :func:`logger_level`."""
     # A node takes any name; asked first, one that it does not have is told of.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
 def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
-    """The response of a node's own service."""
+    """Return the response of a node's own service."""
     name = find_node(graph, node).name
     try:
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))

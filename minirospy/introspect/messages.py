@@ -36,9 +36,9 @@ class MessageClasses:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """The class for a publisher's connection header: the installed one where the md5sums agree.
+        """Return the class for a publisher's connection header: the installed one where the md5sums agree.
 
-        Raises NotFoundError where it is not installed and the publisher sent no definition, DefinitionError
+        Raise NotFoundError where it is not installed and the publisher sent no definition, DefinitionError
         where the definition does not parse.
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
@@ -47,7 +47,7 @@ class MessageClasses:
         return self._classes[key]
 
     def read(self, received: Received) -> Message:
-        """The message in what was received. Raises DeserializationError, and as :meth:`for_header`."""
+        """Return the message in what was received. Raise DeserializationError, and as :meth:`for_header`."""
         message = self.for_header(received.header)()
         message.deserialize(received.body)
         message._connection_header = received.header
@@ -70,7 +70,7 @@ class MessageClasses:
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
     """``message`` with YAML values in its fields: one dictionary, or a value for each field in order.
 
-    ``keys`` are words that stand for a value, as ``now`` for a time. Raises MessageException.
+    ``keys`` are words that stand for a value, as ``now`` for a time. Raise MessageException.
     """
     from minirospy.idl.message import fill_message_args
 
@@ -88,7 +88,7 @@ def check(message: Message) -> None:
 
 
 def serialize(message: Message) -> bytes:
-    """The bytes of a message. Raises MessageException where a value does not fit its field."""
+    """Return the bytes of a message. Raise MessageException where a value does not fit its field."""
     buffer = BytesIO()
     try:
         message.serialize(buffer)
@@ -98,7 +98,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """What is wrong with the ``values`` that were typed, on one line, and what the fields are."""
+    """Return what is wrong with the ``values`` that were typed, on one line, and what the fields are."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

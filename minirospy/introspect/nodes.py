@@ -82,7 +82,7 @@ class Neighbours(NamedTuple):
 
 
 def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
-    """The sorted names of the nodes at or below ``namespace``."""
+    """Return the sorted names of the nodes at or below ``namespace``."""
     state = graph.state()
     found: set[str] = set()
     for table in (state.publishers, state.subscribers, state.services):
@@ -92,13 +92,13 @@ def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def node_hosts(graph: Graph) -> dict[str, str]:
-    """The host name or address of each node whose address the master knows."""
+    """Return the host name or address of each node whose address the master knows."""
     hosts = {node.name: node_host(node.uri) for node in graph.addresses(list_nodes(graph))}
     return {node: host for node, host in hosts.items() if host}
 
 
 def nodes_on(graph: Graph, machine: str) -> list[str]:
-    """The nodes on a machine, by its name or address. Raises NotFoundError where there is none."""
+    """Return the nodes on a machine, by its name or address. Raise NotFoundError where there is none."""
     hosts = node_hosts(graph)
     found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
     if not found:
@@ -107,7 +107,7 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Each node that publishes or subscribes, sorted, and the other ends of its topics."""
+    """Return each node that publishes or subscribes, sorted, and the other ends of its topics."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -123,7 +123,7 @@ def neighbours(state: SystemState) -> dict[str, Neighbours]:
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
-    """A node (global name) and its URI. Raises NotFoundError with the nearest names."""
+    """Return a node (global name) and its URI. Raise NotFoundError with the nearest names."""
     uri = graph.node_uri(name)
     if uri is None:
         raise NotFoundError("node", name, list_nodes(graph))
@@ -131,7 +131,7 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """What the master knows of a node (global name). Raises NotFoundError."""
+    """Return what the master knows of a node (global name). Raise NotFoundError."""
     state = graph.state()
     # Types as publishers told them: of a topic that nobody publishes, rosnode says "unknown type".
     types = dict(graph.master.get_published_topics())
@@ -149,13 +149,13 @@ def node_detail(graph: Graph, name: str) -> NodeDetail:
 
 
 def node_connections(graph: Graph, node: NodeAddress) -> Connections:
-    """The process id and the connections of a node, from itself. Raises NodeUnreachableError."""
+    """Return the process id and the connections of a node, from itself. Raise NodeUnreachableError."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout=5.0)) as slave:
         return Connections(slave.get_pid(), slave.get_bus_info())
 
 
 def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
-    """The seconds that a call to a node takes. Raises NodeUnreachableError."""
+    """Return the seconds that a call to a node takes. Raise NodeUnreachableError."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
         start = time.perf_counter()
         slave.get_pid()
@@ -165,7 +165,7 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
     """Ask a node to shut down. A node that is gone already is as good as stopped.
 
-    Raises NodeUnreachableError where it is there and says nothing.
+    Raise NodeUnreachableError where it is there and says nothing.
     """
     with contextlib.closing(_slave(graph, node, _SHUTDOWN_SECONDS)) as slave:
         try:
@@ -178,7 +178,7 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
 
 
 def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
-    """The registered nodes that do not answer."""
+    """Return the registered nodes that do not answer."""
     nodes = graph.addresses(list_nodes(graph))
     return [node for node in nodes if node.uri is not None and not _answers(graph, node, timeout)]
 
@@ -186,7 +186,7 @@ def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
     """Unregister everything that a node registered with the master; without effect on a newer node of its name.
 
-    ``state``: the master's, where the caller has it. Raises MasterUnreachableError.
+    ``state``: the master's, where the caller has it. Raise MasterUnreachableError.
     """
     from minirospy.runtime.master_proxy import MasterProxy
 

@@ -40,13 +40,13 @@ class ParameterFile(NamedTuple):
 
 
 def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
-    """The sorted names of the parameters below ``namespace``."""
+    """Return the sorted names of the parameters below ``namespace``."""
     prefix = namespace.rstrip("/") + "/"
     return sorted(name for name in graph.master.get_param_names() if name.startswith(prefix))
 
 
 def get_parameter(graph: Graph, name: str) -> Any:
-    """The value of a parameter (global name); a namespace is a dictionary. Raises NotFoundError."""
+    """Return the value of a parameter (global name); a namespace is a dictionary. Raise NotFoundError."""
     try:
         return graph.master.get_param(name)
     except RpcRefused:
@@ -56,7 +56,7 @@ def get_parameter(graph: Graph, name: str) -> Any:
 def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
     """Set a parameter; a dictionary sets each of its own and leaves those beside them, as rosparam does.
 
-    The single parameters that were set come back. Raises ValueTextError on what none can hold.
+    The single parameters that were set come back. Raise ValueTextError on what none can hold.
     """
     if name == "/" and not isinstance(value, dict):
         raise ValueTextError(name, "the root holds parameters, it is none: give a dictionary or a name")
@@ -68,7 +68,7 @@ def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
 
 
 def delete_parameter(graph: Graph, name: str) -> None:
-    """Delete a parameter or namespace; the root is emptied. Raises NotFoundError."""
+    """Delete a parameter or namespace; the root is emptied. Raise NotFoundError."""
     if name == "/":
         # The master's deleteParam refuses it.
         graph.master.set_param(name, {})
@@ -80,9 +80,9 @@ def delete_parameter(graph: Graph, name: str) -> None:
 
 
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
-    """The documents of a parameter file named ``where``, to be set below ``namespace`` (global).
+    """Return the documents of a parameter file named ``where``, to be set below ``namespace`` (global).
 
-    Raises ValueTextError where it is not YAML, or values stand at the root without a name.
+    Raise ValueTextError where it is not YAML, or values stand at the root without a name.
     """
     files = []
     for document in parse_documents(text, where):
@@ -106,7 +106,7 @@ def dump_parameters(values: Any) -> str:
 
 
 def flatten(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Each single parameter at or below ``name``, in the order that the values have."""
+    """Yield each single parameter at or below ``name``, in the order that the values have."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from flatten(_join(name, str(key)), inner)

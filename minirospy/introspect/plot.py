@@ -18,14 +18,14 @@ class _Cell(NamedTuple):
 
 
 def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> str:
-    """The line of column names for messages like ``value``."""
+    """Return the line of column names for messages like ``value``."""
     return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays, 0))
 
 
 def plot_row(
     value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
-    """The line of values, with the message's time in front; ``origin`` (nanoseconds) is taken off times inside."""
+    """Return the line of values, with the message's time in front; ``origin`` (nanoseconds) is taken off times inside."""
     return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays, origin))
 
 

@@ -20,7 +20,7 @@ _NO_BYTES = '!!binary ""'
 def prototype(
     spec: MessageSpec, catalogue: Catalogue, *, without: Collection[str] = (), empty_arrays: bool = False
 ) -> str:
-    """A message of default values as YAML, as `rosmsg-proto` writes it: to be changed and published.
+    """Return a message of default values as YAML, as `rosmsg-proto` writes it: to be changed and published.
 
     An array of no fixed length has one element, which shows what its elements are, or with ``empty_arrays``
     none. ``without``: names of fields to leave out, also of inner messages.
@@ -35,7 +35,7 @@ class _Defaults(NamedTuple):
     empty_arrays: bool
 
     def of(self, spec: MessageSpec) -> dict[str, object]:
-        """The values of a message's fields."""
+        """Return the values of a message's fields."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
@@ -63,7 +63,7 @@ class _Yaml:
         self._tight = False
 
     def lines(self, value: object) -> list[str]:
-        """The lines of a value, those of what it holds indented."""
+        """Return the lines of a value, those of what it holds indented."""
         inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
         if isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE:
             self._tight = True
@@ -93,7 +93,7 @@ def _flow(value: object) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """A line that is too wide goes on below, as YAML libraries write it: its next word after the last column."""
+    """Return a line that is too wide goes on below, as YAML libraries write it: its next word after the last column."""
     if len(line) <= _COLUMNS:
         return line
     # A dash before a key counts as indentation, one before a brace does not.

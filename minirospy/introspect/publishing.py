@@ -23,7 +23,7 @@ __all__ = ["publish_all", "values_to_publish"]
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
 ) -> Iterator[list[object]]:
-    """The YAML values of each message with ``fields``; at least one.
+    """Yield the YAML values of each message with ``fields``; at least one.
 
     ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raises
     UsageError where there are no values, NotFoundError where there is no file, ValueTextError on what is not YAML.

@@ -64,7 +64,7 @@ class RateWindow:
         self._reported = 0
 
     def add(self, time: float) -> None:
-        """A message has come."""
+        """Count a message."""
         self._arrived += 1
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
@@ -74,7 +74,7 @@ class RateWindow:
         self._last = time
 
     def report(self) -> Spread | None:
-        """The statistics; None where nothing has come since the last report, or too little yet."""
+        """Return the statistics; None where nothing has come since the last report, or too little yet."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -88,11 +88,11 @@ class BandwidthWindow:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
 
     def add(self, time: float, size: int) -> None:
-        """A message of ``size`` bytes has come."""
+        """Count a message of ``size`` bytes."""
         self._messages.append((time, size))
 
     def report(self, now: float) -> Bandwidth | None:
-        """The statistics; None while fewer than two messages have come."""
+        """Return the statistics; None while fewer than two messages have come."""
         messages = list(self._messages)
         if len(messages) < 2:
             return None
@@ -111,12 +111,12 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """A message stamped ``stamp`` has come."""
+        """Count a message stamped ``stamp``."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
     def report(self) -> Spread | None:
-        """The statistics; None where nothing has come since the last report."""
+        """Return the statistics; None where nothing has come since the last report."""
         if self._arrived == self._reported:
             return None
         self._reported = self._arrived
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """What `rostopic hz` prints once a second: of one topic two lines, of several a table."""
+    """Return what `rostopic hz` prints once a second: of one topic two lines, of several a table."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -137,12 +137,12 @@ def rate_text(reports: Mapping[str, Spread | None]) -> str:
 
 
 def delay_text(report: Spread | None) -> str:
-    """What `rostopic delay` prints once a second."""
+    """Return what `rostopic delay` prints once a second."""
     return f"average delay: {report.mean:.3f}\n\t{_extremes(report)}" if report else _NOTHING
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """What `rostopic bw` prints once a second: of one topic two lines, of several a table; "" for nothing."""
+    """Return what `rostopic bw` prints once a second: of one topic two lines, of several a table; "" for nothing."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """A number of bytes in the unit that suits the rate."""
+    """Return a number of bytes in the unit that suits the rate."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

@@ -60,7 +60,7 @@ class ServiceOffer(NamedTuple):
 
 
 def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
-    """The services at or below ``namespace``, sorted by name."""
+    """Return the services at or below ``namespace``, sorted by name."""
     state = graph.state()
     return [
         ServiceNode(name, tuple(state.services[name]))
@@ -70,7 +70,7 @@ def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
 
 
 def service_uri(graph: Graph, service: str) -> str:
-    """Where a service is called (``rosrpc://host:port``). Raises NotFoundError."""
+    """Return where a service is called (``rosrpc://host:port``). Raise NotFoundError."""
     try:
         return graph.master.lookup_service(service)
     except RpcRefused:
@@ -78,15 +78,15 @@ def service_uri(graph: Graph, service: str) -> str:
 
 
 def service_type(graph: Graph, service: str) -> str:
-    """The type of a service, asked from the node that offers it.
+    """Return the type of a service, asked from the node that offers it.
 
-    Raises NotFoundError, NodeUnreachableError.
+    Raise NotFoundError, NodeUnreachableError.
     """
     return _probe(graph, service, service_uri(graph, service))
 
 
 def service_offer(graph: Graph, service: str) -> ServiceOffer:
-    """Who offers a service, and where. Raises NotFoundError."""
+    """Return who offers a service, and where. Raise NotFoundError."""
     nodes = graph.state().services.get(service)
     if not nodes:
         raise unknown_service(graph, service)
@@ -94,14 +94,14 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 
 def service_arguments(type_: str) -> list[str]:
-    """The names of the fields of a service type's request. Raises NotFoundError where it is not installed."""
+    """Return the names of the fields of a service type's request. Raise NotFoundError where it is not installed."""
     from minirospy.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
 
 
 def find_services_of_type(graph: Graph, type_: str) -> list[str]:
-    """The sorted names of the services of a type; a service that does not answer has none."""
+    """Return the sorted names of the services of a type; a service that does not answer has none."""
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
@@ -115,9 +115,9 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 
 
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
-    """A request of a service type, filled from YAML values (one dictionary, or all fields in order).
+    """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
-    Raises NotFoundError where the type is not installed, MessageException where the values do not fit.
+    Raise NotFoundError where the type is not installed, MessageException where the values do not fit.
     """
     from minirospy.idl.load import service_class
     from minirospy.introspect.messages import fill
@@ -126,7 +126,7 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
-    """The response to a filled request. Raises NotFoundError, ServiceException with the handler's text."""
+    """Return the response to a filled request. Raise NotFoundError, ServiceException with the handler's text."""
     from minirospy.idl.load import service_class
     from minirospy.introspect.messages import check, serialize
 
@@ -155,7 +155,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """A service's type; None where it is not there or does not answer."""
+    """Return a service's type; None where it is not there or does not answer."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):
@@ -163,7 +163,7 @@ def _probed_type(graph: Graph, service: str) -> str | None:
 
 
 def service_header(graph: Graph, service: str, uri: str) -> Header:
-    """The connection header that a service at ``uri`` answers with. Raises NodeUnreachableError."""
+    """Return the connection header that a service at ``uri`` answers with. Raise NodeUnreachableError."""
     try:
         client = _connect(graph, service, uri, _ANY, probe=True)
     except (OSError, WireError) as error:
@@ -180,7 +180,7 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """`Connection refused` rather than `[Errno 111] Connection refused`."""
+    """Return `Connection refused` rather than `[Errno 111] Connection refused`."""
     return getattr(error, "strerror", None) or str(error)
 
 

@@ -102,7 +102,7 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep so long, or until the node is asked to stop: True then. Raises what :meth:`measure` met."""
+        """Sleep so long, or until the node is asked to stop: True then. Raise what :meth:`measure` met."""
         end = time.monotonic() + seconds
         while not self.ended.is_set():
             rest = end - time.monotonic()
@@ -155,7 +155,7 @@ class ToolNode:
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
-        """The messages of a topic, to be read by one thread."""
+        """Return the messages of a topic, to be read by one thread."""
         inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
@@ -234,7 +234,7 @@ class Inbox:
         self._closed = threading.Event()
 
     def put(self, body: Frame, header: Header) -> None:
-        """A message has come; waits while too many are unread."""
+        """Take a message; wait while too many are unread."""
         received = Received(bytes(body), header, self._clock.now())
         while not self._closed.is_set():
             try:
@@ -284,7 +284,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message; its header is numbered. Raises MessageException where a value does not fit."""
+        """Send a message; its header is numbered. Raise MessageException where a value does not fit."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
@@ -293,7 +293,7 @@ class TopicPublisher:
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
-    """The topic that ``name`` is, or is a field of, once it is published; ``on_waiting`` is called once."""
+    """Return the topic that ``name`` is, or is a field of, once it is published; ``on_waiting`` is called once."""
     field = find_topic(graph, name)
     if field is None:
         on_waiting()

@@ -17,7 +17,7 @@ _DIRECTIONS = {"i": "inbound", "o": "outbound", "b": "bidirectional"}
 
 
 def node_text(detail: NodeDetail) -> str:
-    """What the master knows of a node."""
+    """Return what the master knows of a node."""
 
     def section(title: str, rows: list[str]) -> str:
         return f"{title}: " + ("\n" + "\n".join(f" * {row}" for row in rows) if rows else "None") + "\n"
@@ -36,7 +36,7 @@ def node_text(detail: NodeDetail) -> str:
 
 
 def connections_text(graph: Graph, connections: Connections) -> str:
-    """What a node says of itself: process id and connections."""
+    """Return what a node says of itself: process id and connections."""
     lines = [f"Pid: {connections.pid}"]
     if connections.links:
         names = {graph.node_uri(node): node for node in list_nodes(graph)}
@@ -55,7 +55,7 @@ def connections_text(graph: Graph, connections: Connections) -> str:
 
 
 def topic_text(detail: TopicDetail) -> str:
-    """The type, publishers and subscribers of a topic."""
+    """Return the type, publishers and subscribers of a topic."""
 
     def side(title: str, nodes: list[NodeAddress]) -> str:
         if not nodes:

@@ -70,7 +70,7 @@ class TopicField(NamedTuple):
 def topic_names(
     graph: Graph, namespace: str = "/", *, published: bool = True, subscribed: bool = True
 ) -> list[str]:
-    """The sorted names of the topics at or below ``namespace`` that have publishers or subscribers."""
+    """Return the sorted names of the topics at or below ``namespace`` that have publishers or subscribers."""
     state = graph.state()
     found: set[str] = set()
     if published:
@@ -81,7 +81,7 @@ def topic_names(
 
 
 def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
-    """The topics at or below ``namespace`` with types and nodes."""
+    """Return the topics at or below ``namespace`` with types and nodes."""
     state = graph.state()
     types = graph.master.get_topic_types()
 
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """The topics of each host that has nodes on them, hosts sorted."""
+    """Return the topics of each host that has nodes on them, hosts sorted."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -110,7 +110,7 @@ def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
 
 
 def topic_detail(graph: Graph, topic: str) -> TopicDetail:
-    """Type, publishers and subscribers of a topic. Raises NotFoundError."""
+    """Type, publishers and subscribers of a topic. Raise NotFoundError."""
     state = graph.state()
     publishers, subscribers = state.publishers.get(topic, []), state.subscribers.get(topic, [])
     if not publishers and not subscribers:
@@ -124,7 +124,7 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 
 
 def find_topic(graph: Graph, name: str) -> TopicField | None:
-    """The topic that ``name`` (global) is, or is a field of: ``/pose/header/stamp``.
+    """Return the topic that ``name`` (global) is, or is a field of: ``/pose/header/stamp``.
 
     None where there is no such topic, or its type is not known yet. A topic of the whole name comes
     before a field of a shorter one.
@@ -141,14 +141,14 @@ def find_topic(graph: Graph, name: str) -> TopicField | None:
 
 
 def find_topics_of_type(graph: Graph, type_: str) -> list[str]:
-    """The sorted names of the topics of a type."""
+    """Return the sorted names of the topics of a type."""
     return sorted(topic for topic, of in graph.master.get_topic_types().items() if of == type_)
 
 
 def topic_field_type(field: TopicField) -> str:
-    """The type of a field of a topic's messages.
+    """Return the type of a field of a topic's messages.
 
-    Raises NotFoundError where the message has no such field, or its type is not installed here.
+    Raise NotFoundError where the message has no such field, or its type is not installed here.
     """
     from minirospy.idl.load import message_class
     from minirospy.introspect.fields import field_type
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Like :func:`find_topic`. Raises NotFoundError where there is none or its type is not known."""
+    """Like :func:`find_topic`. Raise NotFoundError where there is none or its type is not known."""
     field = find_topic(graph, name)
     if field:
         return field

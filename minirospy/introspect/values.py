@@ -39,7 +39,7 @@ _LONGEST_ANGLE = 200
 
 
 def parse_value(text: str) -> Any:
-    """The value of a YAML text. Raises ValueTextError."""
+    """Return the value of a YAML text. Raise ValueTextError."""
     word = text.strip()
     whole, dot, fraction = word.removeprefix("-").partition(".")
     if _is_digits(whole) and dot and _is_digits(fraction):
@@ -60,7 +60,7 @@ def parse_value(text: str) -> Any:
 
 
 def parse_documents(text: str, where: str) -> Iterator[Any]:
-    """The values of the documents of a YAML text, ``---`` between them. Raises ValueTextError."""
+    """Yield the values of the documents of a YAML text, ``---`` between them. Raise ValueTextError."""
     import yaml
 
     try:
@@ -129,19 +129,19 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[Any]:
 
 
 def parse_arguments(words: Sequence[str]) -> list[Any]:
-    """The values that a command line gives a message. An empty word is the empty text; to YAML it would be null."""
+    """Return the values that a command line gives a message. An empty word is the empty text; to YAML it would be null."""
     return [parse_value(word) if word else "" for word in words]
 
 
 def message_values(documents: Iterable[Any]) -> Iterator[list[Any]]:
-    """The values that each document gives a message: a list has one for each field."""
+    """Yield the values that each document gives a message: a list has one for each field."""
     for document in documents:
         if document is not None:
             yield document if isinstance(document, list) else [document]
 
 
 def format_value(value: Any) -> str:
-    """A value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
+    """Return a value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -154,7 +154,7 @@ def format_value(value: Any) -> str:
 
 
 def format_pretty(value: Any) -> str:
-    """A value for people's eyes, as `rosparam get -p` prints it: texts bare, not to be parsed again."""
+    """Return a value for people's eyes, as `rosparam get -p` prints it: texts bare, not to be parsed again."""
     if isinstance(value, dict):
         return "\n".join(_pretty_lines(value, ""))
     return value if isinstance(value, str) else format_value(value)
@@ -187,7 +187,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Whether YAML reads a text as itself, for it has only letters, digits, / and _."""
+    """Return whether YAML reads a text as itself, for it has only letters, digits, / and _."""
     return (
         len(word) > 1
         and word.isascii()
@@ -211,7 +211,7 @@ def _pretty_lines(table: dict[str, Any], indent: str) -> Iterator[str]:
 
 
 def _complaint(error: Exception) -> str:
-    """A YAML library's complaint on one line."""
+    """Return a YAML library's complaint on one line."""
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     mark = getattr(error, "problem_mark", None)
     return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
@@ -219,7 +219,7 @@ def _complaint(error: Exception) -> str:
 
 @lru_cache(maxsize=1)
 def _loader() -> type[Any]:
-    """A safe YAML loader that knows angles."""
+    """Return a safe YAML loader that knows angles."""
     import yaml
 
     class AngleLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
@@ -254,7 +254,7 @@ def add_angles(loader_class: Any) -> None:
 
 
 def _arithmetic(text: str) -> float:
-    """The value of a sum over numbers and ``pi``. Raises ValueError, SyntaxError or ArithmeticError."""
+    """Return the value of a sum over numbers and ``pi``. Raise ValueError, SyntaxError or ArithmeticError."""
     import ast
     import operator
 

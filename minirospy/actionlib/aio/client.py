@@ -88,7 +88,7 @@ class ClientGoal(Generic[_R, _F]):
         self._news.set()
 
     def _take_status(self, status: GoalStatus | None) -> None:
-        """The server's list has come; it names the goal, or does not."""
+        """Take the server's list, which names the goal or does not."""
         if status is not None:
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
@@ -139,14 +139,14 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._registration = asyncio.ensure_future(self._register())
 
     async def wait_for_server(self, timeout: float | None = None) -> None:
-        """Wait until a server is connected by all five topics. Raises TimeoutError after ``timeout`` seconds."""
+        """Wait until a server is connected by all five topics. Raise TimeoutError after ``timeout`` seconds."""
         try:
             await asyncio.wait_for(self._wait_for_server(), timeout)
         except asyncio.TimeoutError:
             raise TimeoutError(f"timeout exceeded while waiting for the action server {self.name}") from None
 
     def send(self, goal: _G) -> ClientGoal[_R, _F]:
-        """Send a goal, as soon as a server is connected. Raises ROSException once the client is closed."""
+        """Send a goal, as soon as a server is connected. Raise ROSException once the client is closed."""
         if self._is_closed or self._node.is_shutdown:
             raise ROSException(f"send() of a closed action client of {self.name}")
         now = self._node.now()

@@ -44,7 +44,7 @@ class Examination:
         self._stack.close()
 
     def findings(self) -> Iterator[Finding]:
-        """One finding after the other."""
+        """Yield one finding after the other."""
         yield from check_python()
         try:
             environment = Environment.read(self._environ)

@@ -26,7 +26,7 @@ class Finding(NamedTuple):
 
 
 def ok(check: str, text: str) -> Finding:
-    """Nothing to do."""
+    """Return nothing to do."""
     return Finding(check, Status.OK, text)
 
 

@@ -68,7 +68,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "") -> Answers:
-    """What all registered nodes say of themselves, asked side by side, without the node ``besides``."""
+    """Return what all registered nodes say of themselves, asked side by side, without the node ``besides``."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -108,7 +108,7 @@ def check_nodes(answers: Answers, place: MasterPlace) -> Iterator[Finding]:
 
 
 def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, str]:
-    """(what, advice) for a node that told the master that it is at ``host`` and does not answer there."""
+    """Return (what, advice) for a node that has registered as being at ``host`` and does not answer there."""
     if trouble.fault is Fault.NAME:
         return (
             f"told the master that they are at '{host}', a name that this machine does not know",
@@ -171,7 +171,7 @@ def _near(topic: str, published: set[str]) -> str:
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Publishers and subscribers that should be connected and are not."""
+    """Yield the publishers and subscribers that should be connected and are not."""
     pairs = [
         _Pair(topic, publisher, subscriber)
         for topic, publishers in state.publishers.items()
@@ -259,7 +259,7 @@ def _ask(tool: str, node: NodeAddress) -> NodeAnswer:
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
-    """The types that nodes name for a topic, and who does."""
+    """Return the types that nodes name for a topic, and who does."""
     types: dict[str, set[str]] = {}
     for name, answer in answers.items():
         for table in (answer.publications, answer.subscriptions):
@@ -270,7 +270,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Whether it is where an action server waits for goals: most of the time nobody sends any."""
+    """Return whether it is where an action server waits for goals: most of the time nobody sends any."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 
@@ -291,7 +291,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """What to do, where the publisher's definition of the type is another than this machine's; else ""."""
+    """Return what to do, where the publisher's definition of the type is another than this machine's; else ""."""
     from minirospy.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -306,7 +306,7 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 
 def _probe_service(graph: Graph, name: str) -> str:
-    """What is wrong with a service's type; "": nothing. Raises as ServiceClient, and RpcRefused where it has gone."""
+    """Return what is wrong with a service's type; "": nothing. Raise as ServiceClient, and RpcRefused where it has gone."""
     from minirospy.idl.load import service_class
     from minirospy.runtime.service_client import ServiceClient
 
@@ -325,7 +325,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """The first few of them, and how many there are more."""
+    """Return the first few of them, and how many there are more."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

@@ -45,7 +45,7 @@ _PADDING = "x" * 16384
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
     """Connect back to each doctor that asks, from now on; ``report`` hears of each, in a thread of its own.
 
-    Raises MasterUnreachableError, RpcError.
+    Raise MasterUnreachableError, RpcError.
     """
 
     def connect_back(_: memoryview, fields: Header) -> bytes:
@@ -81,12 +81,12 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
 
 
 def listeners(state: SystemState, answers: Answers) -> Answers:
-    """The doctors among the nodes that listen."""
+    """Return the doctors among the nodes that listen."""
     return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
 
 
 def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: MasterPlace) -> Iterator[Finding]:
-    """What the listeners among the nodes that answer say: one or two findings for each."""
+    """Yield what the listeners among the nodes that answer say: one or two findings for each."""
     services = [
         node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble
     ]
@@ -126,7 +126,7 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
 
 
 def _call(uri: str, service: str, caller_id: str) -> str:
-    """The text of a listener's answer. Raises OSError, WireError."""
+    """Return the text of a listener's answer. Raise OSError, WireError."""
     type_ = service_class("std_srvs/Trigger")
     client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, nearby=False)
     try:

@@ -33,7 +33,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Which Python this is, and whose rospy a program gets that it runs."""
+    """Yield which Python this is, and whose rospy a program gets that it runs."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -54,7 +54,7 @@ def check_python() -> Iterator[Finding]:
 def check_variables(
     environ: Mapping[str, str], environment: Environment, master: MasterPlace, known: Mapping[str, list[str]]
 ) -> Iterator[Finding]:
-    """The variables that say where the master and this machine are, one by one and beside each other.
+    """Yield the variables that say where the master and this machine are, one by one and beside each other.
 
     ``known``: the addresses of the names in them.
     """
@@ -166,7 +166,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
 
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
-    """The packages of ROS_PACKAGE_PATH: of one name, unreadable, with missing dependencies; ``here``: a workspace."""
+    """Yield the packages of ROS_PACKAGE_PATH: of one name, unreadable, with missing dependencies; ``here``: a workspace."""
     from minirospy.workspace.packages import Packages, built_in_roots
 
     found: list[Finding] = []

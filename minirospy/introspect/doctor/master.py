@@ -24,7 +24,7 @@ _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
-    """Whether a master answers; a single problem if it does not."""
+    """Yield whether a master answers; a single problem if it does not."""
     if not place.addresses:
         yield problem(
             "master",
@@ -47,7 +47,7 @@ def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
 
 
 def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
-    """How far the master's clock is from ours; nothing where both are this machine's."""
+    """Yield how far the master's clock is from ours; nothing where both are this machine's."""
     if place.is_local:
         return
     before = time.time()
@@ -65,7 +65,7 @@ def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
 
 
 def clock_finding(who: str, told: float, before: float, after: float) -> Finding:
-    """What ``told``, a time that came between ``before`` and ``after``, says of another clock."""
+    """Return what ``told``, a time that came between ``before`` and ``after``, says of another clock."""
     difference = told - after if told > after else min(0.0, told - before)
     if abs(difference) < _FEEL_SECONDS:
         return ok("clock", f"that of {who} is the same")
@@ -115,7 +115,7 @@ def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
 
 
 def _status(master: MasterProxy) -> dict[str, Any]:
-    """What only minirospy's master tells of itself."""
+    """Return what only minirospy's master tells of itself."""
     try:
         found = master.call("minirospy.status")
     except (RpcFault, RpcError):
@@ -124,7 +124,7 @@ def _status(master: MasterProxy) -> dict[str, Any]:
 
 
 def _http_date(place: MasterPlace) -> float | None:
-    """The time that the server writes into its answers, as Python's own does."""
+    """Return the time that the server writes into its answers, as Python's own does."""
     from email.utils import parsedate_to_datetime
 
     request = serialize_request(place.host, "/RPC2", serialize_call("getPid", ("/doctor",)))

@@ -22,7 +22,7 @@ __all__ = ["check_listens", "check_machine"]
 
 
 def check_machine(host: str, port: int) -> Iterator[Finding]:
-    """Whether this machine reaches ``host``, by a connection to ``port``, the master's."""
+    """Yield whether this machine reaches ``host``, by a connection to ``port``, the master's."""
     known = addresses(host)
     if not known:
         yield problem(
@@ -57,7 +57,7 @@ def check_machine(host: str, port: int) -> Iterator[Finding]:
 
 
 def check_listens(host: str, listeners: Answers, master_uri: str) -> Iterator[Finding]:
-    """A warning where none of ``listeners``, the doctors that connect back, is at ``host``."""
+    """Yield a warning where none of ``listeners``, the doctors that connect back, is at ``host``."""
     theirs = [host_port(answer.node.uri or "")[0] for answer in listeners.values()]
     known = addresses_of([host, *theirs])
     here = {host, *known[host]}

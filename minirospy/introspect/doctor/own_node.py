@@ -81,12 +81,12 @@ class DoctorNode:
     def register(self) -> None:
         """Be a node of the graph: it publishes its letter, and like any node /rosout.
 
-        Raises MasterUnreachableError, RpcError.
+        Raise MasterUnreachableError, RpcError.
         """
         self._loop.run(self._register())
 
     def serve(self, name: str, handler: Handler) -> None:
-        """Offer a std_srvs/Trigger service. Raises MasterUnreachableError, RpcError."""
+        """Offer a std_srvs/Trigger service. Raise MasterUnreachableError, RpcError."""
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
             name,
@@ -98,7 +98,7 @@ class DoctorNode:
         self._loop.run(self.node.serve(server))
 
     def wait_for_log_listeners(self, wanted: Collection[str], timeout: float) -> set[str]:
-        """Those of the nodes ``wanted`` that have not connected to this one's /rosout in time."""
+        """Return those of the nodes ``wanted`` that have not connected to this one's /rosout in time."""
         with self._log_links:
             self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
             return set(wanted) - self._listeners
@@ -143,7 +143,7 @@ class _Node(Node):
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
-    """Whether this machine reaches its own nodes at the address that they tell others."""
+    """Yield whether this machine reaches its own nodes at the address that they tell others."""
     host, ports = own.environment.host, own.environment.ports
     slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, nearby=False)
     try:
@@ -164,7 +164,7 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Whether the master calls our node, and those who hear /rosout (``log_listeners``) connect to it."""
+    """Yield whether the master calls our node, and those who hear /rosout (``log_listeners``) connect to it."""
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return
@@ -180,7 +180,7 @@ def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[
 
 
 def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
-    """The finding for another machine (``who``, at ``their_host``) that does not reach our node."""
+    """Return the finding for another machine (``who``, at ``their_host``) that does not reach our node."""
     host, port = host_port(own.node.uri)
     known = addresses(their_host)
     ours = own_address_towards(known[0]) if known else ""

@@ -98,7 +98,7 @@ class MasterPlace(NamedTuple):
 
 
 def trouble_of(error: Exception) -> Trouble:
-    """The trouble that an error of a call, a connection or a look-up stands for."""
+    """Return the trouble that an error of a call, a connection or a look-up stands for."""
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
@@ -126,7 +126,7 @@ def trouble_of(error: Exception) -> Trouble:
 
 
 def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """The addresses of a name, IPv4 first, as this machine knows them; [] where it knows none, or takes too long."""
+    """Return the addresses of a name, IPv4 first, as this machine knows them; [] where it knows none, or takes too long."""
     try:
         return look_up(host, timeout)
     except OSError:
@@ -134,7 +134,7 @@ def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
 
 
 def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict[str, list[str]]:
-    """The same of several names, looked up side by side."""
+    """Return the same of several names, looked up side by side."""
     names = list(dict.fromkeys(hosts))
     found = in_parallel(_ask_resolver, names, timeout)
     return {
@@ -143,7 +143,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 
 
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """The same; raises OSError. A name server that is out of reach would keep its client for half a minute."""
+    """Return the same; raises OSError. A name server that is out of reach would keep its client for half a minute."""
     (found,) = in_parallel(_ask_resolver, [host], timeout)
     if isinstance(found, Exception):
         raise socket.gaierror(socket.EAI_NONAME, f"the name '{host}' is not known") from found
@@ -157,12 +157,12 @@ def _ask_resolver(name: str) -> list[str]:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a name or address is one by which a machine reaches itself alone."""
+    """Return whether a name or address is one by which a machine reaches itself alone."""
     return host in {"localhost", "ip6-localhost", "::1"} or host.startswith("127.")
 
 
 def is_own_address(address: str) -> bool:
-    """Whether this machine has an address: no other can be bound."""
+    """Return whether this machine has an address: no other can be bound."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -173,7 +173,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """The address that this machine shows to another one; "" where there is no way to it. Nothing is sent."""
+    """Return the address that this machine shows to another one; "" where there is no way to it. Nothing is sent."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -195,9 +195,9 @@ def host_port(uri: str) -> tuple[str, int]:
 def read_topic(
     uri: str, topic: str, caller_id: str, timeout: float = CONNECT_SECONDS, *, wait: bool = False
 ) -> tuple[Header, bytes]:
-    """What the publisher at ``uri`` (its Slave API) says of a topic, and with ``wait`` its first message.
+    """Return what the publisher at ``uri`` (its Slave API) says of a topic, and with ``wait`` its first message.
 
-    ``timeout`` seconds are for each step. Raises RpcError, WireError, OSError.
+    ``timeout`` seconds are for each step. Raise RpcError, WireError, OSError.
     """
     look_up(host_port(uri)[0])
     with contextlib.closing(SlaveProxy(uri, caller_id, timeout, nearby=False)) as slave:
@@ -216,7 +216,7 @@ def read_topic(
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
-    """A block with its length in front. Raises WireError, OSError."""
+    """Return a block with its length in front. Raise WireError, OSError."""
 
     def exactly(count: int) -> bytes:
         data = b""
@@ -236,7 +236,7 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 def in_parallel(
     function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
 ) -> list[_R | Exception]:
-    """What ``function`` returns, or the error it raises, for each argument; TimeoutError for what takes longer.
+    """Return what ``function`` returns, or the error it raises, for each argument; TimeoutError for what takes longer.
 
     Daemon threads: a look-up of a name cannot be ended, and must not keep the program.
     """
