@@ -1,6 +1,6 @@
 """The master: its server, its calls to nodes, its journal, and the look at the nodes of a master that was killed.
 
-What it answers is in ``runtime/master_api.py``.
+What it answers is in ``graph/master_api.py``.
 """
 
 from __future__ import annotations
@@ -12,23 +12,26 @@ import os
 import re
 import socket
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import minirospy
 from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.graph.calls import Answer
+from minirospy.graph.master_api import MasterApi, Notice, key_of_node, nothing
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
 from minirospy.runtime.access import Access
 from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.master_api import Answer, MasterApi, key_of_node, nothing
-from minirospy.runtime.notifier import Notice, Notifier
+from minirospy.runtime.notifier import Notifier
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.steps import Steps, finish
+from minirospy.wire.http import MAX_BODY
 from minirospy.wire.journal import unpack
+from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 if TYPE_CHECKING:
     from minirospy.runtime.journal import Journal
@@ -81,6 +84,9 @@ class Master(MasterApi):
         """
         super().__init__()
         self.host = host
+        self.calls = 0
+        # The answer to getSystemState, and after which change of the registry it was written.
+        self._state = (-1, Serialized())
         self.news: list[str] = []
         """What a person should know of the start: what was recovered, and what was not."""
         self._started = time.monotonic()
@@ -171,6 +177,26 @@ class Master(MasterApi):
     def adopt(self, node: Node) -> None:
         """``node``, which has started, is on this loop: it is told of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
+
+    def serve(self, method: str, args: Sequence[Any]) -> Any:
+        """Return the answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
+        self.calls += 1
+        if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
+            if self._state[0] == self.registry.changes:
+                return self._state[1]
+            steps = self._write_state()
+            return finish(steps) if self.registry.is_small else steps
+        return self.dispatch(method, args)
+
+    def _write_state(self) -> Steps[Serialized]:
+        """Return the system state as it is sent: it takes long to write, and tools request it all the time."""
+        changes = self.registry.changes
+        answer = yield from self.collect_system_state()
+        pieces = yield from serialize_response_in_steps(answer, MAX_BODY)
+        state = Serialized(b"".join(pieces))
+        if changes == self.registry.changes:
+            self._state = (changes, state)
+        return state
 
     def act(self, action: Notice) -> None:
         """Call the node that is to be notified."""

@@ -12,15 +12,16 @@ from functools import partial
 from typing import Any, Protocol
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
+from minirospy.graph.master_api import PARAMETERS, Notice
 from minirospy.graph.parameters import ParameterUpdate
-from minirospy.graph.registry import NodeShutdown, PublisherUpdate
+from minirospy.graph.registry import PublisherUpdate
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.turns import Turns
 from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import MAX_BODY, Body
 from minirospy.wire.xmlrpc import serialize_call, serialize_call_in_steps
 
-__all__ = ["PARAMETERS", "Notice", "Notifier", "State"]
+__all__ = ["Notifier", "State"]
 
 _log = logging.getLogger(__name__)
 
@@ -45,11 +46,6 @@ _LARGE_BYTES = 32 * 1024 * 1024
 
 _MAX_ANSWER = 65536
 """Nobody reads what a node answers to a notice."""
-
-PARAMETERS = ""
-"""For :meth:`Notifier.hold`: no topic has this name."""
-
-Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 
 
 class State(Protocol):

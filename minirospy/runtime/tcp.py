@@ -286,8 +286,8 @@ async def _receive_exactly(sock: socket.socket, count: int, nothing: type[WireEr
 
 @contextlib.contextmanager
 def _time_limit(doing: str) -> Iterator[None]:
-    """Turn asyncio's TimeoutError, which is no OSError before Python 3.11, into one that says what was done."""
+    """Turn asyncio's TimeoutError, which is not the built-in one before Python 3.11, into one that names what was done."""
     try:
         yield
     except asyncio.TimeoutError:
-        raise OSError(f"timed out {doing}") from None
+        raise TimeoutError(f"timed out {doing}") from None

@@ -442,9 +442,7 @@ class Subscription:
             return
         nameless = isinstance(cause, socket.gaierror)
         # Who just leaves refuses, or hangs up; silence or a closed way is the address's fault, or a firewall's.
-        at_once = "timed out" in str(error) or (
-            isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
-        )
+        at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self._plan.failures(uri) >= _TELL_AFTER) and uri not in self._told:
             self._told.add(uri)
             _log.warning(

@@ -9,7 +9,6 @@ http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types 
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -555,12 +554,12 @@ class Reader:
         if self._tag == "base64":
             self._decode_base64()
             return
-        for piece in self._text[self._weighed :]:
-            self._memory += sys.getsizeof(piece)
+        for number, piece in enumerate(self._text[self._weighed :], self._weighed):
             width = _width(piece)
             if width > self._width:
-                self._memory += (width - self._width) * sum(map(len, self._text[: self._weighed]))
+                self._memory += (width - self._width) * sum(map(len, self._text[:number]))
                 self._width = width
+            self._memory += self._width * len(piece)
         self._weighed = len(self._text)
         if self._memory > _MAX_MEMORY:
             raise RpcProtocolError(f"a value of more than {_MAX_MEMORY // _MIB} MiB in memory", status=413)

@@ -61,7 +61,7 @@ async def running(variables: dict[str, str] = NO_MASTER) -> AsyncIterator[Node]:
             [-1, "ERROR: param [publishers] must be a list of strings", -1],
         ),
         (("requestTopic", "/me", "/t", [["TCPROS"]]), [-1, "Not a publisher of [/t]", []]),
-        (("system.multicall",), []),
+        (("system.multicall", []), []),
         (("system.multicall", [{"methodName": "getName", "params": ["/me"]}]), [[[1, "", "/node"]]]),
         (
             ("system.multicall", [5, {"methodName": "getNothing", "params": []}]),

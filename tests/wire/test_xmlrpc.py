@@ -10,13 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.steps import finish
+from minirospy.wire import xmlrpc as xmlrpc_module
+from minirospy.wire.http import MAX_BODY
 from minirospy.wire.xmlrpc import (
     Call,
+    DateTime,
+    Reader,
     parse_call,
+    parse_call_in_steps,
     parse_response,
     serialize_call,
+    serialize_call_in_steps,
     serialize_fault,
     serialize_response,
+    serialize_response_in_steps,
 )
 
 # What XML 1.0 can hold: no control characters but tab and line feed, no surrogates.
@@ -118,3 +126,89 @@ def test_dates_in_any_form() -> None:
     for text in ("20200102T03:04:05", "2020-01-02T03:04:05Z", "some day"):
         body = wrapped(b"<value><dateTime.iso8601>" + text.encode() + b"</dateTime.iso8601></value>")
         assert text.encode() in serialize_response(parse_response(body))
+
+
+# --- in steps
+
+
+LARGE = [
+    [list(range(20_000)), {"a": 1.5, "b": [True, "x" * 200]}],
+    ["<&>\r" * 100_000],
+    ["\U0001f600" + "x" * 300_000],
+    [{f"k{number}": [number] for number in range(5_000)}],
+    [b"\x00\xff" * 200_000],
+    [{"<key>" * 30_000: DateTime("some day")}],
+]
+
+
+@pytest.mark.parametrize("args", LARGE)
+def test_a_large_call_is_written_and_read_in_steps_as_in_one(args: list[Any]) -> None:
+    pieces = finish(serialize_call_in_steps("method", args, MAX_BODY))
+    assert b"".join(pieces) == serialize_call("method", args)
+    assert len(pieces) > 2
+    assert finish(parse_call_in_steps(b"".join(pieces))) == ("method", args)
+    pieces = finish(serialize_response_in_steps(args, MAX_BODY))
+    assert b"".join(pieces) == serialize_response(args)
+
+
+@given(st.lists(VALUES, max_size=3))
+def test_any_call_is_written_and_read_in_steps_as_in_one(args: list[Any]) -> None:
+    body = b"".join(finish(serialize_call_in_steps("m", args, MAX_BODY)))
+    assert body == serialize_call("m", args)
+    reader = Reader()
+    for at in range(0, len(body), 7):
+        reader.feed(body[at : at + 7])
+    reader.feed(b"", is_last=True)
+    reader.close()
+    assert repr(reader.params) == repr(parse_call(body).args)
+
+
+def test_long_base64_is_decoded_as_it_comes() -> None:
+    data = bytes(range(256)) * 2_000
+    body = xmlrpc.client.dumps((xmlrpc.client.Binary(data), "after"), "m").encode()
+    assert finish(parse_call_in_steps(body)).args == [data, "after"]
+
+
+def test_each_step_is_short() -> None:
+    body = serialize_call("m", [list(range(20_000))])
+    assert sum(1 for _ in parse_call_in_steps(body)) > len(body) // 10_000
+    steps = serialize_response_in_steps(list(range(20_000)), MAX_BODY)
+    assert sum(1 for _ in steps) > 50
+
+
+@pytest.mark.parametrize(
+    ("body", "why", "status"),
+    [
+        (b"<methodCall><" + b"x" * 200_000, "a tag or comment of more than 65536 bytes", 400),
+        (b"<methodCall><a b='" + b"x" * 200_000, "a tag or comment of more than 65536 bytes", 400),
+        (b"<methodCall><!--" + b"> " * 100_000, "a tag or comment of more than 65536 bytes", 400),
+        (b"<methodCall>" + b"<a>" * 20_000, "nested deeper", 400),
+        (
+            b"<methodCall><value><int>" + b"9" * 100_000 + b"</int></value></methodCall>",
+            "int has more than 2048",
+            400,
+        ),
+        (
+            b"<methodCall><value><double>" + b"9" * 100_000 + b"</double></value></methodCall>",
+            "double has more than 2048",
+            400,
+        ),
+        (
+            b"<methodCall><value>" + b"\xf0\x9f\x98\x80" + b"x" * 500_000,
+            "more than 1 MiB in memory",
+            413,
+        ),
+    ],
+)
+def test_what_would_take_too_much_is_refused_before_its_end(
+    body: bytes, why: str, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(xmlrpc_module, "_MAX_MEMORY", 1024 * 1024)
+    with pytest.raises(RpcProtocolError, match=why) as caught:
+        finish(parse_call_in_steps(body))
+    assert caught.value.status == status
+
+
+def test_an_answer_that_is_too_large_is_refused_while_it_is_written() -> None:
+    with pytest.raises(RpcProtocolError, match="more than 100000 bytes"):
+        finish(serialize_response_in_steps([list(range(1000))] * 10**6, 100_000))

@@ -1,0 +1,260 @@
+"""Calls of the Master API and the Slave API: tables of methods and their parameters, and the dispatcher that checks them.
+
+Pure: a method's name and arguments in, ``[status code, text, value]`` out. Source: http://wiki.ros.org/ROS/Master_API,
+http://wiki.ros.org/ROS/Slave_API; the texts that refuse an argument are those of real rosmaster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, NamedTuple
+
+from minirospy import names
+from minirospy.errors import MinirospyError, RpcFault
+from minirospy.escape import has_controls
+from minirospy.steps import Steps
+
+__all__ = [
+    "ERROR",
+    "FAILURE",
+    "SUCCESS",
+    "Answer",
+    "CallRefused",
+    "Dispatcher",
+    "Method",
+    "Parameter",
+    "anything",
+    "api_uri",
+    "global_name",
+    "node_name",
+    "parameter_key",
+    "parameters",
+    "plain_key",
+    "some",
+    "subgraph",
+    "text",
+    "type_name",
+    "uris",
+]
+
+SUCCESS, FAILURE, ERROR = 1, 0, -1
+"""Status codes of an answer."""
+
+Answer = list[Any]
+"""``[status code, text, value]``."""
+
+_MAX_CHARACTERS = 4096
+"""Of a name, a type or a URI."""
+
+
+class CallRefused(MinirospyError):
+    """An argument is not acceptable; the text is the answer's."""
+
+
+class Parameter(NamedTuple):
+    """A parameter of a method: ``read(value, name, caller_id)`` returns the argument or raises CallRefused."""
+
+    name: str
+    read: Callable[[Any, str, str], Any]
+
+
+class Method(NamedTuple):
+    """A method: what is called with the caller_id and the arguments, and the value of an answer that refuses."""
+
+    function: Callable[..., Answer | Steps[Answer]]
+    refused: Any
+    parameters: tuple[Parameter, ...] = ()
+    optional: int = 0
+    """How many of the last parameters may be left out."""
+
+
+class Dispatcher:
+    """Checks calls and makes them. An answer may come in steps."""
+
+    def __init__(
+        self,
+        methods: dict[str, Method],
+        *,
+        unknown: str = 'method "{}" is not supported',
+        refusals: tuple[type[Exception], ...] = (),
+    ) -> None:
+        """``unknown``: the fault of a method that is not there; ``refusals``: what methods raise beside CallRefused."""
+        self.methods = methods
+        self._unknown = unknown
+        self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
+
+    def dispatch(self, name: str, args: Sequence[Any]) -> Any:
+        """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
+        method = self.methods.get(name)
+        if method is None:
+            return self._dispatch_system(name, args)
+        if not args:
+            return [ERROR, "missing required caller_id parameter", method.refused]
+        most = len(method.parameters) + 1
+        if not most - method.optional <= len(args) <= most:
+            return [ERROR, "Error: bad call arity", method.refused]
+        caller_id = args[0]
+        if not isinstance(caller_id, str):
+            return [ERROR, "caller_id must be a string", method.refused]
+        try:
+            if len(caller_id) > _MAX_CHARACTERS:
+                raise CallRefused(f"the caller_id has more than {_MAX_CHARACTERS} characters")
+            if has_controls(caller_id):
+                raise CallRefused("caller_id contains illegal chars")
+            answer = method.function(
+                caller_id,
+                *[
+                    parameter.read(value, parameter.name, caller_id)
+                    for parameter, value in zip(method.parameters, args[1:], strict=False)
+                ],
+            )
+        except self._refusals as refusal:
+            return [ERROR, str(refusal), method.refused]
+        return answer if isinstance(answer, list) else self._finish(answer, method.refused)
+
+    def _finish(self, steps: Steps[Answer], refused: Any) -> Steps[Answer]:
+        try:
+            return (yield from steps)
+        except self._refusals as refusal:
+            return [ERROR, str(refusal), refused]
+
+    def _dispatch_system(self, name: str, args: Sequence[Any]) -> Any:
+        """Call what XML-RPC servers have: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
+        if name == "system.listMethods":
+            return sorted(self.methods)
+        if name == "system.multicall":
+            if len(args) != 1 or not isinstance(args[0], list):
+                raise RpcFault(1, "system.multicall takes a list of structs of methodName and params")
+            return self._call_many(args[0])
+        raise RpcFault(1, self._unknown.format(name[:_MAX_CHARACTERS]))
+
+    def _call_many(self, calls: list[Any]) -> Steps[list[Any]]:
+        answers = []
+        for call in calls:
+            answers.append((yield from self._call_one_of_many(call)))
+            yield None
+        return answers
+
+    def _call_one_of_many(self, call: Any) -> Steps[Any]:
+        match call:
+            case {"methodName": "system.multicall"}:
+                return _fault("system.multicall inside itself")
+            case {"methodName": str(name), "params": list(args)}:
+                try:
+                    answer = self.dispatch(name, args)
+                    return [(yield from answer) if isinstance(answer, Generator) else answer]
+                except RpcFault as fault:
+                    return {"faultCode": fault.code, "faultString": fault.text}
+            case _:
+                return _fault("a call is a struct of methodName and params")
+
+
+def _fault(text: str) -> dict[str, Any]:
+    return {"faultCode": 1, "faultString": text}
+
+
+# --- the types of parameters
+
+
+def anything(value: Any, name: str, caller_id: str) -> Any:
+    """Return any value."""
+    return value
+
+
+def some(value: Any, name: str, caller_id: str) -> Any:
+    """Return any value that is not empty."""
+    if not value:
+        raise CallRefused(f"ERROR: parameter [{name}] must be specified and non-empty")
+    return value
+
+
+def text(value: Any, name: str, caller_id: str) -> str:
+    """Return a text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise CallRefused(f"ERROR: parameter [{name}] must be a non-empty string")
+    return value
+
+
+def global_name(value: Any, name: str, caller_id: str) -> str:
+    """Return the name of a topic or a service, resolved as the caller sees it."""
+    resolved = node_name(value, name, caller_id)
+    if resolved == "/":
+        raise CallRefused(f"ERROR: parameter [{name}] cannot be the global namespace")
+    return resolved
+
+
+def node_name(value: Any, name: str, caller_id: str) -> str:
+    """Return the name of a node, resolved as the caller sees it."""
+    found = _short_text(value, name)
+    # rosmaster lets in much that is no legal name: many a robot's topics have a dash.
+    if ":" in found or " " in found or has_controls(found):
+        raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
+    return _resolve(found, caller_id)
+
+
+def parameter_key(value: Any, name: str, caller_id: str) -> str:
+    """Return the name of a parameter, resolved as the caller sees it; rosmaster lets any characters in."""
+    return _resolve(plain_key(value, name, caller_id), caller_id)
+
+
+def plain_key(value: Any, name: str, caller_id: str) -> str:
+    """Return the name of a parameter as it is given."""
+    if not isinstance(some(value, name, caller_id), str):
+        raise CallRefused(f"ERROR: parameter [{name}] must be a string")
+    return _short_text(value, name)
+
+
+def type_name(value: Any, name: str, caller_id: str) -> str:
+    """Return a type ``pkg/Name``, or ``*``."""
+    found = _short_text(value, name)
+    if found != "*" and (found.count("/") != 1 or has_controls(found)):
+        raise CallRefused(f"ERROR: parameter [{name}] is not a valid package resource name")
+    return found
+
+
+def api_uri(value: Any, name: str, caller_id: str) -> str:
+    """Return the URI of a node's API or of a service."""
+    if not isinstance(value, str) or not value:
+        raise CallRefused(f"ERROR: parameter [{name}] is not an XMLRPC URI")
+    found = _short_text(value, name)
+    if not found.startswith(("http://", "rosrpc://")):
+        raise CallRefused(f"ERROR: parameter [{name}] is not an RPC URI")
+    if " " in found or has_controls(found):
+        # It becomes part of the requests to the node, and of lines of logs.
+        raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
+    return found
+
+
+def subgraph(value: Any, name: str, caller_id: str) -> str:
+    """Return a namespace, resolved as the caller sees it; "" is the whole graph."""
+    if not isinstance(value, str):
+        raise CallRefused(f"ERROR: parameter [{name}] must be a string")
+    return names.resolve(_short_text(value, name), caller_id) if value else ""
+
+
+def uris(value: Any, name: str, caller_id: str) -> list[str]:
+    """Return a list of URIs."""
+    if not isinstance(value, list):
+        raise CallRefused(f"ERROR: param [{name}] must be a list")
+    if not all(isinstance(uri, str) for uri in value):
+        raise CallRefused(f"ERROR: param [{name}] must be a list of strings")
+    return value
+
+
+def _short_text(value: Any, name: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise CallRefused(f"ERROR: parameter [{name}] must be a non-empty string")
+    if len(value) > _MAX_CHARACTERS:
+        raise CallRefused(f"ERROR: parameter [{name}] has more than {_MAX_CHARACTERS} characters")
+    return value
+
+
+def _resolve(name: str, caller_id: str) -> str:
+    if name[0] == "/" and name[-1] != "/" and "//" not in name:
+        return name
+    return names.resolve(name, caller_id)
+
+
+def parameters(**readers: Callable[[Any, str, str], Any]) -> tuple[Parameter, ...]:
+    """Return the parameters of a method, by their names."""
+    return tuple(Parameter(name, read) for name, read in readers.items())
