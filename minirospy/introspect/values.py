@@ -55,6 +55,9 @@ def parse_value(text: str) -> Any:
     try:
         check_yaml(text)
         return yaml.load(text, Loader=_loader())
+    except UnicodeEncodeError:
+        # A byte of the command line that is not UTF-8 is a usage error, which the command reports.
+        raise
     except (yaml.YAMLError, ValueError) as error:
         raise ValueTextError(text, _complaint(error)) from error
 
