@@ -1,6 +1,6 @@
 """Clocks: what time it is, and waiting until a time comes.
 
-A wall clock, and a simulated one that is told the time (http://wiki.ros.org/Clock). Times are
+A wall clock, and a simulated one that is set from outside (http://wiki.ros.org/Clock). Times are
 nanoseconds since the epoch.
 """
 
@@ -16,15 +16,15 @@ from minirospy.errors import ROSTimeMovedBackwardsException
 __all__ = ["Clock", "SignalSafeEvent", "SimulatedClock", "WallClock", "wait_for_event"]
 
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not end a wait, and elsewhere
-one that comes just before the wait begins is seen only after it."""
+"""Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not interrupt a wait, and
+elsewhere one that arrives just before the wait starts is noticed only after it."""
 
 
 class SignalSafeEvent(threading.Event):
-    """An event that a signal's handler may set, whatever the thread is about that it interrupts.
+    """An event that a signal handler may set, whichever code it interrupts.
 
     That thread may be on its way into wait() or set() of the same event, with the event's lock taken; where that is
-    not reentrant, as threading has it, the handler waits for itself, and the process never ends.
+    not reentrant, as threading has it, the handler waits for itself, and the process never exits.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class SignalSafeEvent(threading.Event):
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
-    """``event.wait(timeout)`` which a signal can interrupt on every OS."""
+    """Do ``event.wait(timeout)`` so that a signal can interrupt it on every OS."""
     if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
@@ -49,46 +49,46 @@ class Clock(Protocol):
     """What the sleeping functions need to know of time."""
 
     def now(self) -> int:
-        """The time in nanoseconds."""
+        """Return the time in nanoseconds."""
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait so long; False where ``stop`` was set meanwhile."""
+        """Wait for this long; return False if ``stop`` was set meanwhile."""
 
 
 class WallClock:
     """The time of the machine."""
 
     def now(self) -> int:
-        """Nanoseconds since the epoch."""
+        """Return the nanoseconds since the epoch."""
         return time.time_ns()
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait so long; False where ``stop`` was set meanwhile."""
+        """Wait for this long; return False if ``stop`` was set meanwhile."""
         return not wait_for_event(stop, max(0.0, nanoseconds / 1e9))
 
 
 class SimulatedClock:
-    """A time that somebody sets: a simulator through /clock, or a test by hand."""
+    """A clock that is set: by a simulator through /clock, or by a test."""
 
     def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
-        """``changed`` is notified of each time that is told."""
+        """Notify ``changed`` each time that the clock is set."""
         self._now = now
         self._changed = changed or threading.Condition()
 
     def now(self) -> int:
-        """What was set last; 0 until then."""
+        """Return what was set last; 0 until then."""
         return self._now
 
     def set(self, now: int) -> None:
-        """Tell the time; sleepers whose time has come wake up."""
+        """Set the time and wake the sleepers that waited for it."""
         with self._changed:
             self._now = now
             self._changed.notify_all()
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait until the clock has moved on so far; False where ``stop`` was set meanwhile.
+        """Wait until the clock has advanced by this much; return False if ``stop`` was set meanwhile.
 
-        While the time is 0, nobody has told it yet: the sleep begins with the first time that is told.
+        While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
         Raises ROSTimeMovedBackwardsException.
         """
         with self._changed:
@@ -97,7 +97,7 @@ class SimulatedClock:
             before = self._now
             end = before + nanoseconds
             while self._now < end and not stop.is_set():
-                # A set stop does not notify: look again now and then.
+                # Setting stop does not notify: poll it.
                 self._changed.wait(0.1)
                 if self._now < before:
                     raise ROSTimeMovedBackwardsException((before - self._now) / 1e9)

@@ -1,4 +1,4 @@
-"""What the environment says: ROS_MASTER_URI and its kin in, one frozen record out.
+"""The environment variables of ROS and of minirospy in, one frozen record out.
 
 Read once where a process starts (a command's main, init_node) and handed on as an argument.
 Source: http://wiki.ros.org/ROS/EnvironmentVariables and http://wiki.ros.org/ROS/NetworkSetup.
@@ -37,10 +37,10 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""What /rosdistro says: the ROS 1 distribution whose behaviour is ours; with its line end, as ROS sets it."""
+"""The value of /rosdistro: the ROS 1 distribution whose behaviour is ours; with a line end, as ROS sets it."""
 
 ROS_VERSION = "1.17.0\n"
-"""What /rosversion says."""
+"""The value of /rosversion."""
 
 
 _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
@@ -54,7 +54,7 @@ net.ipv4.route_localnet, as hosts of containers set it, lets neighbours in."""
 class Environment(NamedTuple):
     """Where the master is, how this process is reached, and where its files go.
 
-    ``host`` is the name that peers are told; ``bind_host`` the address that servers listen on
+    ``host`` is the name that is advertised to peers; ``bind_host`` the address that servers listen on
     (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those
     that a node's servers may take (None: any): what a firewall or a container lets through; ``allow``
     the networks whose machines may connect ("": all). ``transport`` "tcp" keeps connections off Unix sockets.
@@ -75,7 +75,7 @@ class Environment(NamedTuple):
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
-        """The record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
+        """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
         Raises UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
         more than a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
@@ -107,7 +107,7 @@ class Environment(NamedTuple):
 
     @property
     def bind_host(self) -> str:
-        """The address to listen on, as rospy chooses it."""
+        """Return the address to listen on, as rospy chooses it."""
         if self.host.startswith("127."):
             return self.host
         if self.host in {"localhost", "::1"}:
@@ -116,30 +116,30 @@ class Environment(NamedTuple):
 
     @property
     def nearby(self) -> bool:
-        """Whether processes of this machine may be reached by Unix sockets."""
+        """Return whether processes of this machine may be reached by Unix sockets."""
         return self.transport != "tcp"
 
     @property
     def uri_host(self) -> str:
-        """``host`` as it stands in a URI: an IPv6 address in brackets."""
+        """Return ``host`` as it is written in a URI: an IPv6 address in brackets."""
         return f"[{self.host}]" if ":" in self.host else self.host
 
     @property
     def master_address(self) -> tuple[str, int]:
-        """(host, port) of the master."""
+        """Return the (host, port) of the master."""
         host, port, _ = split_uri(self.master_uri)
         return host, port
 
     @property
     def master_is_local(self) -> bool:
-        """Whether the master's host is this machine, so that a tool may start one."""
+        """Return whether the master's host is this machine, so that a tool may start one."""
         return is_own_host(self.master_address[0], self.host)
 
 
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """The master's URI and the namespace of names: all that a tool needs which only asks. As Environment.read."""
+    """Return the master's URI and the namespace, all that a tool needs for queries. Raises as Environment.read."""
     uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
     uri = _checked_uri(uri)
     if is_local(environ):
@@ -167,7 +167,7 @@ def export_local(environ: MutableMapping[str, str]) -> None:
 
 
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
-    """(host, port, path) of ``scheme://host:port/path``. Raises ValueError.
+    """Return the (host, port, path) of ``scheme://host:port/path``. Raises ValueError.
 
     By hand: importing urllib.parse takes a command a twentieth of its time.
     """
@@ -177,19 +177,19 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
     found, _, rest = uri.partition("://")
     address, slash, path = rest.partition("/")
     host, _, port = address.rpartition(":")
-    # `http://[hostname]:11311` is what a page says, and no address of IPv6.
+    # `http://[hostname]:11311` is how a page writes a placeholder, not an IPv6 address.
     if host.startswith("[") and host.endswith("]") and ":" in host:
         host = host[1:-1]
     is_host = host.isprintable() and host[:1] not in ("", "[")
     if found.lower() != scheme or not is_host or not (port.isascii() and port.isdecimal()):
         raise ValueError(f"[{uri}] is not of the form {scheme}://host:port")
     if not 0 < int(port) < 65536:
-        raise ValueError(f"[{uri}]: a port lies between 1 and 65535")
+        raise ValueError(f"[{uri}]: a port is between 1 and 65535")
     return host.lower(), int(port), slash + path or "/"
 
 
 def is_own_host(host: str, own: str = "localhost") -> bool:
-    """Whether a name or address is this machine's (which peers are told is ``own``)."""
+    """Return whether a name or address is this machine's, which is advertised as ``own``."""
     if host in {"localhost", "::1", own, socket.gethostname()} or host.startswith("127."):
         return True
     try:
@@ -264,7 +264,7 @@ def _port_range(text: str) -> range | None:
 
 
 def _advertised_host(environ: Mapping[str, str]) -> str:
-    """ROS_HOSTNAME, else ROS_IP, else this machine's name where it resolves, else loopback."""
+    """Return ROS_HOSTNAME, else ROS_IP, else this machine's name where it resolves, else loopback."""
     for variable in ("ROS_HOSTNAME", "ROS_IP"):
         named = environ.get(variable)
         if named:

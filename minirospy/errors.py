@@ -4,8 +4,8 @@
 
     Exception
     +-- MinirospyError                  a fault that we name: one clear line for a person in str()
-    |   +-- UsageError                  a command was typed wrong (exit status 2)
-    |   +-- NotFoundError               a package, node, type, topic or file that is not there (with nearest names)
+    |   +-- UsageError                  usage error of a command (exit status 2)
+    |   +-- NotFoundError               a package, node, type, topic or file that does not exist (with similar names)
     |   +-- MasterUnreachableError      no master answers at the URI
     |   +-- NodeUnreachableError        a node that the master knows does not answer
     |   +-- RpcError                    a remote procedure call (XML-RPC) went wrong
@@ -22,7 +22,7 @@
     |   |   +-- BuildError              a workspace or package that cannot be built
     |   |   +-- LaunchError             a launch file that does not load
     |   +-- BoardError                  the virtual board cannot be reached
-    |   +-- ValueTextError              a typed value that is not YAML, or does not fit where it goes
+    |   +-- ValueTextError              a typed value that is not YAML, or does not fit its target
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
     |   +-- ThreadLimitError            the system lets this process start no more threads
@@ -88,13 +88,13 @@ class MinirospyError(Exception):
 
 
 class UsageError(MinirospyError):
-    """A command was typed wrong."""
+    """A command was called with wrong arguments."""
 
 
 class NotFoundError(MinirospyError):
-    """Something named does not exist; the text offers the nearest names that do.
+    """Something named does not exist; the text suggests similar names that do.
 
-    ``kind`` is what was looked for ("package", "message type"), ``name`` what was asked,
+    ``kind`` is what was looked up ("package", "message type"), ``name`` the name that was given,
     ``known`` every name that exists, ``hint`` what to do.
     """
 
@@ -247,7 +247,7 @@ class LaunchError(SourceError):
 
 
 class BoardError(MinirospyError):
-    """The virtual board cannot be reached, or refused what was asked."""
+    """The virtual board cannot be reached, or refused a request."""
 
 
 class ValueTextError(MinirospyError):
@@ -348,8 +348,8 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2) -> str:
-    """What is said behind a word that does not exist: those of the ``known`` that look like it, "" where none does."""
+    """Return the suggestion after a word that does not exist: those of the ``known`` that are similar, "" if none is."""
     import difflib
 
-    near = difflib.get_close_matches(word, list(known), n=most)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+    suggestions = difflib.get_close_matches(word, list(known), n=most)
+    return f"; did you mean {' or '.join(suggestions)}?" if suggestions else ""

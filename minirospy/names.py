@@ -31,34 +31,34 @@ _ASSIGNMENT = re.compile(r"^[~/A-Za-z_][\w/]*:=")
 
 
 def is_legal_name(name: str) -> bool:
-    """Whether ``name`` is a legal graph resource name; the empty name resolves to the namespace."""
+    """Return whether ``name`` is a legal graph resource name; the empty name resolves to the namespace."""
     return name == "" or (bool(_LEGAL.match(name)) and "//" not in name)
 
 
 def is_legal_base_name(name: str) -> bool:
-    """Whether ``name`` is legal without any namespace, as a node's name must be."""
+    """Return whether ``name`` is legal without any namespace, as a node's name must be."""
     return bool(_LEGAL_BASE.match(name))
 
 
 def is_global(name: str) -> bool:
-    """Whether ``name`` starts at the root."""
+    """Return whether ``name`` starts at the root."""
     return name.startswith("/")
 
 
 def is_private(name: str) -> bool:
-    """Whether ``name`` starts with ``~``."""
+    """Return whether ``name`` starts with ``~``."""
     return name.startswith("~")
 
 
 def canonicalize(name: str) -> str:
-    """``name`` without doubled or trailing slashes."""
+    """Return ``name`` without doubled or trailing slashes."""
     if not name or name == "/":
         return name
     return ("/" if name.startswith("/") else "") + "/".join(part for part in name.split("/") if part)
 
 
 def namespace_of(name: str) -> str:
-    """The namespace that holds ``name``, with a slash at its end: ``/a/b`` -> ``/a/``."""
+    """Return the namespace that contains ``name``, with a slash at its end: ``/a/b`` -> ``/a/``."""
     if not name:
         return "/"
     stem = name.rstrip("/")
@@ -66,7 +66,7 @@ def namespace_of(name: str) -> str:
 
 
 def join(namespace: str, name: str) -> str:
-    """``name`` below ``namespace``; global and private names stay what they are."""
+    """Return ``name`` below ``namespace``; global and private names are returned unchanged."""
     if is_global(name) or is_private(name):
         return name
     if namespace == "~":
@@ -77,7 +77,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
-    """The global name of ``name`` as the node ``node_name`` (global) sees it, remapped."""
+    """Return the global name of ``name`` as the node ``node_name`` (global) sees it, remapped."""
     namespace = namespace_of(node_name)
     if not name:
         return namespace
@@ -103,7 +103,7 @@ class Arguments(NamedTuple):
 
     ``plain``: what is left for the program; ``remappings``: names as typed, unresolved;
     ``parameters``: private parameters as (name without the underscore, YAML text);
-    ``special``: ``__name``, ``__ns`` and their kin; ``wrong``: arguments with more than one ``:=``.
+    ``special``: ``__name``, ``__ns`` and the like; ``wrong``: arguments with more than one ``:=``.
     """
 
     plain: list[str]
@@ -113,14 +113,15 @@ class Arguments(NamedTuple):
     wrong: list[str]
 
     def resolved_remappings(self, node_name: str) -> dict[str, str]:
-        """The remappings with both sides as global names."""
+        """Return the remappings with both sides as global names."""
         return {resolve(a, node_name): resolve(b, node_name) for a, b in self.remappings.items()}
 
 
 def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
     """Take ``from:=to``, ``_param:=value`` and ``__special:=value`` out of a command line.
 
-    What does not begin with a name, as ``--flag:=x``, is the program's own; without a value it says nothing.
+    An argument that does not start with a name, such as ``--flag:=x``, is left to the program; one without a value has no
+    effect.
     """
     parsed = Arguments([], {}, {}, {}, [])
     for argument in argv:

@@ -18,7 +18,7 @@ __all__ = ["create_file", "open_file", "open_text", "read_file"]
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
     | getattr(os, "O_NOFOLLOW", 0)
-    # A FIFO at the name would block the process until somebody opens its other end.
+    # A FIFO at the name would block the process until another one opens its other end.
     | getattr(os, "O_NONBLOCK", 0)
 )
 

@@ -35,11 +35,11 @@ class TVal:
 
     @classmethod
     def from_sec(cls: type[_V], float_secs: float) -> _V:
-        """From seconds as a float."""
+        """Return the value for seconds as a float."""
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
-        """Whether it is zero."""
+        """Return whether it is zero."""
         return not (self.secs or self.nsecs)
 
     def set(self, secs: int, nsecs: int) -> None:
@@ -54,11 +54,11 @@ class TVal:
             self.secs += carry
 
     def to_sec(self) -> float:
-        """Seconds as a float."""
+        """Return the seconds as a float."""
         return self.secs + self.nsecs / 1e9
 
     def to_nsec(self) -> int:
-        """Nanoseconds."""
+        """Return the nanoseconds."""
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
@@ -102,7 +102,7 @@ class Time(TVal):
             raise TypeError("time values must be positive")
 
     def to_time(self) -> float:
-        """The same as ``to_sec``, as ``time.time()`` counts."""
+        """Return the same as ``to_sec``, as ``time.time()`` counts."""
         return self.to_sec()
 
     def __add__(self, other: Any) -> Time:
@@ -213,13 +213,13 @@ class Duration(TVal):
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Whole seconds, and the nanoseconds of the rest: cut off, as genpy does it, not rounded."""
+    """Return whole seconds, and the nanoseconds of the rest: cut off, as genpy does it, not rounded."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 
 
 def _is_integer(value: object) -> bool:
-    """Whether a number is one without a fraction, such as numpy's."""
+    """Return whether a number is an integer, numpy's included."""
     try:
         operator.index(value)  # type: ignore[arg-type]
     except TypeError:

@@ -58,7 +58,7 @@ ROOMS = {
             "tests/runtime/test_master_journal.py",
             "tests/actionlib/test_statuses.py",
         ],
-        ["two_hundred_nodes", "started_together"],
+        ["two_hundred_nodes", "double_start"],
     ),
     "wire": Room(["wire/*.py"], ["tests/wire"]),
     "journal": Room(
@@ -97,7 +97,7 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 }
 
 Mutate = Callable[[ast.AST], ast.AST | None]
-"""What becomes of a node: another one, or None, where the node itself was changed."""
+"""Return what replaces a node; None if the node itself was changed."""
 
 
 # --- finding mutants
@@ -118,7 +118,7 @@ class Mutant:
 
 
 def find_mutants(module: str, tree: ast.Module) -> Iterator[Mutant]:
-    """Every fault that there is for a module."""
+    """Yield every fault for a module."""
     skipped: set[int] = set()
     for number, node in enumerate(ast.walk(tree)):
         if id(node) in skipped:
@@ -130,7 +130,7 @@ def find_mutants(module: str, tree: ast.Module) -> Iterator[Mutant]:
 
 
 def _untested(node: ast.AST) -> Iterator[ast.AST]:
-    """The parts of a node that are not mutated."""
+    """Yield the parts of a node that are not mutated."""
     match node:
         case ast.arg(annotation=ast.expr() as annotation) | ast.AnnAssign(annotation=annotation):
             yield annotation
@@ -282,7 +282,7 @@ def _assign(module: ModuleType, statement: ast.stmt, path: str) -> None:
 
 
 class Mutants:
-    """The plugin: takes over the session after its tests are collected."""
+    """A pytest plugin that takes over the session after collection."""
 
     def __init__(self, room: Room, options: argparse.Namespace) -> None:
         self._room = room
@@ -406,7 +406,7 @@ class Mutants:
         return found
 
     def _tests(self, mutant: Mutant, session: pytest.Session) -> list[int]:
-        """The tests that execute the statement, the quickest first; those of what is imported: all of the module."""
+        """Return the tests that execute the statement, the quickest first; for code run at import, all of the module."""
         tree = self._trees[mutant.module][1]
         statement: ast.AST = tree
         inside = None
@@ -469,14 +469,14 @@ class Mutants:
 
 
 def _span(node: ast.AST) -> tuple[int, int]:
-    """The first and last line of a statement, of a handler or a case."""
+    """Return the first and last line of a statement, handler or case."""
     if isinstance(node, ast.match_case):
         return node.pattern.lineno, node.body[-1].end_lineno or 0
     return getattr(node, "lineno", 0), getattr(node, "end_lineno", 0) or 0
 
 
 def run_room(name: str, options: argparse.Namespace) -> float:
-    """Try the mutants of a room; the share that was killed."""
+    """Try the mutants of a room; return the percentage that was killed."""
     room, begin = ROOMS[name], time.monotonic()
     plugin = Mutants(room, options)
     # importlib's rewriting of asserts is for people.
@@ -505,7 +505,7 @@ def run_room(name: str, options: argparse.Namespace) -> float:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Try all mutants; 1 where a room is below the goal."""
+    """Try all mutants; return 1 if a room is below the goal."""
     parser = argparse.ArgumentParser(description="Mutation testing of the pure rooms and the journal.")
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"{', '.join(ROOMS)} (default: all)")
     parser.add_argument("--sample", type=int, default=0, metavar="N", help="try only N mutants of each room")

@@ -80,7 +80,7 @@ def lines_until_set(step: int, is_set: bool) -> int:
 
 
 @pytest.mark.parametrize("is_set", [False, True], ids=["wait", "set"])
-def test_a_signal_may_set_an_event_at_any_moment(is_set: bool) -> None:
+def test_signal_handler_may_set_an_event_at_any_moment(is_set: bool) -> None:
     """Its handler runs in the thread that it interrupts, between any two lines of what that calls."""
     step = 1
     while lines_until_set(step, is_set) >= step:
@@ -88,7 +88,7 @@ def test_a_signal_may_set_an_event_at_any_moment(is_set: bool) -> None:
     assert step > 5
 
 
-def test_wall_clock_tells_the_time() -> None:
+def test_wall_clock_returns_the_time() -> None:
     before = time.time_ns()
     assert before <= WallClock().now() <= time.time_ns()
 
@@ -100,7 +100,7 @@ def test_wall_clock_sleeps() -> None:
     assert WallClock().sleep(-SECOND, threading.Event())
 
 
-def test_a_stop_ends_a_sleep_on_wall_time() -> None:
+def test_stop_ends_a_sleep_on_wall_time() -> None:
     stop = threading.Event()
     stop.set()
     assert not WallClock().sleep(60 * SECOND, stop)
@@ -113,7 +113,7 @@ def test_wait_for_event() -> None:
     assert wait_for_event(event, None)
 
 
-def test_simulated_sleep_ends_when_its_time_has_come() -> None:
+def test_simulated_sleep_ends_at_its_time() -> None:
     clock = SimulatedClock(10 * SECOND)
     sleeping = Sleeping(clock, 2 * SECOND)
     sleeping.at(12 * SECOND - 1)
@@ -121,7 +121,7 @@ def test_simulated_sleep_ends_when_its_time_has_come() -> None:
     assert sleeping.end() is True
 
 
-def test_a_sleep_before_the_first_time_begins_with_it() -> None:
+def test_sleep_before_the_first_time_starts_at_it() -> None:
     clock = SimulatedClock()
     sleeping = Sleeping(clock, SECOND)
     sleeping.at(100 * SECOND)
@@ -139,7 +139,7 @@ def test_time_that_jumps_back_raises(now: int) -> None:
     assert error.time == 10 - now / 1e9
 
 
-def test_a_stop_ends_a_simulated_sleep() -> None:
+def test_stop_ends_a_simulated_sleep() -> None:
     for clock in (SimulatedClock(), SimulatedClock(SECOND)):
         sleeping = Sleeping(clock, SECOND)
         sleeping.stop.set()
@@ -147,6 +147,6 @@ def test_a_stop_ends_a_simulated_sleep() -> None:
         assert sleeping.end() is False
 
 
-def test_no_sleep_takes_no_time() -> None:
+def test_sleep_of_zero_takes_no_time() -> None:
     assert SimulatedClock(SECOND).sleep(0, threading.Event())
     assert SimulatedClock(SECOND).sleep(-5, threading.Event())

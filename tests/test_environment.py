@@ -20,7 +20,7 @@ from minirospy.environment import (
 from minirospy.errors import UsageError
 
 
-def test_the_defaults_are_roses() -> None:
+def test_defaults_are_those_of_ros() -> None:
     environment = Environment.read({})
     assert environment.master_uri == "http://localhost:11311"
     assert environment.master_address == ("localhost", 11311)
@@ -29,7 +29,7 @@ def test_the_defaults_are_roses() -> None:
     assert environment.master_is_local
 
 
-def test_the_variables_are_read() -> None:
+def test_variables_are_read() -> None:
     environment = Environment.read(
         {
             "ROS_MASTER_URI": "http://robot:11411/",
@@ -47,12 +47,12 @@ def test_the_variables_are_read() -> None:
     assert environment.package_path == (Path("/a"), Path("/b"))
 
 
-def test_ros_hostname_goes_before_ros_ip() -> None:
+def test_ros_hostname_has_precedence_over_ros_ip() -> None:
     environment = Environment.read({"ROS_HOSTNAME": "localhost", "ROS_IP": "192.0.2.7"})
     assert (environment.host, environment.bind_host) == ("localhost", "127.0.0.1")
 
 
-def test_a_name_that_does_not_resolve_is_not_told_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_name_that_does_not_resolve_is_not_advertised(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise socket.gaierror
 
@@ -60,7 +60,7 @@ def test_a_name_that_does_not_resolve_is_not_told_to_others(monkeypatch: pytest.
     assert Environment.read({}).host == "localhost"
 
 
-def test_overrides_win() -> None:
+def test_overrides_have_precedence() -> None:
     environment = Environment.read({"ROS_MASTER_URI": "http://a:1"}, master_uri="http://b:2", host="c")
     assert (environment.master_uri, environment.host) == ("http://b:2", "c")
 
@@ -77,7 +77,7 @@ def test_overrides_win() -> None:
         "http://[hostname]:11311",
     ],
 )
-def test_a_bad_master_uri_is_refused_in_words(uri: str) -> None:
+def test_invalid_master_uri_is_refused_with_a_reason(uri: str) -> None:
     with pytest.raises(UsageError, match="is not of the form http://host:port"):
         Environment.read({"ROS_MASTER_URI": uri})
 
@@ -97,7 +97,7 @@ def test_a_bad_master_uri_is_refused_in_words(uri: str) -> None:
         ({"ROS_HOSTNAME": "robot", "ROS_IPV6": "ON"}, "0.0.0.0", "robot"),
     ],
 )
-def test_where_servers_listen_as_rosgraph_network_tells(
+def test_bind_address_is_that_of_rosgraph_network(
     variables: dict[str, str], bind_host: str, uri_host: str
 ) -> None:
     environment = Environment.read(variables)
@@ -106,19 +106,19 @@ def test_where_servers_listen_as_rosgraph_network_tells(
 
 @pytest.mark.parametrize("host", ["http://robot", "robot:11311", "robot/", " robot", "[::1]"])
 @pytest.mark.parametrize("variable", ["ROS_HOSTNAME", "ROS_IP"])
-def test_a_host_that_is_more_than_a_host_is_refused_in_words(variable: str, host: str) -> None:
+def test_host_with_scheme_or_port_is_refused_with_a_reason(variable: str, host: str) -> None:
     with pytest.raises(UsageError, match="must be a name or an address alone"):
         Environment.read({variable: host})
 
 
-def test_a_range_of_ports() -> None:
+def test_port_range_is_parsed() -> None:
     assert Environment.read({}).ports is None
     assert Environment.read({"MINIROSPY_PORTS": "40000-40100"}).ports == range(40000, 40101)
     assert Environment.read({"MINIROSPY_PORTS": "40000"}).ports == range(40000, 40001)
 
 
 @pytest.mark.parametrize("text", ["a-b", "40100-40000", "0-5", "1-70000", "-5"])
-def test_a_range_that_is_none_is_refused_in_words(text: str) -> None:
+def test_invalid_port_range_is_refused_with_a_reason(text: str) -> None:
     with pytest.raises(UsageError, match="is not a range of ports"):
         Environment.read({"MINIROSPY_PORTS": text})
 
@@ -156,7 +156,7 @@ def test_uri_with_control_characters_is_refused(uri: str) -> None:
 @pytest.mark.parametrize(
     "elsewhere", [{}, {"ROS_IP": "192.0.2.7"}, {"ROS_HOSTNAME": "robot"}, {"MINIROSPY_ALLOW": "192.0.2.7"}]
 )
-def test_minirospy_local_wins_over_what_leads_elsewhere(elsewhere: dict[str, str]) -> None:
+def test_minirospy_local_has_precedence_over_addresses(elsewhere: dict[str, str]) -> None:
     environment = Environment.read({"MINIROSPY_LOCAL": "1", **elsewhere}, host="here")
     assert (environment.host, environment.bind_host, environment.allow) == (
         "localhost",

@@ -35,7 +35,7 @@ def test_remapping_is_by_resolved_names() -> None:
     assert arguments.plain == ["prog", "x"]
 
 
-def test_arguments_are_taken_apart() -> None:
+def test_arguments_are_parsed() -> None:
     arguments = names.parse_arguments(["p", "_rate:=5", "__name:=n", "__unknown:=x", "a:=b", "-v", ":=x"])
     assert arguments.parameters == {"rate": "5"}
     assert arguments.special == {"__name": "n", "__unknown": "x"}
@@ -46,15 +46,15 @@ def test_arguments_are_taken_apart() -> None:
 @pytest.mark.parametrize(
     "argument", ["--flag:=x", "-x:=y", "1:=2", "x-y:=z", "a b:=c", "[x]:=y", ":=", "http://a:=b"]
 )
-def test_what_begins_with_no_name_is_the_programs_own(argument: str) -> None:
+def test_argument_without_a_name_is_left_to_the_program(argument: str) -> None:
     assert names.parse_arguments([argument]) == ([argument], {}, {}, {}, [])
 
 
-def test_arguments_without_a_value_say_nothing() -> None:
+def test_argument_without_a_value_has_no_effect() -> None:
     assert names.parse_arguments(["a:=", "_p:=", "__name:= "]) == ([], {}, {}, {}, [])
 
 
-def test_arguments_with_two_values_are_told() -> None:
+def test_argument_with_two_values_is_reported() -> None:
     assert names.parse_arguments(["a:=b:=c", "_:=x"]) == ([], {"_": "x"}, {}, {}, ["a:=b:=c"])
 
 

@@ -1,4 +1,4 @@
-"""Files at predictable names are no way to another file, by a link, a FIFO or a folder that somebody else made."""
+"""Files at predictable names: links, FIFOs and folders of other users are refused."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users of Window
 
 @pytest.fixture
 def mine(tmp_path: Path) -> Path:
-    """A file of the user's, somewhere else."""
+    """A file of the user in another folder."""
     path = tmp_path / "mine"
     path.write_text("precious")
     return path

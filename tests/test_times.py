@@ -53,7 +53,7 @@ def test_durations_are_numbers(a: int, b: int) -> None:
 
 
 @given(points, spans)
-def test_points_and_durations(a: int, b: int) -> None:
+def test_arithmetic_of_times_and_durations(a: int, b: int) -> None:
     for operation in (operator.add, operator.sub):
         if operation(a, b) < 0:
             with pytest.raises(TypeError, match="time values must be positive"):
@@ -65,7 +65,7 @@ def test_points_and_durations(a: int, b: int) -> None:
 
 
 @given(points, points)
-def test_points_are_ordered(a: int, b: int) -> None:
+def test_times_are_ordered(a: int, b: int) -> None:
     assert (point(a) - point(b)).to_nsec() == a - b
     assert type(point(a) - point(b)) is Duration
     for operation in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
@@ -90,19 +90,19 @@ def test_floats_are_cut_off(seconds: float) -> None:
 @pytest.mark.parametrize(
     "arguments", [("x",), (None,), (1.5, 2), (float("nan"),), (float("inf"),), (1, None)]
 )
-def test_refused(kind: type[TVal], arguments: tuple[object, ...]) -> None:
+def test_invalid_values_are_refused(kind: type[TVal], arguments: tuple[object, ...]) -> None:
     with pytest.raises((TypeError, ValueError, OverflowError)):
         kind(*arguments)  # type: ignore[arg-type]
 
 
-def test_a_point_before_the_epoch_is_refused() -> None:
+def test_time_before_the_epoch_is_refused() -> None:
     for arguments in ((-1,), (0, -1), (-0.5,), (-2, BILLION)):
         with pytest.raises(TypeError, match="time values must be positive"):
             Time(*arguments)
 
 
 @pytest.mark.parametrize("other", [1, 1.5, "s", None, Time(1)])
-def test_a_point_is_no_number(other: object) -> None:
+def test_time_is_not_a_number(other: object) -> None:
     for operation in (operator.add, operator.mul, operator.truediv, operator.mod):
         with pytest.raises(TypeError):
             operation(Time(5), other)
@@ -110,7 +110,7 @@ def test_a_point_is_no_number(other: object) -> None:
     assert Time(5) != other
 
 
-def test_a_point_is_not_a_duration() -> None:
+def test_time_is_not_a_duration() -> None:
     assert Time(1) != Duration(1)
     assert len({Time(1), Duration(1)}) == 2
     with pytest.raises(TypeError):
@@ -129,7 +129,7 @@ def test_results_keep_the_class(kind: type[TVal]) -> None:
 
 
 @KINDS
-def test_set_takes_what_it_is_given(kind: type[TVal]) -> None:
+def test_set_does_not_normalise(kind: type[TVal]) -> None:
     value = kind()
     value.set(5, 6 * BILLION)
     assert (value.secs, value.nsecs) == (5, 6 * BILLION)
@@ -137,7 +137,7 @@ def test_set_takes_what_it_is_given(kind: type[TVal]) -> None:
     assert (value.secs, value.nsecs) == (11, 0)
 
 
-def test_what_numpy_computed_does_not_overflow() -> None:
+def test_values_of_numpy_do_not_overflow() -> None:
     numpy = pytest.importorskip("numpy")
     stamp = Time()
     stamp.secs, stamp.nsecs = numpy.int32(3), numpy.uint32(5)

@@ -1,8 +1,8 @@
-"""The master's journal on disk: what a master that was killed leaves to its successor.
+"""The master's journal on disk: the state that the successor of a killed master recovers.
 
 One file for each user and port, ``ROS_HOME/master/journal-PORT``. A record is written, without fsync, before
 the caller gets its answer: so a kill -9 loses nothing that was answered. A power cut may lose the last seconds,
-and with them the nodes of this machine are gone too. The file is rewritten, and then synced, once it has grown
+together with the nodes of this machine. The file is rewritten, and then synced, once it has grown
 to several times what it holds. A master that shuts down cleanly removes it: the next session starts empty.
 """
 
@@ -35,7 +35,7 @@ RETRY_SECONDS = 30.0
 """After this the journal is tried again that could not be written."""
 
 _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
-"""What locking a file raises that another process has locked; the last two on Windows."""
+"""The errors of locking a file that another process has locked; the last two are those of Windows."""
 
 
 class JournalBusyError(Exception):
@@ -51,7 +51,7 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """What a master that was killed has left; ``age``: seconds since it last wrote.
+    """The journal that a killed master left; ``age``: seconds since it last wrote.
 
     ``copy`` is the file to which a damaged journal was copied, None where that was not possible.
     """
@@ -66,7 +66,7 @@ class Journal:
     """An open journal. ``snapshot`` returns the records that make up the present state, for a rewrite.
 
     In this order: :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`. Where the disk fails, from the
-    first step on, the master goes on without; ``trouble`` says why, and a whole rewrite is tried every half minute.
+    first step on, the master runs without; ``trouble`` is the reason, and a whole rewrite is tried every half minute.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Journal:
 
     @property
     def size(self) -> int:
-        """The bytes in the file."""
+        """Return the number of bytes in the file."""
         return self._size
 
     def lock(self) -> None:
@@ -213,7 +213,7 @@ class Journal:
             try:
                 _write_all(self._second, data)
             except OSError:
-                # The old file goes on growing for a while.
+                # The old file keeps growing for a while.
                 self._compact_at = 2 * self._size
                 self._abandon()
 
@@ -249,7 +249,7 @@ class Journal:
             file, self._second = self._put_in_place(self._second), None
             self._switch_to(file, size + self._size - before)
         except (OSError, ValueError, TypeError) as error:
-            _log.warning("the journal %s could not be rewritten, it goes on growing: %s", self.path, error)
+            _log.warning("the journal %s could not be rewritten, it keeps growing: %s", self.path, error)
             self._compact_at = 2 * self._size
             if self._file is None:
                 # On Windows the old file is closed by then.
@@ -427,7 +427,7 @@ def _locked(path: Path, journal: Path) -> int:
             text = os.read(file, 20).strip()
             os.close(file)
             raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
-        # A file system without locks: nobody else has the port of this master, at least.
+        # A file system without locks: no other master has this port, at least.
 
     # On a full disk the lock holds all the same.
     with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""The log files of a master: thousands of lines a second cost little, since they are written twice a second together."""
+"""The log files of a master: lines are collected and written twice a second, so that thousands a second cost little."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SECONDS = 0.5
 
 
 class LogFileHandler(RotatingFileHandler):
-    """A handler of logging that follows no link: a log file's name can be predicted."""
+    """A logging handler that follows no link: the name of a log file can be predicted."""
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
         """``most_bytes`` 0: no limit. Raises OSError."""
@@ -34,10 +34,10 @@ class LogFileHandler(RotatingFileHandler):
 
 
 class LogFile(LogFileHandler):
-    """``path``, of ``most_bytes`` at most, with three older ones beside it.
+    """``path``, of ``most_bytes`` at most, with three older files next to it.
 
-    Records of logging come as to any handler, warnings and worse written at once; :meth:`line` and :meth:`text`
-    take a text alone, on the loop.
+    As a logging handler it writes warnings and errors immediately. :meth:`line` and :meth:`text` take a text alone, on
+    the loop.
     """
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
@@ -50,17 +50,17 @@ class LogFile(LogFileHandler):
         self._second = (0, "")
 
     def line(self, text: str) -> None:
-        """A line of level INFO (on the loop)."""
+        """Add a line of level INFO (on the loop)."""
         self.text(f"{self._line_head}{self._stamp(time.time())}: {escaped(text)}")
 
     def text(self, text: str) -> None:
-        """A line that has its time and level already (on the loop)."""
+        """Add a line that has its time and level already (on the loop)."""
         self._add(text + "\n")
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """As logging wants it; from any thread."""
+        """Add a record; from any thread."""
         try:
             self._add(self.format(record) + "\n")
         except Exception:  # noqa: BLE001 - as every handler of logging
@@ -69,11 +69,11 @@ class LogFile(LogFileHandler):
             self._write_out()
 
     def flush(self) -> None:
-        """Write what waits."""
+        """Write the lines that are pending."""
         self._write_out()
 
     def close(self) -> None:
-        """Write what waits, and close. Idempotent."""
+        """Write the lines that are pending, and close. Idempotent."""
         self._write_out()
         if self._timer:
             self._timer.cancel()
@@ -99,6 +99,7 @@ class LogFile(LogFileHandler):
             lines, self._lines = self._lines, []
             if not lines:
                 return
+
             try:
                 if self.stream is None:
                     self.stream = self._open()
@@ -107,7 +108,7 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. What the stream could not write would fail again at its end.
+                # A full disk must not stop the master. What the stream could not write would fail again when it is closed.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()
@@ -115,7 +116,7 @@ class LogFile(LogFileHandler):
 
 
 class _Formatter(logging.Formatter):
-    """As the lines are written; the time of a second is looked up once."""
+    """Formats records like the lines; the text of a second is made once."""
 
     def __init__(self, stamp: Callable[[float], str]) -> None:
         super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")
@@ -125,6 +126,6 @@ class _Formatter(logging.Formatter):
         return self._stamp(record.created)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
-        # Names and URIs in it are a peer's choice: none may begin another line.
+        # Names and URIs in it are a peer's choice: none may start another line.
         record.message = escaped(record.message)
         return super().formatMessage(record)

@@ -26,7 +26,7 @@ BIN = Path(sys.executable).parent
 
 @contextlib.contextmanager
 def started(*command: str, until: str, **environ: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """A command that runs, and what it printed until a line contained ``until``."""
+    """Start a command; yield it, and what it printed up to a line that contains ``until``."""
     process = subprocess.Popen(
         [str(BIN / command[0]), *command[1:]],
         stdout=subprocess.PIPE,
@@ -59,7 +59,7 @@ def run(*command: str, **environ: str) -> subprocess.CompletedProcess[str]:
 
 
 def listening(process: psutil.Process) -> set[str]:
-    """The addresses that a process and its children listen on."""
+    """Return the addresses that a process and its children listen on."""
     found: set[str] = set()
     for each in (process, *process.children(recursive=True)):
         # psutil 6 renamed it.
@@ -70,7 +70,7 @@ def listening(process: psutil.Process) -> set[str]:
 
 @pytest.fixture
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
-    """What ~/.bashrc says after a day in the laboratory."""
+    """The variables that a day in the laboratory leaves in ~/.bashrc."""
     monkeypatch.delenv("ROS_HOSTNAME")
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     monkeypatch.setenv("ROS_IP", "192.0.2.7")

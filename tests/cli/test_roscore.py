@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class Core:
-    """A roscore that has said that it is ready."""
+    """A roscore that has reported that it is ready."""
 
     def __init__(self, *options: str) -> None:
         self.process = subprocess.Popen(
@@ -71,7 +71,7 @@ def proxy() -> MasterProxy:
     return MasterProxy(os.environ["ROS_MASTER_URI"], "/test")
 
 
-def test_a_killed_session_goes_on(start: Start) -> None:
+def test_killed_session_is_continued(start: Start) -> None:
     first = start()
     master = proxy()
     run_id = master.get_param("/run_id")
@@ -93,7 +93,7 @@ def test_a_killed_session_goes_on(start: Start) -> None:
 
 
 @pytest.mark.parametrize("options", [["--fresh"], ["--no-journal"]])
-def test_a_killed_session_that_is_not_wanted(start: Start, options: list[str]) -> None:
+def test_killed_session_is_ignored_with_fresh_or_no_journal(start: Start, options: list[str]) -> None:
     start(*options).end(signal.SIGKILL)
     core = start(*options)
     assert "recovered" not in core.said
@@ -103,14 +103,14 @@ def test_a_killed_session_that_is_not_wanted(start: Start, options: list[str]) -
     master.close()
 
 
-def test_the_end_of_the_terminal_is_a_clean_end(start: Start) -> None:
+def test_closed_terminal_is_a_clean_shutdown(start: Start) -> None:
     core = start()
     assert list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
     assert core.end(signal.SIGHUP) == "master stopped\n"
     assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
 
 
-def test_scripts_find_whom_to_end(start: Start) -> None:
+def test_pid_file_exists_while_the_master_runs(start: Start) -> None:
     core = start()
     port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
     pid_file = Path(os.environ["ROS_HOME"], f"roscore-{port}.pid")
@@ -120,7 +120,7 @@ def test_scripts_find_whom_to_end(start: Start) -> None:
     assert not pid_file.exists()
 
 
-def test_a_shutdown_call_is_one_too(start: Start) -> None:
+def test_shutdown_call_is_a_clean_shutdown(start: Start) -> None:
     core = start()
     master = proxy()
     master.call("shutdown", "enough")
@@ -129,7 +129,9 @@ def test_a_shutdown_call_is_one_too(start: Start) -> None:
     assert not list(Path(os.environ["ROS_HOME"], "master").glob("journal-*[0-9]"))
 
 
-def test_folders_that_cannot_be_made(start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_that_cannot_be_created_are_reported(
+    start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It runs without them, and says so: a line for the logs, a line for the journal."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
@@ -146,25 +148,23 @@ def test_folders_that_cannot_be_made(start: Start, tmp_path: Path, monkeypatch: 
     assert " cannot be written: Not a directory; set ROS_HOME (it is tried again every 30 s)\n" in core.said
     assert "Errno" not in core.said
     assert f"setting /run_id to {run_id}\n" in core.said
-    # The /rosout node hears what is logged, and does not stumble over its file.
+    # The /rosout node receives what is logged, and runs without its file.
     monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
     assert core.end() == "master stopped\n"
 
 
-def test_the_address_of_another_network(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_address_of_another_network_is_reported(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_HOSTNAME")
     for address, is_ours in (("203.0.113.9", False), ("127.0.0.1", True)):
         monkeypatch.setenv("ROS_IP", address)
         core = start()
-        warning = f"WARNING: ROS_IP={address} is no address of this machine: right only behind NAT or in a container"
+        warning = f"WARNING: ROS_IP={address} is not an address of this machine: correct only behind NAT or in a container"
         assert (warning in core.said) != is_ours
         core.end()
     monkeypatch.setenv("ROS_IP", "::1")
-    assert (
-        "WARNING: ROS_IP=::1 is an address of IPv6, where nobody listens without ROS_IPV6=on" in start().said
-    )
+    assert "WARNING: ROS_IP=::1 is an IPv6 address, where no node listens without ROS_IPV6=on" in start().said
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_the_address_of_another_network(start: Start, monkeypatch: pytest.Monkey
         ("http://203.0.113.9:{}", "[http://203.0.113.9:{}] host is not set to this machine"),
     ],
 )
-def test_nodes_would_look_for_another_master(
+def test_uri_of_another_master_is_reported(
     start: Start, monkeypatch: pytest.MonkeyPatch, uri: str, what: str
 ) -> None:
     port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
@@ -185,7 +185,7 @@ def test_nodes_would_look_for_another_master(
     assert f"WARNING: ROS_MASTER_URI {what.format(port)}: nodes find it with ROS_MASTER_URI=http://" in said
 
 
-def test_the_log_folder(start: Start) -> None:
+def test_log_folder(start: Start) -> None:
     core = start()
     master = proxy()
     folder = Path(os.environ["ROS_LOG_DIR"]) / master.get_param("/run_id")
@@ -228,7 +228,7 @@ for omit, message.level, message.msg in (
 """
 
 
-def test_what_nodes_log(start: Start) -> None:
+def test_rosout_log_contains_what_nodes_log(start: Start) -> None:
     """The lines are those of real rosout."""
     core = start()
     subprocess.run([sys.executable, "-c", LOGS], check=True, timeout=60)
@@ -242,7 +242,7 @@ def test_what_nodes_log(start: Start) -> None:
     )
 
 
-def test_a_rosout_log_that_cannot_be_written(start: Start) -> None:
+def test_rosout_log_that_cannot_be_written_is_reported(start: Start) -> None:
     start().end(signal.SIGKILL)
     (file,) = Path(os.environ["ROS_LOG_DIR"]).glob("*-*/rosout.log")
     file.unlink()
@@ -270,7 +270,7 @@ def test_without_rosout(start: Start) -> None:
     master.close()
 
 
-def test_who_may_connect(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_allow_names_the_networks(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     core = start("--allow", "192.168.65.0/24", "--allow", "10.0.0.1")
     assert "open to 192.168.65.0/24, 10.0.0.1/32\n" in core.said
     master = proxy()
@@ -281,7 +281,7 @@ def test_who_may_connect(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "open to 10.1.0.0/16\n" in start().said
 
 
-def test_the_health_line(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+def test_status_line(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
     core = start()
     assert main(["--status"]) == 0
     line = capsys.readouterr().out
@@ -306,14 +306,14 @@ def test_the_health_line(start: Start, capsys: pytest.CaptureFixture[str]) -> No
         (["--master-logger-level", "loud"], "invalid choice: 'loud'"),
     ],
 )
-def test_typed_wrong(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_usage_errors(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert roscore(words) == 2
     error: Any = capsys.readouterr().err
     assert says in error
     assert len(own_lines(error)) == 1
 
 
-def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(
+def test_rosout_node_lists_and_sets_the_loggers_of_the_master(
     start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As /rosout of real ROS, a node of roscpp: its root logger is `ros`."""
@@ -332,7 +332,7 @@ def test_the_rosout_node_lists_and_sets_the_loggers_of_the_master(
     assert "[loud] is none of the levels debug, info, warn, error, fatal" in capsys.readouterr().err
 
 
-def test_a_reader_that_has_gone_does_not_hurt_the_master(start: Start) -> None:
+def test_closed_standard_output_does_not_stop_the_master(start: Start) -> None:
     """`roscore -v | head -3`: what comes later is not printed, and all is registered."""
     core = start("-v", "--no-journal")
     assert core.process.stdout
@@ -347,7 +347,7 @@ def test_a_reader_that_has_gone_does_not_hurt_the_master(start: Start) -> None:
     core.process.stdout = None
 
 
-def test_a_reader_that_was_never_there_does_not_either(start: Start) -> None:
+def test_missing_standard_output_does_not_stop_the_master(start: Start) -> None:
     read, write = os.pipe()
     os.close(read)
     core = subprocess.Popen([str(BIN / "roscore"), "--no-journal"], stdout=write, stderr=subprocess.DEVNULL)

@@ -105,7 +105,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
 
 
 def records(path: Path) -> list[list[Any]]:
-    """What is in the file, values in parts as one record."""
+    """Return the records of the file, a value in parts as one record."""
     recovered = parse_journal(path.read_bytes())
     assert not recovered.damage
     found: list[list[Any]] = []
@@ -198,7 +198,7 @@ def test_rewrite_writes_all_where_the_system_takes_it_in_parts(
 
 
 def sizes(journal: Journal, record: Callable[[int], tuple[Any, ...]], count: int) -> list[int]:
-    """The size after each of ``count`` records."""
+    """Return the size after each of ``count`` records."""
     found = []
     for number in range(count):
         journal.append(*record(number))
@@ -250,7 +250,7 @@ def test_large_journal_is_rewritten_at_four_times_what_it_holds(
 
 @pytest.fixture
 def steps() -> list[Steps[None]]:
-    """What a journal wants to be done in steps."""
+    """The work that a journal hands over to be done in steps."""
     return []
 
 
@@ -317,7 +317,7 @@ def test_rewrite_in_steps_that_fails_goes_on_with_the_old_file(
         finish(steps[0])
     assert path.read_bytes() == before
     assert not path.with_name("journal-1.new").exists()
-    assert "could not be rewritten, it goes on growing" in caplog.text
+    assert "could not be rewritten, it keeps growing" in caplog.text
     assert not stepping.trouble
     # Tried again only when it has doubled.
     stepping.append("set", "/p", "x" * (MIB // 2))

@@ -1,4 +1,4 @@
-"""runtime/log_file: many lines are written together, and a warning at once."""
+"""runtime/log_file: lines are written in batches, and a warning immediately."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from minirospy.runtime import log_file
 from minirospy.runtime.log_file import LogFile
 
 
-def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log_file, "_SECONDS", 0.05)
     written: list[int] = []
     again = asyncio.Event()
@@ -50,7 +48,7 @@ def test_a_flood_of_warnings_does_not_have_the_lines_written_one_by_one(
     asyncio.run(scene())
 
 
-def test_no_line_is_lost_where_several_threads_log(tmp_path: Path) -> None:
+def test_no_line_is_lost_if_several_threads_log(tmp_path: Path) -> None:
     file = LogFile(tmp_path / "master.log", 10_000_000, "master")
     stop = threading.Event()
 
@@ -73,7 +71,7 @@ def test_no_line_is_lost_where_several_threads_log(tmp_path: Path) -> None:
     assert (tmp_path / "master.log").read_text().count("\n") == 3000
 
 
-def test_a_disk_that_is_full_for_a_while_hurts_nobody(tmp_path: Path) -> None:
+def test_disk_that_was_full_is_written_again(tmp_path: Path) -> None:
     class Full(io.StringIO):
         def flush(self) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")

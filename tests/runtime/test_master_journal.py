@@ -1,4 +1,4 @@
-"""What a killed master leaves, and what its successor makes of it."""
+"""The journal of a killed master, and what its successor recovers."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ BIN = Path(sys.executable).parent
 
 
 class Fakes:
-    """Nodes that answer each call with success; each at a port of its own. On the loop of the test."""
+    """Nodes that answer each call with success, each on its own port. On the loop of the test."""
 
     def __init__(self) -> None:
         self.called: list[tuple[int, str, list[Any]]] = []
         self._servers: dict[str, RpcServer] = {}
 
     async def open(self, name: str = "") -> str:
-        """Another node, which calls itself ``name`` if asked; its URI."""
+        """Start a node that returns ``name`` for getName; return its URI."""
 
         def answer(method: str, args: Sequence[Any]) -> list[Any]:
             self.called.append((server.port, method, list(args)))
@@ -71,12 +71,12 @@ async def until(condition: Callable[[], object]) -> None:
 
 
 def state(master: Master) -> Any:
-    """All that a master can be asked."""
-    ask = master.dispatch
-    found = [ask(what, ["/x"])[2] for what in ("getSystemState", "getTopicTypes", "getParamNames")]
+    """Return everything that a master can be queried for."""
+    query = master.dispatch
+    found = [query(what, ["/x"])[2] for what in ("getSystemState", "getTopicTypes", "getParamNames")]
     nodes = sorted(master.registry.nodes().items())
-    services = {name: ask("lookupService", ["/x", name])[2] for name, _ in found[0][2]}
-    return [found, ask("getParam", ["/x", "/"]), nodes, services, sorted(master.parameters.subscriptions())]
+    services = {name: query("lookupService", ["/x", name])[2] for name, _ in found[0][2]}
+    return [found, query("getParam", ["/x", "/"]), nodes, services, sorted(master.parameters.subscriptions())]
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def call(master: Master, method: str, *args: Any) -> Any:
     return answer[2]
 
 
-def test_all_is_back(path: Path) -> None:
+def test_killed_master_is_recovered_whole(path: Path) -> None:
     async def test() -> None:
         nodes = Fakes()
         uri, other = await nodes.open(), await nodes.open()
@@ -118,7 +118,7 @@ def test_all_is_back(path: Path) -> None:
         second = await start(path)
         assert state(second) == before
         assert "recovered 2 nodes and 1 parameter of" in second.news[0]
-        # The nodes may have missed a call while the master was gone: they are told where things stand.
+        # The nodes may have missed a call while no master was running: they are notified of the present state.
         await until(
             lambda: {method for _, method, _ in nodes.called} == {"getName", "publisherUpdate", "paramUpdate"}
         )
@@ -130,7 +130,7 @@ def test_all_is_back(path: Path) -> None:
     run(test())
 
 
-def test_a_clean_end_leaves_nothing(path: Path) -> None:
+def test_clean_shutdown_leaves_nothing(path: Path) -> None:
     async def test() -> None:
         first = await start(path)
         call(first, "setParam", "/a", "/p", 1)
@@ -145,7 +145,7 @@ def test_a_clean_end_leaves_nothing(path: Path) -> None:
     run(test())
 
 
-def test_a_fresh_start(path: Path) -> None:
+def test_fresh_start_recovers_nothing(path: Path) -> None:
     async def test() -> None:
         first = await start(path)
         call(first, "setParam", "/a", "/p", 1)
@@ -157,7 +157,7 @@ def test_a_fresh_start(path: Path) -> None:
     run(test())
 
 
-def test_dead_nodes_are_pruned_and_their_subscribers_told(path: Path) -> None:
+def test_dead_nodes_are_forgotten_and_their_subscribers_notified(path: Path) -> None:
     async def test() -> None:
         nodes = Fakes()
         live, dead, stranger = (
@@ -191,7 +191,7 @@ def test_dead_nodes_are_pruned_and_their_subscribers_told(path: Path) -> None:
 
 @pytest.mark.parametrize("lives", [True, False])
 @pytest.mark.parametrize("reason", ["another boot", "long ago"])
-def test_yesterdays_session_is_taken_up_only_if_somebody_is_still_there(
+def test_old_session_is_recovered_only_if_a_node_answers(
     path: Path, lives: bool, reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test() -> None:
@@ -218,7 +218,7 @@ def test_yesterdays_session_is_taken_up_only_if_somebody_is_still_there(
 
 
 @pytest.mark.parametrize("damage", ["torn", "changed", "empty", "not a journal"])
-def test_a_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) -> None:
+def test_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) -> None:
     async def test() -> None:
         first = await start(path)
         for number in range(10):
@@ -260,7 +260,7 @@ def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.Monke
     run(test())
 
 
-def test_a_master_that_does_not_get_the_port_never_locks_the_journal(path: Path) -> None:
+def test_master_without_the_port_never_locks_the_journal(path: Path) -> None:
     """For a moment it would keep the lock from the one that got the port, which would then run without a journal."""
 
     async def test() -> None:
@@ -274,9 +274,7 @@ def test_a_master_that_does_not_get_the_port_never_locks_the_journal(path: Path)
     run(test())
 
 
-def test_a_master_waits_for_the_journal_of_one_that_is_ending(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_master_waits_for_the_lock_of_one_that_exits(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(master_module, "_LOCK_SECONDS", 20.0)
 
     async def test() -> None:
@@ -296,7 +294,7 @@ def test_a_master_waits_for_the_journal_of_one_that_is_ending(
     run(test())
 
 
-def test_a_port_that_is_taken_leaves_the_journal_alone(path: Path) -> None:
+def test_master_without_the_port_leaves_the_journal_unchanged(path: Path) -> None:
     async def test() -> None:
         first = await start(path)
         call(first, "setParam", "/a", "/q", 1)
@@ -313,7 +311,7 @@ def test_a_port_that_is_taken_leaves_the_journal_alone(path: Path) -> None:
     run(test())
 
 
-def test_a_full_disk_stops_no_master(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_does_not_stop_the_master(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def test() -> None:
         master = await start(path)
         call(master, "setParam", "/a", "/before", 1)
@@ -360,7 +358,7 @@ def full_disk(patch: pytest.MonkeyPatch, room: int = 0) -> None:
 
 @pytest.mark.parametrize("room", [0, 3, 40], ids=["no new file", "not even the pid", "half a rewrite"])
 @pytest.mark.parametrize("has_lock", [True, False], ids=["lock file", "no lock file"])
-def test_a_start_on_a_full_disk_recovers_and_writes_again_later(
+def test_start_on_a_full_disk_recovers_and_retries_the_journal(
     path: Path, room: int, has_lock: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test() -> None:
@@ -383,7 +381,7 @@ def test_a_start_on_a_full_disk_recovers_and_writes_again_later(
             assert "recovered 2 nodes and 1 parameter" in second.news[0]
             assert "No space left on device; set ROS_HOME (it is tried again every 30 s)" in second.news[1]
             assert call(second, "minirospy.status", "/x")["journal"] == "failing: No space left on device"
-            # The nodes that are gone are forgotten all the same.
+            # Nodes that do not answer are forgotten nevertheless.
             await until(lambda: set(second.registry.nodes()) == {"/live"})
             assert path.read_bytes() == before
             assert not path.with_name("journal-1.new").exists()
@@ -403,7 +401,7 @@ def test_a_start_on_a_full_disk_recovers_and_writes_again_later(
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
-def test_a_journal_in_a_folder_that_cannot_be_written_is_recovered(path: Path) -> None:
+def test_journal_in_a_read_only_folder_is_recovered(path: Path) -> None:
     async def test() -> None:
         first = await start(path)
         call(first, "setParam", "/a", "/p", 1)
@@ -421,7 +419,7 @@ def test_a_journal_in_a_folder_that_cannot_be_written_is_recovered(path: Path) -
     run(test())
 
 
-def test_a_journal_that_failed_is_retried_without_a_call(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_journal_is_retried_without_a_call(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async def test() -> None:
         with monkeypatch.context() as patch:
             full_disk(patch)
@@ -437,7 +435,7 @@ def test_a_journal_that_failed_is_retried_without_a_call(path: Path, monkeypatch
     run(test())
 
 
-def test_a_fresh_start_on_a_full_disk_leaves_nothing_to_recover(
+def test_fresh_start_on_a_full_disk_leaves_nothing_to_recover(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test() -> None:
@@ -455,7 +453,7 @@ def test_a_fresh_start_on_a_full_disk_leaves_nothing_to_recover(
     run(test())
 
 
-def test_a_journal_that_cannot_be_read_is_set_aside(path: Path) -> None:
+def test_unreadable_journal_is_set_aside(path: Path) -> None:
     async def test() -> None:
         path.mkdir(parents=True)
         master = await start(path)
@@ -470,7 +468,7 @@ def test_a_journal_that_cannot_be_read_is_set_aside(path: Path) -> None:
     run(test())
 
 
-def test_a_journal_where_none_can_be(tmp_path: Path) -> None:
+def test_journal_in_a_folder_that_cannot_exist_is_reported(tmp_path: Path) -> None:
     async def test() -> None:
         (tmp_path / "file").write_text("")
         master = await start(tmp_path / "file" / "journal")
@@ -505,7 +503,7 @@ def random_call(rng: random.Random) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("compact", [300, 10**6], ids=["rewritten often", "appended"])
-def test_after_any_calls_the_journal_tells_the_same(
+def test_journal_replays_to_the_same_state_after_any_calls(
     path: Path, seed: int, compact: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(journal_module, "_COMPACT_BYTES", compact)
@@ -531,9 +529,7 @@ def test_after_any_calls_the_journal_tells_the_same(
     run(test())
 
 
-def test_a_rewrite_that_is_interrupted_leaves_the_old_file(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupted_rewrite_leaves_the_old_file(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     journal = Journal(path, lambda: [["set", "/", {"a": 1}]])
     journal.start()
     assert not journal.trouble
@@ -556,7 +552,7 @@ class Killed:
         self.port = port
         self.uri = f"http://127.0.0.1:{port}/"
         self.first = self.start()
-        """The seconds until it answered when it knew nothing."""
+        """The seconds until an empty master answered."""
 
     def start(self) -> float:
         """Start; the seconds until it answers with all that it knew."""
@@ -593,7 +589,7 @@ class Killed:
 
 
 class Registering:
-    """A client that registers nodes and sets parameters, and remembers what was answered."""
+    """A client that registers nodes and sets parameters, and records the acknowledged calls."""
 
     def __init__(self, master: str, uris: list[str]) -> None:
         self.answered: set[tuple[str, str, str]] = set()
@@ -608,7 +604,7 @@ class Registering:
         self._thread.join()
 
     def lasts(self, seconds: float, answers: int) -> bool:
-        """Whether it goes on until so many more answers have come, and for so long after that."""
+        """Wait for this many more answers, and this long after them; return whether the client still runs."""
         wanted = len(self.answered) + answers
         while len(self.answered) < wanted:
             if not self._thread.is_alive() or self._over.wait(0.01):
@@ -696,7 +692,7 @@ class Oracle:
         self._thread.join()
 
     def lasts(self, calls: int) -> bool:
-        """Whether so many more calls are acknowledged."""
+        """Wait until this many more calls are acknowledged; return whether they were."""
         wanted = self.acknowledged + calls
         while self.acknowledged < wanted:
             if not self._thread.is_alive() or self._over.wait(0.01):
@@ -724,7 +720,7 @@ class Oracle:
                 while not self._over.is_set():
                     with self.lock:
                         self._call(proxy, rng)
-                    # Whoever waits for the lock gets it.
+                    # Let a thread that waits for the lock have it.
                     time.sleep(0.0005)
 
     def _call(self, proxy: ServerProxy, rng: random.Random) -> None:
@@ -755,7 +751,7 @@ class Oracle:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
 @pytest.mark.timeout(1200)
-def test_of_two_masters_started_together_one_has_the_graph_and_the_journal() -> None:
+def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
     """CRASHES=50 in the environment makes it the long one."""
     crashes = int(os.environ.get("CRASHES", "2"))
     loop, fakes = LoopThread("fakes"), Fakes()
@@ -766,7 +762,7 @@ def test_of_two_masters_started_together_one_has_the_graph_and_the_journal() -> 
     port = free_port()
     master = Killed(port)
     with ServerProxy(master.uri) as proxy:
-        # 20 MB: to read them takes so long that both starts are under way at the same time.
+        # 20 MB, which take long enough to read that both starts overlap.
         for number in range(10):
             proxy.setParam("/test", f"/large/{number}", [f"{number} " + 1000 * "x"] * 2000)
     oracle = Oracle(master.uri, loop.run(open_all(), 20.0))
@@ -801,7 +797,7 @@ def test_of_two_masters_started_together_one_has_the_graph_and_the_journal() -> 
 
 
 def first_to_end(processes: list[subprocess.Popen[bytes]]) -> list[subprocess.Popen[bytes]]:
-    """The processes, the one first that has ended."""
+    """Return the processes, the one first that has exited."""
     begin = time.monotonic()
     while all(each.poll() is None for each in processes):
         assert time.monotonic() - begin < 60

@@ -1,4 +1,4 @@
-"""`roscore` and `minirospy master`: the master in the foreground, with the /rosout node beside it.
+"""`roscore` and `minirospy master`: the master in the foreground, with the /rosout node.
 
 Source: http://wiki.ros.org/roscore.
 """
@@ -51,7 +51,7 @@ _LEVELS = {
 
 
 class _Options(NamedTuple):
-    """What the command line asks of a master that is started."""
+    """The options of a master that is started."""
 
     verbose: bool
     quiet: bool
@@ -158,7 +158,7 @@ def _add_own_options(parser: Parser) -> None:
         action="store_true",
         help="keep no file of the graph: a master that is killed forgets it",
     )
-    add("--fresh", action="store_true", help="start empty, whatever a master that was killed has left")
+    add("--fresh", action="store_true", help="start empty: ignore the journal of a master that was killed")
     add("--no-rosout", action="store_true", help="without the /rosout node, as rosmaster")
     parser.accept("--core", group=parser.own_options())
 
@@ -188,7 +188,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # A variable that is not set, perhaps: surely not what lets everybody in.
+        # Perhaps a variable that is not set: it must not open the master to everybody.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -213,7 +213,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """Name, in one line, what asks for other machines and has no effect in a local master."""
+    """Name, in one line, the options and variables for other machines, which have no effect in a local master."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -246,6 +246,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await master.start()
     except OSError as error:
         raise _port_error(name, environment.host, port, error) from error
+
     keep = True
     pid_file = environment.home / f"roscore-{master.port}.pid"
     try:
@@ -256,40 +257,50 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         )
         for key, value in (("/run_id", run_id), ("/rosdistro", DISTRO), ("/rosversion", ROS_VERSION)):
             master.set_param("/roslaunch", key, value)
+
         where = listening_lines(environment.bind_host, master.port, access, local=environment.local)
-        if not options.quiet:
-            logs = f"log file {log_file}" if log_file else "no log file"
-            _show(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")
-            _show("\n".join([where[0], *master.news]))
-            _show(f"ROS_MASTER_URI={master.uri}")
-        if where[1:]:
-            print("\n".join(where[1:]), file=sys.stderr, flush=True)
+        _announce(master, where, log_file, quiet=options.quiet)
         _warn_of_host(environment)
         if not options.quiet and name != "rosmaster":
-            # In a thread: a name server that is out of reach keeps nobody else waiting.
+            # In a thread: a name server that is out of reach must not delay the start.
             threading.Thread(target=_warn_of_uri, args=(environment, master), daemon=True).start()
-        for line in (*where, *master.news):
-            logging.getLogger("minirospy.master").warning(line)
-        rosout_file = log_file.with_name("rosout.log") if log_file else None
+
         rosout = None
         if not options.no_rosout:
+            rosout_file = log_file.with_name("rosout.log") if log_file else None
             rosout = RosoutNode(
                 environment._replace(master_uri=master.uri), rosout_file, lambda: master.omits_topics
             )
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # While it has the port: the file may be the next one's right after.
+        # While this master has the port: right after, the file may be that of the next one.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
+
     if not options.quiet:
         _show("master stopped")
     return 0
 
 
+def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, quiet: bool) -> None:
+    """Print and log where the master listens, what it recovered, and where its log is."""
+    listening, *warnings = where
+    if not quiet:
+        logs = f"log file {log_file}" if log_file else "no log file"
+        _show(f"minirospy {minirospy.__version__} master: pid {os.getpid()}, {logs}")
+        _show("\n".join([listening, *master.news]))
+        _show(f"ROS_MASTER_URI={master.uri}")
+    if warnings:
+        print("\n".join(warnings), file=sys.stderr, flush=True)
+
+    for line in (*where, *master.news):
+        logging.getLogger("minirospy.master").warning(line)
+
+
 def _write_pid(path: Path) -> None:
-    """Write the pid where scripts, as in ROS, look for it."""
+    """Write the pid to the file where scripts look for it, as in ROS."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:
@@ -299,7 +310,7 @@ def _write_pid(path: Path) -> None:
 async def _run(
     master: Master, stop: asyncio.Event, rosout: RosoutNode | None, run_id: str, *, quiet: bool
 ) -> None:
-    """Until somebody ends it."""
+    """Serve until the master is stopped."""
     try:
         if rosout:
             await rosout.start()
@@ -315,7 +326,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """One line about the master that runs; of real rosmaster what its API tells."""
+    """Print one line about the master that is running; for rosmaster, what its API returns."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -333,6 +344,7 @@ def _status(environment: Environment, port: int) -> int:
         return 0
     finally:
         master.close()
+
     print(
         f"{uri}: pid {found['pid']}, up {_span(found['uptime'])}, {found['nodes']} nodes, {found['topics']} topics, "
         f"{found['services']} services, {found['parameters']} parameters, {found['clients']} clients, "
@@ -348,23 +360,23 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Say so where nobody reaches ROS_IP: most often it is that of yesterday's network.
+    """Warn if no node can reach ROS_IP: most often it is an address of another network.
 
-    Names are left alone: a name server that is out of reach would keep the master waiting.
+    Names are not checked: a name server that is out of reach would delay the master.
     """
     host = environment.host
     variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
     if host.replace(".", "").isdigit() and not is_own_host(host):
         warn(
-            f"{variable}={host} is no address of this machine: right only behind NAT or in a container "
-            "(`minirospy doctor` tells more)"
+            f"{variable}={host} is not an address of this machine: correct only behind NAT or in a container "
+            "(`minirospy doctor` shows more)"
         )
     elif ":" in host and not environment.ipv6:
-        warn(f"{variable}={host} is an address of IPv6, where nobody listens without ROS_IPV6=on")
+        warn(f"{variable}={host} is an IPv6 address, where no node listens without ROS_IPV6=on")
 
 
 def _warn_of_uri(environment: Environment, master: Master) -> None:
-    """Say so where ROS_MASTER_URI, which nodes that are started next to this master go by, leads to another one."""
+    """Warn if ROS_MASTER_URI, by which nodes started from this terminal find the master, names another one."""
     host, port = environment.master_address
     if port != master.port:
         what = f"port [{port}] does not match this roscore [{master.port}]"
@@ -376,7 +388,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """How many clients may be connected: as many files as the system lets this process open, with some left."""
+    """Return how many clients may be connected: the limit of open files, less some for other use."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -391,7 +403,7 @@ def _most_clients() -> int:
 
 
 def _stop_event() -> asyncio.Event:
-    """Set by SIGINT, SIGTERM, or the end of the terminal (unless nohup said not to care)."""
+    """Return an event that SIGINT, SIGTERM or a closed terminal sets (SIGHUP not under nohup)."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     numbers = [signal.SIGINT, signal.SIGTERM]
@@ -401,7 +413,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # Windows: the handler runs in the main thread, the loop's own, once it wakes up.
+            # Windows: the handler runs in the main thread, which is the loop's, at its next wakeup.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -409,7 +421,7 @@ def _stop_event() -> asyncio.Event:
 
 
 def _keep_waking(loop: asyncio.AbstractEventLoop) -> None:
-    """On Windows a select does not end at Ctrl-C: look twice a second."""
+    """Wake the loop twice a second: on Windows Ctrl-C does not interrupt a select."""
     loop.call_later(0.5, _keep_waking, loop)
 
 
@@ -437,19 +449,19 @@ def _port_error(name: str, host: str, port: int, error: OSError) -> MinirospyErr
 
 
 def _quiet(line: str) -> None:
-    """Where nobody reads what is registered."""
+    """Discard a line about a registration."""
 
 
 class _Shown(logging.Handler):
-    """Prints what is logged."""
+    """Prints log records."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """One record."""
+        """Print a record."""
         _show(self.format(record))
 
 
 def _show(line: str) -> None:
-    """Print; a reader that has gone (`roscore -v | head`) is no reason for the master to fail."""
+    """Print a line; a reader that disconnected (`roscore -v | head`) must not stop the master."""
     with contextlib.suppress(OSError):
         print(line, flush=True)
 
@@ -457,9 +469,9 @@ def _show(line: str) -> None:
 def _log_to_file(
     folder: Path, *, verbose: bool, level: str | None
 ) -> tuple[Path | None, Callable[[str], object]]:
-    """Log to ``folder``/master.log; ``latest`` beside the folder points to it where links are allowed.
+    """Log to ``folder``/master.log; ``latest`` next to the folder links to it where links are supported.
 
-    The file, and what takes a line about a registration. Where none can be written the master goes on without.
+    Return the file, and the function for lines about registrations. If no file can be written, the master runs without.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")
@@ -471,22 +483,24 @@ def _log_to_file(
     except OSError as error:
         warn(f"cannot write logs to {folder}: {error.strerror or error}; set ROS_LOG_DIR")
     logger.addHandler(file or logging.NullHandler())
-    say: Callable[[str], object] = file.line if file and logger.isEnabledFor(logging.INFO) else _quiet
+
+    record: Callable[[str], object] = file.line if file and logger.isEnabledFor(logging.INFO) else _quiet
     if verbose:
         logger.addHandler(_Shown())
 
-        def say_twice(line: str, note: Callable[[str], object] = say) -> None:
-            note(line)
+        def record_and_show(line: str, record: Callable[[str], object] = record) -> None:
+            record(line)
             _show(line)
 
-        say = say_twice
+        record = record_and_show
     if not file:
-        return None, say
+        return None, record
+
     latest = folder.parent / "latest"
     with contextlib.suppress(OSError):
         latest.unlink(missing_ok=True)
         latest.symlink_to(folder.name)
-    return path, say
+    return path, record
 
 
 def _rosmaster(**options: Any) -> int:
