@@ -29,7 +29,7 @@ class ActionClient:
     """The client of the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
 
     The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set the lengths
-    of its queues. Raises ActionException on a class that is no action.
+    of its queues. Raises ActionException on a class that is not an action.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
@@ -143,14 +143,14 @@ class ActionClient:
 class _Listener(rospy.SubscribeListener):
     """Notifies of new subscribers."""
 
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell = tell
+    def __init__(self, notify: Callable[[], None]) -> None:
+        self._notify = notify
 
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
         """Notify of a new subscriber."""
-        self._tell()
+        self._notify()
 
 
 def _peer(link: InLink | OutLink) -> str | None:

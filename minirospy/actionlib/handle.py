@@ -68,10 +68,10 @@ class StatusTracker:
         """Return the status as it travels. Once the goal has ended, it changes no more."""
         if self._bytes is not None:
             return self._bytes
-        told = status_bytes(self.status)
+        encoded = status_bytes(self.status)
         if self.ended_at:
-            self._bytes = told
-        return told
+            self._bytes = encoded
+        return encoded
 
 
 class HandleTrackerDeleter:

@@ -1,4 +1,4 @@
-"""What a client knows of its goals: one CommStateMachine a goal, found by the GoalManager, asked by a ClientGoalHandle.
+"""What a client knows of its goals: one CommStateMachine a goal, found by the GoalManager, read through a ClientGoalHandle.
 
 The machine's rules are tables (`minirospy.graph.goals`). Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -65,12 +65,12 @@ class ClientGoalHandle:
         return machine.state if machine else CommState.LOST
 
     def get_goal_status(self) -> int:
-        """Return what the server told last of the goal: one of GoalStatus."""
+        """Return the last status of the goal: one of GoalStatus."""
         machine = self._machine("get_goal_status")
         return machine.latest_goal_status.status if machine else GoalStatus.PENDING
 
     def get_goal_status_text(self) -> str:
-        """Return the text that the server told with it."""
+        """Return the text that the server sent with it."""
         machine = self._machine("get_goal_status_text")
         if machine is None:
             return "ERROR: Trying to get_goal_status_text on an inactive ClientGoalHandle."
@@ -97,14 +97,14 @@ class ClientGoalHandle:
             rospy.logerr("Asking for a terminal state, but the goal status is %d", status)
             return TerminalState.LOST
 
-    def _machine(self, asked: str) -> CommStateMachine | None:
+    def _machine(self, call: str) -> CommStateMachine | None:
         if self.comm_state_machine is None:
-            rospy.logerr("Trying to %s on an inactive ClientGoalHandle.", asked)
+            rospy.logerr("Trying to %s on an inactive ClientGoalHandle.", call)
         return self.comm_state_machine
 
 
 class CommStateMachine:
-    """A goal as its client sees it: takes what the server tells, calls back on each change.
+    """A goal as its client sees it: takes what the server publishes, calls back on each change.
 
     ``mutex`` is held during callbacks: those of a goal come one after the other.
     """
@@ -180,7 +180,7 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The list of statuses may come later, or not at all: pass through what it would have told.
+                # The list of statuses may come later, or not at all: pass through what it would have reported.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
@@ -218,9 +218,9 @@ class CommStateMachine:
 
 
 class GoalManager:
-    """The goals of one action client: makes them, and hands each what the server tells.
+    """The goals of one action client: makes them, and hands each what the server publishes.
 
-    It holds no goal alive: one whose handles are gone is told no more.
+    It holds no goal alive: one without handles is not notified any more.
     """
 
     _numbers = itertools.count(1)

@@ -1,4 +1,4 @@
-"""ActionServer: takes goals and cancels, keeps a status of each goal, tells of statuses, feedback and results.
+"""ActionServer: takes goals and cancels, keeps a status of each goal, publishes statuses, feedback and results.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -44,10 +44,10 @@ _TOO_LATE = (
     "the last cancel request"
 )
 _FEW_STATUSES = 50
-"""So many statuses are told at once at each change."""
+"""So many statuses are published at each change, without a pause."""
 
 _SECONDS_A_STATUS = 1e-4
-"""Of more, each adds this to the pause between two lists: else a busy server would do nothing but tell them."""
+"""Of more, each adds this to the pause between two lists: else a busy server would do nothing but publish them."""
 
 
 def nop_cb(goal_handle: ServerGoalHandle) -> None:
@@ -62,7 +62,7 @@ class ActionServer:
 
     ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each that a client wants
     canceled, one after the other, in threads of the library. Parameters: ``actionlib_status_frequency`` in Hz,
-    ``<ns>/status_list_timeout`` in seconds (how long goals are told of after their end),
+    ``<ns>/status_list_timeout`` in seconds (how long the status of a goal is published after its end),
     ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raises ActionException.
     """
 
@@ -106,7 +106,7 @@ class ActionServer:
 
     @property
     def status_list(self) -> list[StatusTracker]:
-        """Every goal that is told of."""
+        """Every goal whose status is published."""
         return list(self._trackers.values())
 
     @staticmethod
@@ -197,7 +197,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Tell the statuses of all goals, at once where they are few, else soon."""
+        """Publish the statuses of all goals: now where they are few, else soon."""
         with self.lock:
             pause = len(self._trackers) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -207,7 +207,7 @@ class ActionServer:
                 self._teller.hurry(self._told_at + pause - now)
 
     def publish_status_now(self) -> None:
-        """Tell the statuses of all goals; those that ended long ago are told of no more."""
+        """Publish the statuses of all goals but those that ended long ago."""
         with self.lock:
             now = rospy.get_rostime()
             self._forget_old(now)
@@ -296,10 +296,10 @@ class ActionServer:
 
 
 class _Teller:
-    """A thread that calls ``tell`` every ``period`` seconds, and sooner where that is asked for."""
+    """A thread that calls ``publish`` every ``period`` seconds, and sooner on request."""
 
-    def __init__(self, tell: Callable[[], None], period: float) -> None:
-        self._tell = tell
+    def __init__(self, publish: Callable[[], None], period: float) -> None:
+        self._publish = publish
         self._period = period
         self._due = time.monotonic() + period
         self._stopped = False
@@ -326,11 +326,11 @@ class _Teller:
                     self._wake.clear()
                 else:
                     self._due = time.monotonic() + self._period
-                    self._tell()
+                    self._publish()
 
 
 def _status_frequency(name: str) -> float:
-    """Return how often a server tells all statuses, in Hz. Raise ActionException."""
+    """Return how often a server publishes all statuses, in Hz. Raise ActionException."""
     if rospy.has_param(name + "/status_frequency"):
         rospy.logwarn(
             "You're using the deprecated status_frequency parameter, please switch to "

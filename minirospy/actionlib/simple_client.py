@@ -55,7 +55,7 @@ class SimpleActionClient:
         active_cb: Callable[[], object] | None = None,
         feedback_cb: Callable[[Any], object] | None = None,
     ) -> None:
-        """Send a goal; the one before is no more tracked.
+        """Send a goal; the one before is not tracked any more.
 
         ``active_cb()`` is called when the server begins with it, ``feedback_cb(feedback)`` with feedback,
         ``done_cb(state, result)`` at its end; all in threads of the library.
@@ -121,7 +121,7 @@ class SimpleActionClient:
         return visible_state(gh.get_goal_status()) if gh else GoalStatus.LOST
 
     def get_goal_status_text(self) -> str:
-        """Return the text that the server told with the state."""
+        """Return the text that the server sent with the state."""
         if self.gh is None:
             rospy.logerr("Called get_goal_status_text when no goal is running")
             return "ERROR: Called get_goal_status_text when no goal is running"

@@ -1,4 +1,4 @@
-"""SimpleActionServer: one goal at a time; a new goal asks the one that runs to make way.
+"""SimpleActionServer: one goal at a time; a new goal requests that the current one is preempted.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription#Server-Side_Policies.
 """
@@ -33,9 +33,9 @@ class SimpleActionServer:
     """A server that works on one goal at a time.
 
     ``execute_cb(goal)`` is called with each goal in a thread of its own, and has to set a terminal state
-    (``set_succeeded``, ``set_aborted``, ``set_preempted``). Without it, ``register_goal_callback`` tells of
+    (``set_succeeded``, ``set_aborted``, ``set_preempted``). Without it, ``register_goal_callback`` notifies of
     goals, and ``accept_new_goal`` takes them. The program lives on while an ``execute_cb`` serves. Raises
-    ActionException on a class that is no action.
+    ActionException on a class that is not an action.
     """
 
     def __init__(

@@ -18,17 +18,20 @@ __all__ = [
 
 
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
-"""What our clients say in the connection header of their goals."""
+"""What our clients send in the connection header of their goals."""
 
 SEND_SECONDS = 1e-3
-"""Goals of others wait so long: actionlib in Python drops what comes before its send_goal has returned: a result, too."""
+"""Goals of third-party clients wait for this long.
+
+actionlib in Python drops what comes before its send_goal has returned: a result, too.
+"""
 
 CANCEL_SECONDS = 3 * SEND_SECONDS
-"""Cancels wait so long: the goal that was sent before comes by another connection, and waits itself."""
+"""Cancels wait for this long: the goal that was sent before comes by another connection, and waits itself."""
 
 
 class ActionException(MinirospyError):
-    """A class that is no action."""
+    """A class that is not an action."""
 
 
 class ActionTypes(NamedTuple):

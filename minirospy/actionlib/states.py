@@ -1,4 +1,4 @@
-"""The numbers that an action's client tells, by the names that user code has for them."""
+"""The numbers that an action's client reports, by the names that user code has for them."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A list of statuses as it travels: actionlib_msgs/GoalStatusArray, made of parts and read in part.
 
-A server tells of each goal for seconds after its end, so a busy one tells thousands of statuses at a time, of
+A server publishes the status of each goal for seconds after its end, so a busy one publishes thousands at a time, of
 which a client wants those of its own goals.
 """
 
@@ -29,7 +29,7 @@ def status_bytes(status: GoalStatus) -> bytes:
 
 
 class StatusList(GoalStatusArray):
-    """A GoalStatusArray that is sent as the parts which it was made of, and read when it is asked."""
+    """A GoalStatusArray that is sent as the parts which it was made of, and read when it is used."""
 
     _takes_memoryview = False
 
@@ -54,12 +54,12 @@ class StatusList(GoalStatusArray):
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:
-        """Return the status of a goal; None where the list does not tell of it."""
+        """Return the status of a goal; None where the list does not have it."""
         name = id.encode()
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # It is there, or stands in another goal's text.
+        # It is there, or is a part of another goal's text.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
                 return self._status(start, end)
@@ -117,7 +117,7 @@ class StatusList(GoalStatusArray):
 
 
 def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
-    """Return the status of a goal in a GoalStatusArray; None where it does not tell of it."""
+    """Return the status of a goal in a GoalStatusArray; None where it does not have it."""
     if isinstance(statuses, StatusList):
         return statuses.find(id)
     for status in statuses.status_list:

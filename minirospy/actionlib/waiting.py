@@ -14,7 +14,7 @@ __all__ = ["Waiting"]
 
 _FOREVER = times.Duration()
 _SIMULATED_SLICE = 0.02
-"""Seconds: nothing tells of simulated time's passing, which may be faster than the wall's."""
+"""Seconds: nothing notifies of simulated time's passing, which may be faster than the wall's."""
 
 
 class Waiting:

@@ -123,7 +123,7 @@ def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
 
     packages = Packages()
     if not Path(file).is_file():
-        yield problem("launch file", f"{file} is no file", "give its path")
+        yield problem("launch file", f"{file} is not a file", "give its path")
         return
     try:
         spec = load_files([file], args, packages)

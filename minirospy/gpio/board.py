@@ -85,7 +85,7 @@ class Board:
 
     @property
     def person(self) -> Position | None:
-        """Where the person before the scanner stands: metres ahead and to the left; None: nobody is there."""
+        """The position of the person in front of the scanner: metres ahead and to the left; None: nobody is there."""
         return self._link.person
 
     def move_person(self, position: Position | None) -> None:

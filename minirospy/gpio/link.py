@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 __all__ = ["Edge", "Link"]
 
 START_PATIENCE = 30.0
-"""Seconds for a server to start; a loaded small machine needs two or three, one that also stands still fifteen."""
+"""Seconds for a server to start; a loaded small machine needs two or three, one that is also blocked fifteen."""
 
 ANSWER_PATIENCE = 40.0
 """Seconds for an answer: longer than a dead server takes to be replaced."""
@@ -199,7 +199,7 @@ class Link:
         return connection
 
     def _take(self, message: Message) -> Edge | None:
-        """Mirror one message (under the lock); the edge that it tells of."""
+        """Mirror one message (under the lock); return the edge that it reports."""
         if isinstance(message, Changed):
             self.states[message.pin] = message.state
             level = message.state.level
@@ -231,7 +231,7 @@ class Link:
 
 
 class _Connection:
-    """A socket on which the server has said Welcome: ``pins`` and ``person`` are what it told."""
+    """A socket on which the server has said Welcome: ``pins`` and ``person`` are what it sent."""
 
     def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link

@@ -2,7 +2,7 @@
 
 A pin is an input or an output. An output's level is its latch; an input's is what the world drives it to
 (a pressed button, a jumper wire), else its pull resistor, else 0. The latch outlives the direction and the
-process that wrote it, as on a Raspberry Pi. Before the board stands a scanner, and perhaps a person.
+process that wrote it, as on a Raspberry Pi. In front of the board is a scanner, and perhaps a person.
 """
 
 from __future__ import annotations

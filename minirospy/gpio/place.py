@@ -35,7 +35,7 @@ class Place:
     def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> Place:
         """Return the place of board ``name`` (default: what the environment says).
 
-        Raise BoardError on a name that is no file name.
+        Raise BoardError on a name that is not a file name.
         """
         environ = os.environ if environ is None else environ
         name = name or environ.get("MINIROSPY_BOARD") or "default"

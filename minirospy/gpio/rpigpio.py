@@ -213,7 +213,7 @@ class Gpio:
                 for one in [one for one, pin in table.items() if pin in mine]:
                     del table[one]
             if everything and self._link is not None:
-                # Also where nothing was left: RPi.GPIO only asks whether it has touched a pin yet.
+                # Also where nothing was left: RPi.GPIO only checks whether it has touched a pin yet.
                 self._mode = None
         if not mine:
             self._warn(
@@ -285,7 +285,7 @@ class Gpio:
         return detector is not None and detector.take()
 
     def remove_event_detect(self, gpio: int) -> None:
-        """Stop watching a channel; callbacks that have not begun will not run."""
+        """Stop watching a channel; callbacks that have not started will not run."""
         with self._lock:
             self._forget_events(self._pin(gpio))
 
@@ -366,12 +366,12 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Before the board is asked: a Ctrl-C may end the asking, and cleanup() has to undo what the board did.
+            # Before the call of the board: a Ctrl-C may end that call, and cleanup() has to undo what the board did.
             self._directions[pin] = direction
         link.call(Setup(pin, direction, pull, level))
         with self._lock:
             if pin not in self._directions:
-                # A signal handler's cleanup() came while the board was asked.
+                # A signal handler's cleanup() came during the call of the board.
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin

@@ -45,7 +45,7 @@ SAVE_AFTER = 0.05
 """Seconds from a change to its file: a fast blinker is written 20 times a second, not at each change."""
 
 MAX_UNSENT = 1 << 20
-"""Bytes that wait for a client that does not read; then it is dropped, and joins anew when it wakes up."""
+"""Bytes that wait for a client that does not read; then it is dropped, and joins again when it wakes up."""
 
 LOCK_PATIENCE = 5.0
 """Seconds to wait for the lock of a server that is about to end."""
@@ -105,7 +105,7 @@ class _Server:
             self._wait_for_clients()
 
     def carry_out(self, request: Request) -> Message:
-        """Apply and tell everybody; the answer is for the one who asked."""
+        """Apply a request and notify all clients; return the answer for the caller."""
         if request.operation is None:
             return Done(request.number)
         try:

@@ -32,7 +32,7 @@ class _Leaf(NamedTuple):
 
     @property
     def letters(self) -> str:
-        """What ``struct`` calls it, where its size is fixed and it stands for itself; else nothing."""
+        """Its format characters for ``struct``, where its size is fixed; else nothing."""
         if not self.type.is_array:
             return PRIMITIVES[self.type.base]
         return f"{self.type.length}s" if self.type.is_bytes and self.type.length else ""
@@ -54,7 +54,7 @@ class _Leaf(NamedTuple):
         return [self.path]
 
     def packed(self) -> list[str]:
-        """Return the same, for ``struct`` to pack: a bool of numpy is no integer to it, a sum with one is."""
+        """Return the same, for ``struct`` to pack: a bool of numpy is not an integer to it, a sum with one is."""
         return [f"{self.path} + 0"] if self.type.base == "bool" and not self.type.is_array else self.values()
 
 
@@ -75,7 +75,7 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
-    """Return the fields that stay bytes until they are read, arrays of numbers of any length -> their letter."""
+    """Return the fields that stay bytes until they are read, arrays of numbers of any length -> their format character."""
     return {
         python_name(field.name): PRIMITIVES[field.type.base]
         for field in spec.fields
@@ -344,7 +344,7 @@ class _Reader:
             with self._source.block("if end > len(data):"):
                 self._line('raise genpy.DeserializationError("the message ends too early")')
         if raw:
-            # The slots are emptied: reading one of them then asks __getattr__.
+            # The slots are emptied: reading one of them then calls __getattr__.
             self._line(" = ".join(f"self.{name}" for name in raw) + " = []")
             self._line("del " + ", ".join(f"self.{name}" for name in raw))
             self._line("self._raw = {" + ", ".join(f'"{name}": {local}' for name, local in raw.items()) + "}")

@@ -95,7 +95,7 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""What a module needs beside its classes: name -> lines, in the order in which they stand."""
+"""What a module needs besides its classes: name -> lines, in the order in which they are written."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:

@@ -1,4 +1,4 @@
-"""What generated messages stand on: the base class, checks, the text of a message, and filling from values.
+"""What generated messages are based on: the base class, checks, the text of a message, and filling from values.
 
 The names and rules are genpy's, since user code relies on them: http://docs.ros.org/api/genpy/html/.
 """
@@ -176,7 +176,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
     """Fill ``msg`` from values as YAML has them: a list of its fields' values, or of one dictionary of them.
 
-    ``keys`` are words that stand for values ("now", "auto"). Raise MessageException where a name or a number
+    ``keys`` are words that represent values ("now", "auto"). Raise MessageException where a name or a number
     of values does not fit, ValueError on values that cannot be fields.
     """
     if not is_message(msg):

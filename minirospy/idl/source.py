@@ -24,7 +24,7 @@ class Source:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.structs: dict[str, str] = {}
-        """Letters for ``struct`` -> the module's name of the compiled struct."""
+        """Format characters for ``struct`` -> the module's name of the compiled struct."""
         self.classes: dict[str, str] = {}
         """``pkg/Name`` -> the module's name of that class."""
         self.helpers: set[str] = set()

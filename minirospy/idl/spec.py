@@ -24,7 +24,7 @@ PRIMITIVES = {
     "duration": "ii",
     "string": "",
 }
-"""Primitive type -> its letters for ``struct``; a string has none."""
+"""Primitive type -> its format characters for ``struct``; a string has none."""
 
 
 class FieldType(NamedTuple):
@@ -102,7 +102,7 @@ class ServiceSpec(NamedTuple):
 
 
 class ActionSpec(NamedTuple):
-    """An action: the seven messages that it stands for (http://wiki.ros.org/actionlib)."""
+    """An action: the seven messages that it consists of (http://wiki.ros.org/actionlib)."""
 
     package: str
     name: str

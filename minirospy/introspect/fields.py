@@ -95,7 +95,9 @@ def field_type(message_class: type[Message], path: str) -> str:
 def _parse_step(part: str, path: str) -> Step:
     match = _STEP.match(part)
     if not match:
-        raise UsageError(f"field path [{path}]: [{part}] is none of field, field[0], field[1:3], field[::2]")
+        raise UsageError(
+            f"field path [{path}]: [{part}] is not one of field, field[0], field[1:3], field[::2]"
+        )
     name, index = match.groups()
     if index is None:
         return Step(name, None)

@@ -1,4 +1,4 @@
-"""The graph that the questions are about: a master, and the names as the asker sees them."""
+"""The graph that the queries are about: a master, and the names as the caller sees them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class NodeAddress(NamedTuple):
 
 
 class Graph:
-    """A master, asked in the name of ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
+    """A master, called in the name of ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
 
     Every call raises MasterUnreachableError where no master answers.
     """
@@ -92,7 +92,7 @@ class Graph:
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API (asked once a node); None where the master does not know it."""
+        """Return the URI of a node's Slave API (one call a node); None where the master does not know it."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
@@ -108,7 +108,7 @@ class Graph:
 def why_illegal(name: str) -> str:
     """Return what is wrong with the global name of a topic or service; "" where nothing is.
 
-    rospy takes such names all the same, roscpp does not. The path of a field may stand behind a topic's: /points[0]/x.
+    rospy takes such names all the same, roscpp does not. The path of a field may follow a topic's: /points[0]/x.
     """
     legal = name != "/" and names.is_legal_name(re.sub(r"\[.*?\]", "", name))
     return "" if legal else "that is not a legal name: letters, digits, _ and /"

@@ -58,7 +58,7 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that ``name`` stands for: itself where it has a package, else those of that bare name.
+        """Return the types that ``name`` means: itself where it has a package, else those of that bare name.
 
         Raise NotFoundError with the nearest names where there is none.
         """
@@ -71,7 +71,7 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """Return the definition of a type, as it stands in its file. Raise NotFoundError."""
+        """Return the definition of a type, as it is in its file. Raise NotFoundError."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
@@ -96,7 +96,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """Return the sorted names of the types of a package, by its files; an action stands for seven messages."""
+        """Return the sorted names of the types of a package, by its files; an action means seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}

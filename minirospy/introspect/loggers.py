@@ -1,4 +1,4 @@
-"""The loggers of a node and their levels, as the node tells them.
+"""The loggers of a node and their levels, as the node reports them.
 
 Source: http://wiki.ros.org/rosconsole (the services get_loggers and set_logger_level of each node).
 """
@@ -24,7 +24,7 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
     """Logger -> level (in small letters) of a node (global name).
 
-    Raise NotFoundError, NodeUnreachableError, and MinirospyError where it tells nothing of its loggers.
+    Raise NotFoundError, NodeUnreachableError, and MinirospyError where it has no service of its loggers.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
     return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}
@@ -40,7 +40,7 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
     """Set the level of a logger. Raise as :func:`logger_level`."""
-    # A node takes any name; asked first, one that it does not have is told of.
+    # A node takes any name: an unknown one is reported only if it is looked up first.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
@@ -52,5 +52,5 @@ def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))
     except NotFoundError as error:
         raise MinirospyError(
-            f"node [{name}] tells nothing of its loggers: it has no service {service}"
+            f"node [{name}] does not report its loggers: it has no service {service}"
         ) from error

@@ -70,7 +70,7 @@ class MessageClasses:
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
     """``message`` with YAML values in its fields: one dictionary, or a value for each field in order.
 
-    ``keys`` are words that stand for a value, as ``now`` for a time. Raise MessageException.
+    ``keys`` are words that represent a value, as ``now`` for a time. Raise MessageException.
     """
     from minirospy.idl.message import fill_message_args
 

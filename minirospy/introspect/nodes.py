@@ -133,7 +133,7 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 def node_detail(graph: Graph, name: str) -> NodeDetail:
     """Return what the master knows of a node (global name). Raise NotFoundError."""
     state = graph.state()
-    # Types as publishers told them: of a topic that nobody publishes, rosnode says "unknown type".
+    # Types as publishers registered them: of a topic that nobody publishes, rosnode says "unknown type".
     types = dict(graph.master.get_published_topics())
 
     def topics(table: Mapping[str, list[str]]) -> list[TypedName]:

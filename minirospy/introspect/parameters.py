@@ -59,7 +59,7 @@ def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
     The single parameters that were set come back. Raise ValueTextError on what none can hold.
     """
     if name == "/" and not isinstance(value, dict):
-        raise ValueTextError(name, "the root holds parameters, it is none: give a dictionary or a name")
+        raise ValueTextError(name, "the root holds parameters, it is not one: give a dictionary or a name")
     check_parameter(value, name)
     singles = list(flatten(name, value))
     for single, single_value in singles:
@@ -82,7 +82,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
     """Return the documents of a parameter file named ``where``, to be set below ``namespace`` (global).
 
-    Raise ValueTextError where it is not YAML, or values stand at the root without a name.
+    Raise ValueTextError where it is not YAML, or there are values at the root without a name.
     """
     files = []
     for document in parse_documents(text, where):

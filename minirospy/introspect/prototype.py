@@ -57,7 +57,7 @@ class _Defaults(NamedTuple):
 
 
 class _Yaml:
-    """Values as lines. From the first wide one on, all that holds no further braces stands on one line: so it fits."""
+    """Values as lines. From the first wide one on, all that holds no further braces is on one line: so it fits."""
 
     def __init__(self) -> None:
         self._tight = False

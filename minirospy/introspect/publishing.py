@@ -53,7 +53,7 @@ def publish_all(
     rate: float,
     on_message: Callable[[Message], object],
 ) -> None:
-    """Publish ``rate`` messages a second by the node's clock until they end or the node is asked to stop.
+    """Publish ``rate`` messages a second by the node's clock until they end or the node has to stop.
 
     Where time jumps back (a simulation that starts again), it goes on from there.
     """

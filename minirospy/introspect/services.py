@@ -78,7 +78,7 @@ def service_uri(graph: Graph, service: str) -> str:
 
 
 def service_type(graph: Graph, service: str) -> str:
-    """Return the type of a service, asked from the node that offers it.
+    """Return the type of a service, as the node that offers it reports it.
 
     Raise NotFoundError, NodeUnreachableError.
     """
@@ -175,7 +175,7 @@ def service_header(graph: Graph, service: str, uri: str) -> Header:
 def _probe(graph: Graph, service: str, uri: str) -> str:
     type_ = service_header(graph, service, uri).get("type")
     if not type_:
-        raise NodeUnreachableError(service, uri, "it does not tell its type", kind="service")
+        raise NodeUnreachableError(service, uri, "it does not send its type", kind="service")
     return type_
 
 

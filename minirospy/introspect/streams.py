@@ -1,6 +1,6 @@
 """Listening and publishing: a node of the tool's own, several in a process allowed.
 
-Bytes arrive in a worker of each connection; :class:`Inbox` hands them to the thread that asks, and holds the
+Bytes arrive in a worker of each connection; :class:`Inbox` hands them to the thread that reads, and holds the
 publishers back while that thread is busy (a slow terminal is not a growing memory).
 """
 
@@ -59,10 +59,10 @@ class Received(NamedTuple):
 
 
 class ToolNode:
-    """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it is asked to stop.
+    """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it has to stop.
 
-    ``clock`` tells when messages come: the machine's time; with ``ros_time`` that of /clock where the parameter
-    /use_sim_time asks for it, which ``simulated`` says then. Raises MasterUnreachableError where no master answers.
+    ``clock`` gives the time of messages: the machine's time; with ``ros_time`` that of /clock where the parameter
+    /use_sim_time requests it, which ``simulated`` says then. Raises MasterUnreachableError where no master answers.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep so long, or until the node is asked to stop: True then. Raise what :meth:`measure` met."""
+        """Sleep for this long, or until the node has to stop: True then. Raise what :meth:`measure` met."""
         end = time.monotonic() + seconds
         while not self.ended.is_set():
             rest = end - time.monotonic()
@@ -114,7 +114,7 @@ class ToolNode:
         return True
 
     def wait_for_time(self, seconds: float) -> None:
-        """Wait until /clock has told the time, or so long."""
+        """Wait until /clock has given the time, for this long at most."""
         end = time.monotonic() + seconds
         while not self.clock.now() and time.monotonic() < end and not self.wait(0.01):
             pass
@@ -278,7 +278,7 @@ class TopicPublisher:
         return len(self._publication.links)
 
     def wait_for_subscriber(self, wait: Callable[[float], bool], seconds: float) -> None:
-        """``wait(seconds)`` in small steps until somebody is connected, or so long, or ``wait`` says to stop."""
+        """Wait until a subscriber is connected, for this long at most, or until ``wait(step)`` returns True."""
         end = time.monotonic() + seconds
         while not self.connections and time.monotonic() < end and not wait(0.02):
             pass

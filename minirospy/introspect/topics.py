@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""What stands for the type of a topic that nobody has named yet: its subscribers take any."""
+"""What is printed for the type of a topic that nobody has named yet: its subscribers take any."""
 
 _ANY = "*"
 

@@ -97,7 +97,7 @@ def check_yaml(text: str) -> None:
             case yaml.AliasEvent(anchor=name):
                 size = sizes.get(str(name), 1)
                 if size is None:
-                    raise ValueError(f"the alias *{name} stands inside of what it names")
+                    raise ValueError(f"the alias *{name} is inside of what it names")
                 counts[-1] += size
             case yaml.ScalarEvent(anchor=name):
                 counts[-1] += 1
@@ -180,7 +180,7 @@ def check_parameter(value: Any, name: str) -> None:
     elif not isinstance(value, bool | int | float | str | bytes):
         raise ValueTextError(
             name,
-            f"a {type(value).__name__} is no parameter: quote {str(value)!r} twice for the text",
+            f"a {type(value).__name__} is not a parameter: quote {str(value)!r} twice for the text",
         )
 
 

@@ -91,7 +91,7 @@ def test_nodes_that_are_dead_nowhere_or_others(
         "PROBLEM nodes: /dead, /dead_too: nothing listens at their port on 'localhost' -> if they were killed"
     )
     assert lost.startswith(
-        "PROBLEM nodes: /lost: told the master that they are at 'no-such-host.invalid', a name that this"
+        "PROBLEM nodes: /lost: are registered as being at 'no-such-host.invalid', a name that this"
     )
     assert moved.startswith(
         "PROBLEM nodes: /moved: another program answers at their port on 'localhost': it is the node /robot"
@@ -182,7 +182,7 @@ def test_roswtf_and_launch_files(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert f"PROBLEM launch file: {bad}:2: " in one
     assert "led_actuator.py" in one
     assert str(broken) in two
-    assert "none.launch is no file" in three
+    assert "none.launch is not a file" in three
 
 
 def test_a_doctor_that_listens(robot: Any, command: Any, program: Start) -> None:

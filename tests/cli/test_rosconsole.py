@@ -69,7 +69,7 @@ def test_what_is_not_there(talker: subprocess.Popen[str], command: Command) -> N
 
 def test_a_node_without_loggers(robot: Robot, command: Command) -> None:
     assert command("rosconsole", "list", "robot").err == (
-        "rosconsole: ERROR: node [/robot] tells nothing of its loggers: it has no service get_loggers\n"
+        "rosconsole: ERROR: node [/robot] does not report its loggers: it has no service get_loggers\n"
     )
 
 

@@ -166,13 +166,13 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             {"ROS_HOSTNAME": "localhost", "ROS_NAMESPACE": "a b"},
             HERE,
             "problem",
-            "ROS_NAMESPACE=a b is no legal name",
+            "ROS_NAMESPACE=a b is not a legal name",
         ),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_PACKAGE_PATH": "/nowhere"},
             HERE,
             "warning",
-            "which is no folder",
+            "which is not a folder",
         ),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": "/dev/null/log"},
@@ -184,7 +184,7 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             {"ROS_HOSTNAME": "localhost", "ROS_PYTHON_LOG_CONFIG_FILE": "/nowhere"},
             HERE,
             "warning",
-            "ROS_PYTHON_LOG_CONFIG_FILE=/nowhere is no file",
+            "ROS_PYTHON_LOG_CONFIG_FILE=/nowhere is not a file",
         ),
     ],
 )
@@ -250,8 +250,8 @@ def test_packages(tmp_path: Path) -> None:
     environ = {"ROS_PACKAGE_PATH": os.pathsep.join([str(tmp_path / "a"), str(tmp_path / "b")])}
     found = list(check_packages(Environment.read(environ), tmp_path))
     texts = [each.text for each in found]
-    assert texts[0] == f"arm lies in {tmp_path}/a/arm and in {tmp_path}/b/arm: the first counts"
-    assert texts[1] == "arm needs hand_msgs, which is no package here"
+    assert texts[0] == f"arm is in {tmp_path}/a/arm and in {tmp_path}/b/arm: the first counts"
+    assert texts[1] == "arm needs hand_msgs, which is not a package here"
     assert f"{tmp_path}/b/leg/package.xml" in texts[2]
     assert [each.status.value for each in found] == ["warning", "warning", "problem"]
 

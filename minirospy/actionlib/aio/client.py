@@ -36,7 +36,7 @@ class ClientGoal(Generic[_R, _F]):
     def __init__(self, id: str, cancel: Callable[[ClientGoal[Any, Any]], None]) -> None:
         self.id = id
         self.state = GoalState.PENDING
-        """What the server told last."""
+        """The last status that the server published."""
         self.text = ""
         """The server's text on that."""
         self._cancel = cancel
@@ -113,7 +113,7 @@ class ClientGoal(Generic[_R, _F]):
 class ActionClient(ActionEnd, Generic[_G, _R, _F]):
     """A client of the action ``name`` of the class ``action``, such as ``runningLedAction``.
 
-    ``async with`` it, or ``await client.close()`` in the end. Raises ActionException on a class that is no action.
+    ``async with`` it, or ``await client.close()`` in the end. Raises ActionException on a class that is not an action.
     """
 
     _numbers = itertools.count(1)
@@ -163,7 +163,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._start(self._cancel.publish(GoalID()))
 
     async def close(self) -> None:
-        """Leave the action's topics; goals go on, but nothing is heard of them any more. Idempotent."""
+        """Leave the action's topics; goals go on, without any further notification. Idempotent."""
         self._is_closed = True
         for goal in list(self._goals.values()):
             goal._interrupt()
@@ -218,7 +218,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
-            # Feedback travels by a connection of its own: what has come by now is to be heard first.
+            # Feedback travels by a connection of its own: what has come by now is to be read first.
             end = (goal, GoalState(status.status), status.text, message.result)
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

@@ -26,7 +26,7 @@ _R = TypeVar("_R")
 _F = TypeVar("_F")
 
 _SECONDS_A_STATUS = 1e-4
-"""A list of statuses is told after a pause that grows with it: a busy server has better things to do."""
+"""A list of statuses is published after a pause that grows with it: a busy server has better things to do."""
 
 _EVENTS = {
     GoalState.PREEMPTED: GoalEvent.CANCEL,
@@ -40,11 +40,11 @@ class ServerGoal(Generic[_G, _F]):
 
     def __init__(self, server: ActionServer[_G, Any, _F], message: Any) -> None:
         self.request: _G = message.goal
-        """What is asked for: the goal's message."""
+        """What is requested: the goal's message."""
         self.is_cancel_requested = False
         """Whether the goal is to make way: a client has cancelled it, or a newer one has come."""
         self.text = ""
-        """What the client is told with the goal's end."""
+        """The text that is sent with the goal's end."""
         self._server = server
         self._status = GoalStatus(goal_id=message.goal_id)
         self._task: asyncio.Task[None] | None = None
@@ -74,7 +74,7 @@ class ServerGoal(Generic[_G, _F]):
         """Cancel what works on it; once."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # A task that has not begun would end without a word.
+            # A task that has not started would end silently.
             if self._has_begun:
                 self._task.cancel()
 
@@ -94,7 +94,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     One goal runs at a time, and a newer one takes its place, as in SimpleActionServer; with ``concurrent`` each
     runs beside the others. ``accepts(goal)`` may refuse a goal by returning False.
 
-    ``async with`` it, or ``await server.close()`` in the end. Raises ActionException on a class that is no action.
+    ``async with`` it, or ``await server.close()`` in the end. Raises ActionException on a class that is not an action.
     """
 
     def __init__(

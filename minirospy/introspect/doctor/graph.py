@@ -68,7 +68,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "") -> Answers:
-    """Return what all registered nodes say of themselves, asked side by side, without the node ``besides``."""
+    """Return what all registered nodes report of themselves, queried side by side, without the node ``besides``."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -111,18 +111,18 @@ def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, 
     """Return (what, advice) for a node that has registered as being at ``host`` and does not answer there."""
     if trouble.fault is Fault.NAME:
         return (
-            f"told the master that they are at '{host}', a name that this machine does not know",
+            f"are registered as being at '{host}', a name that this machine does not know",
             f"on '{host}' set ROS_IP to its address and start them again, or add '{host}' to the hosts file here",
         )
     if is_loopback(host) and not place.is_local:
         return (
-            f"told the master that they are at '{host}', by which each machine reaches itself alone",
+            f"are registered as being at '{host}', by which each machine reaches itself alone",
             "on their machine set ROS_IP to its address and start them again",
         )
     if trouble.fault is Fault.REFUSED:
         return (
             f"nothing listens at their port on '{host}'",
-            "if they were killed, `rosnode cleanup` makes the master forget them; if they run, they told a wrong address: "
+            "if they were killed, `rosnode cleanup` makes the master forget them; if they run, they registered a wrong address: "
             "set ROS_IP on their machine",
         )
     if trouble.fault is Fault.STRANGER:
@@ -212,7 +212,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Services that do not answer; those of nodes that do not answer either are told of with their nodes."""
+    """Services that do not answer; those of nodes that do not answer either are reported with their nodes."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -244,7 +244,7 @@ def _ask(tool: str, node: NodeAddress) -> NodeAnswer:
     slave = SlaveProxy(node.uri, "/" + tool, CONNECT_SECONDS, nearby=False)
     with contextlib.closing(slave):
         slave.get_pid()
-        # Not all clients tell their name.
+        # Not all clients send their name.
         with contextlib.suppress(RpcFault, RpcRefused, RpcProtocolError):
             name = slave.call("getName")
             if name not in (node.name, "", 0):

@@ -1,4 +1,4 @@
-"""Both ways between two machines: one listens, the other asks it to connect back.
+"""Both ways between two machines: one listens, the other requests that it connects back.
 
 The listener is a service of type std_srvs/Trigger: who calls it has reached that machine, and its answer says whether
 that machine reached the caller's node, by a topic, with a message of 16 KiB. The answer's text is JSON: ``host`` and
@@ -43,7 +43,7 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Connect back to each doctor that asks, from now on; ``report`` hears of each, in a thread of its own.
+    """Connect back to each doctor that requests it, from now on; ``report`` is called with each, in a thread of its own.
 
     Raise MasterUnreachableError, RpcError.
     """

@@ -118,7 +118,7 @@ def _host_findings(
     elif all(map(is_loopback, own)) and not master.is_local:
         yield warning(
             "variables",
-            f"{variable} is {own[0]} here, which tells others nothing: they have to know that name",
+            f"{variable} is {own[0]} here, which other machines cannot use unless they know that name",
             correct,
         )
     elif not any(map(is_own_address, own)):
@@ -137,20 +137,20 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     if not names.is_legal_name(environment.namespace):
         yield problem(
             "variables",
-            f"ROS_NAMESPACE={environ.get('ROS_NAMESPACE')} is no legal name",
+            f"ROS_NAMESPACE={environ.get('ROS_NAMESPACE')} is not a legal name",
             "letters, digits, _ and /, a letter first",
         )
     for folder in environment.package_path:
         if not folder.is_dir():
             yield warning(
                 "variables",
-                f"ROS_PACKAGE_PATH names {folder}, which is no folder",
+                f"ROS_PACKAGE_PATH names {folder}, which is not a folder",
                 "take it out of the variable",
             )
     config = environ.get("ROS_PYTHON_LOG_CONFIG_FILE", "")
     if config and not Path(config).is_file():
-        yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is no file", "unset it")
-    # What would be made is asked of the nearest folder that is there.
+        yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
+    # Of a folder that is not there yet, the nearest one above it counts.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
@@ -187,7 +187,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
             found.append(
                 warning(
                     "packages",
-                    f"{name} lies in {' and in '.join(map(str, folders))}: the first counts",
+                    f"{name} is in {' and in '.join(map(str, folders))}: the first counts",
                     "remove or rename one of them",
                 )
             )
@@ -223,8 +223,8 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
         if missing:
             yield warning(
                 "packages",
-                f"{name} needs {', '.join(missing)}, which is no package here",
-                "put it into a folder of ROS_PACKAGE_PATH; if it is no ROS package, nothing need be done",
+                f"{name} needs {', '.join(missing)}, which is not a package here",
+                "put it into a folder of ROS_PACKAGE_PATH; if it is not a ROS package, nothing need be done",
             )
 
 

@@ -1,4 +1,4 @@
-"""The master: whether it answers, which side is at fault if it does not, and how its clock stands to ours."""
+"""The master: whether it answers, which side is at fault if it does not, and how its clock differs from ours."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
         return
     seconds = _http_date(place)
     if seconds is None:
-        yield ok("clock", f"{place.host} does not tell its time: compare `date` on both machines")
+        yield ok("clock", f"{place.host} does not report its time: compare `date` on both machines")
         return
     # Whole seconds, cut off.
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
@@ -108,14 +108,14 @@ def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
     if trouble.fault is Fault.STRANGER:
         return problem(
             "master",
-            f"what answers at {where} is no ROS master: {trouble.text}",
+            f"what answers at {where} is not a ROS master: {trouble.text}",
             "correct the port in ROS_MASTER_URI, or end that program",
         )
     return problem("master", f"{where}: {trouble.text}", "see docs/network.md")
 
 
 def _status(master: MasterProxy) -> dict[str, Any]:
-    """Return what only minirospy's master tells of itself."""
+    """Return what only minirospy's master reports of itself."""
     try:
         found = master.call("minirospy.status")
     except (RpcFault, RpcError):

@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """A node with a latched message for whoever asks, registered while the context lasts.
+    """A node with a latched message for any peer, registered while the context lasts.
 
     Entering raises OSError where no server can be opened at this machine's address.
     """
@@ -104,7 +104,7 @@ class DoctorNode:
             return set(wanted) - self._listeners
 
     async def _register(self) -> None:
-        # In this order the master has to tell us of ourselves.
+        # In this order the master has to notify us of ourselves.
         await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
@@ -143,7 +143,7 @@ class _Node(Node):
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
-    """Yield whether this machine reaches its own nodes at the address that they tell others."""
+    """Yield whether this machine reaches its own nodes at the address that they advertise."""
     host, ports = own.environment.host, own.environment.ports
     slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, nearby=False)
     try:

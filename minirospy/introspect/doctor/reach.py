@@ -1,6 +1,6 @@
 """Whether an address can be reached from here, and if not, why: a host and a port in, a named fault out.
 
-Everything blocks its thread for a bounded time; :func:`in_parallel` asks many at once.
+Everything blocks its thread for a bounded time; :func:`in_parallel` makes many calls at the same time.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _R = TypeVar("_R")
 
 
 class Fault(str, Enum):
-    """Why an address does not answer, as far as it can be told from here."""
+    """Why an address does not answer, as far as it can be seen from here."""
 
     NAME = "name"
     """the name is not known here"""
@@ -93,12 +93,12 @@ class MasterPlace(NamedTuple):
 
     @property
     def own_address(self) -> str:
-        """The address that this machine shows to it; "" where there is no way."""
+        """The address that this machine shows to it; "" where there is no route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
 def trouble_of(error: Exception) -> Trouble:
-    """Return the trouble that an error of a call, a connection or a look-up stands for."""
+    """Return the trouble that an error of a call, a connection or a look-up means."""
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
@@ -173,7 +173,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return the address that this machine shows to another one; "" where there is no way to it. Nothing is sent."""
+    """Return the address that this machine shows to another one; "" where there is no route to it. Nothing is sent."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -184,7 +184,7 @@ def own_address_towards(address: str) -> str:
 
 
 def host_port(uri: str) -> tuple[str, int]:
-    """(host, port) of ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) where it is no such URI."""
+    """(host, port) of ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) where it is not such a URI."""
     try:
         parts = urlsplit(uri)
         return parts.hostname or "", parts.port or 0
@@ -229,7 +229,7 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 
     length = int.from_bytes(exactly(4), "little")
     if length > most:
-        raise WireError(f"{length} bytes are announced: that is no TCPROS")
+        raise WireError(f"{length} bytes are announced: that is not TCPROS")
     return exactly(length)
 
 
