@@ -41,10 +41,12 @@ class ActionClient:
         self.ActionGoal = self.manager.ActionGoal
         self.ActionResult = self.manager.ActionResult
         self.ActionFeedback = self.manager.ActionFeedback
+
         listener = _Listener(self._news.notify)
         self.pub_queue_size: int = rospy.get_param("actionlib_client_pub_queue_size", 10)
         if self.pub_queue_size < 0:
             self.pub_queue_size = 10
+
         # Small messages that somebody waits for: none may wait for the one before to be acknowledged.
         self.pub_goal = rospy.Publisher(
             rospy.remap_name(ns) + "/goal",
@@ -61,11 +63,13 @@ class ActionClient:
             tcp_nodelay=True,
             queue_size=self.pub_queue_size,
         )
+
         self.manager.register_send_goal_fn(self.pub_goal.publish)
         self.manager.register_cancel_fn(self.pub_cancel.publish)
         self.sub_queue_size: int | None = rospy.get_param("actionlib_client_sub_queue_size", -1)
         if self.sub_queue_size is not None and self.sub_queue_size < 0:
             self.sub_queue_size = None
+
         self.status_sub = self._subscribe("/status", StatusList, self._status_cb)
         self.result_sub = self._subscribe("/result", self.ActionResult, self._result_cb)
         self.feedback_sub = self._subscribe("/feedback", self.ActionFeedback, self._feedback_cb)

@@ -83,11 +83,13 @@ class ActionServer:
         self.ActionResult = types.action_result
         self.ActionResultType = types.result
         self.ActionFeedback = types.action_feedback
+
         self.goal_sub: rospy.Subscriber[ActionGoal] | None = None
         self.cancel_sub: rospy.Subscriber[GoalID] | None = None
         self.status_pub: rospy.Publisher[StatusList] | None = None
         self.result_pub: rospy.Publisher[ActionResult] | None = None
         self.feedback_pub: rospy.Publisher[ActionFeedback] | None = None
+
         self.lock = threading.RLock()
         self.last_cancel: times.Time = rospy.Time()
         self.status_list_timeout = rospy.Duration()
@@ -97,9 +99,11 @@ class ActionServer:
         self.cancel_callback = cancel_cb
         self.auto_start = auto_start
         self.started = False
+
         self._trackers: dict[str, StatusTracker] = {}
         self._told_at = 0.0
         self._teller: _Teller | None = None
+
         if auto_start:
             self.warn_of_auto_start()
             self.start()
@@ -172,6 +176,7 @@ class ActionServer:
             queue_size=self.sub_queue_size,
             tcp_nodelay=True,
         )
+
         self.cancel_sub = rospy.Subscriber(
             name + "/cancel",
             GoalID,
@@ -179,6 +184,7 @@ class ActionServer:
             queue_size=self.sub_queue_size,
             tcp_nodelay=True,
         )
+
         self._teller = _Teller(self.publish_status_now, 1.0 / self.status_frequency)
 
     def publish_result(self, status: GoalStatus, result: Message | None) -> None:
@@ -219,11 +225,13 @@ class ActionServer:
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
         """Cancel goals for a client: the one of the id, all up to a stamp, or all."""
         time.sleep(CANCEL_SECONDS)
+
         with self.lock:
             if not self.started:
                 return
             rospy.logdebug("The action server has received a new cancel request")
             stamp = goal_id.stamp.to_nsec()
+
             for tracker in self.status_list:
                 own = tracker.status.goal_id
                 if not tracker.goal or not is_meant(goal_id.id, stamp, own.id, own.stamp.to_nsec()):
@@ -231,11 +239,13 @@ class ActionServer:
                 handle = self._handle(tracker)
                 if handle.set_cancel_requested():
                     self.cancel_callback(handle)
+
             if goal_id.id and goal_id.id not in self._trackers:
                 # The goal may be on its way: it is to be recalled as soon as it comes.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._trackers[goal_id.id] = tracker
                 tracker.end()
+
             self.last_cancel = max(self.last_cancel, goal_id.stamp)
 
     def internal_goal_callback(self, goal: ActionGoal) -> None:
@@ -243,6 +253,7 @@ class ActionServer:
         header = getattr(goal, "_connection_header", None) or {}
         if not TAKES_FAST_ANSWERS.items() <= header.items():
             time.sleep(SEND_SECONDS)
+
         with self.lock:
             if not self.started:
                 return

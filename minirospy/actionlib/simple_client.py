@@ -80,6 +80,7 @@ class SimpleActionClient:
         Duration waits for ever.
         """
         self.send_goal(goal)
+
         if not self.wait_for_result(execute_timeout):
             rospy.logdebug("Canceling goal")
             self.cancel_goal()
@@ -91,6 +92,7 @@ class SimpleActionClient:
                 rospy.logdebug(
                     "Preempt didn't finish specified preempt_timeout [%.2f]", preempt_timeout.to_sec()
                 )
+
         return self.get_state()
 
     def wait_for_result(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
@@ -147,6 +149,7 @@ class SimpleActionClient:
 
     def _handle_transition(self, gh: ClientGoalHandle) -> None:
         comm_state = gh.get_comm_state()
+
         with self._lock:
             if gh != self.gh:
                 rospy.logerr("Got a transition callback on a goal handle that we're not tracking")
@@ -156,6 +159,7 @@ class SimpleActionClient:
             done_cb, active_cb = self.done_cb, self.active_cb
             if step is SimpleStep.ACTIVATE:
                 self._set_simple_state(SimpleGoalState.ACTIVE)
+
         if step is SimpleStep.ACTIVATE:
             if active_cb:
                 active_cb()

@@ -62,10 +62,12 @@ class SimpleActionServer:
         # One lock for both: with two, a goal that comes while one ends could find them taken crosswise.
         self.lock = self.action_server.lock
         self.execute_condition = threading.Condition(self.lock)
+
         if execute_cb:
             self.execute_thread = threading.Thread(target=self.executeLoop, name="minirospy-action")
             with naming_thread_limit():
                 self.execute_thread.start()
+
         if auto_start:
             self.action_server.warn_of_auto_start()
             self.start()
@@ -151,11 +153,13 @@ class SimpleActionServer:
             if _is_older(goal, self.current_goal) or _is_older(goal, self.next_goal):
                 goal.set_canceled(None, _REPLACED)
                 return
+
             if self.next_goal.get_goal() and self.next_goal != self.current_goal:
                 self.next_goal.set_canceled(None, _REPLACED)
             self.next_goal = goal
             self.new_goal = True
             self.new_goal_preempt_request = False
+
             try:
                 if self.is_active():
                     self.preempt_request = True
@@ -165,6 +169,7 @@ class SimpleActionServer:
                     self.goal_callback()
             except Exception as error:  # noqa: BLE001 - the user's function: the goal has come all the same
                 rospy.logerr("SimpleActionServer.internal_goal_callback - exception %s", error)
+
             self.execute_condition.notify_all()
 
     def internal_preempt_callback(self, preempt: ServerGoalHandle) -> None:

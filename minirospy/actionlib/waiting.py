@@ -35,6 +35,7 @@ class Waiting:
             return True
         event = SignalSafeEvent()
         self._events.append(event)
+
         try:
             with process.interrupting(event.set):
                 while not condition() and not process.is_shutdown():
@@ -49,4 +50,5 @@ class Waiting:
                     event.clear()
         finally:
             self._events.remove(event)
+
         return condition()

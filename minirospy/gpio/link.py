@@ -168,6 +168,7 @@ class Link:
             self._connection = None
         if self._closed:
             return None
+
         try:
             connection = _reach(self._place, lambda: self._closed)
         except BoardError as error:
@@ -175,6 +176,7 @@ class Link:
                 self._failure = error
                 self._news.notify_all()
             return None
+
         with self._news:
             if self._closed:
                 connection.hang_up()
@@ -195,6 +197,7 @@ class Link:
             for _number, data in self._unacknowledged:
                 connection.send(data)
             self._connection = connection
+
         self._report(edges)
         return connection
 
@@ -284,6 +287,7 @@ def _reach(place: Place, given_up: Callable[[], bool]) -> _Connection:
 def _connect(place: Place) -> _Connection | None:
     """Return the connection, after Hello and Welcome, or None when nobody answers."""
     token = ""
+
     try:
         if sys.platform != "win32" and place.uses_unix_socket:
             link = socket.socket(socket.AF_UNIX)
@@ -295,6 +299,7 @@ def _connect(place: Place) -> _Connection | None:
             target = ("127.0.0.1", int(port))
     except (OSError, ValueError):
         return None
+
     try:
         link.settimeout(5.0)
         link.connect(target)
@@ -310,10 +315,12 @@ def _connect(place: Place) -> _Connection | None:
     except (OSError, ProtocolError):
         link.close()
         return None
+
     welcome, *more = messages
     if not isinstance(welcome, Welcome) or welcome.version != VERSION:
         link.close()
         raise BoardError(f"the virtual board [{place.name}] is in use by another version of minirospy")
+
     return _Connection(link, stream, welcome, more)
 
 

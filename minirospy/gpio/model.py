@@ -151,12 +151,15 @@ class BoardModel:
                     wanted = {pin: before._replace(latch=_level(level))}
                 else:
                     wanted = {pin: before._replace(world=_level(level))}
+
         changes = []
+
         for pin, state in wanted.items():
             before = self.pins[pin]
             if state != before:
                 self.pins[pin] = state
                 changes.append(Change(pin, state, state.level != before.level))
+
         return changes
 
     def move_person(self, position: Position | None) -> bool:

@@ -205,16 +205,20 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             self._let_interrupted_call_end(sys._getframe())
+
             for pin in sorted(mine):
                 self._forget_events(pin)
                 self._linked().call(Setup(pin, IN))
                 self._directions.pop(pin, None)
+
             for table in (self._readable, self._writable):
                 for one in [one for one, pin in table.items() if pin in mine]:
                     del table[one]
+
             if everything and self._link is not None:
                 # Also where nothing was left: RPi.GPIO only checks whether it has touched a pin yet.
                 self._mode = None
+
         if not mine:
             self._warn(
                 "No channels have been set up yet - nothing to clean up!  "
@@ -239,6 +243,7 @@ class Gpio:
             raise TypeError("Parameter must be callable")
         pin = self._input_pin(number)
         detector = _detector(number, edge, bouncetime)
+
         with self._lock:
             if pin in self._detectors:
                 raise RuntimeError("Conflicting edge detection already enabled for this GPIO channel")
@@ -363,12 +368,15 @@ class Gpio:
                 "Use GPIO.setwarnings(False) to disable warnings.",
                 depth=3,
             )
+
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
             # Before the call of the board: a Ctrl-C may end that call, and cleanup() has to undo what the board did.
             self._directions[pin] = direction
+
         link.call(Setup(pin, direction, pull, level))
+
         with self._lock:
             if pin not in self._directions:
                 # A signal handler's cleanup() came during the call of the board.
@@ -399,6 +407,7 @@ class Gpio:
         values = list(value) if several else [value] * len(channels)
         if len(channels) != len(values) or (several and not isinstance(channel, (list, tuple))):
             raise RuntimeError("Number of channels != number of values")
+
         try:
             levels = [_level(one) for one in values]
         except TypeError:
@@ -407,6 +416,7 @@ class Gpio:
                 if several
                 else "Value must be an integer/boolean or a list/tuple of integers/booleans"
             ) from None
+
         pins = [self._pin(one) for one in channels]
         if any(self._directions.get(pin) != OUT for pin in pins):
             raise RuntimeError("The GPIO channel has not been set up as an OUTPUT")

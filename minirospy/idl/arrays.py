@@ -74,6 +74,7 @@ def numpy_class(message_class: type[_M]) -> type[_M]:
 def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
     """Return the message, just read from bytes, with each of its arrays of numbers as a numpy array."""
     raw = getattr(message, "_raw", {})
+
     for name, base, is_array in _fields(_class_of(message)):
         dtype = _DTYPES.get(base)
         if dtype is None:
@@ -90,6 +91,7 @@ def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
             values = numpy.array(getattr(message, name), dtype)
             values.flags.writeable = False
             setattr(message, name, values)
+
     return message
 
 

@@ -333,9 +333,11 @@ class _Reader:
         if _is_fixed(spec, self._lookup):
             self._run(chunks[0], names, "data")
             return
+
         if not self._keeps_buffer:
             with self._source.block("if not isinstance(data, bytes):"):
                 self._line("data = bytes(data)")
+
         self._line("end = 0")
         if _has_elements_without_bytes(spec, self._lookup):
             self._line(f"spare = len(data) + {_SPARE}")
@@ -343,6 +345,7 @@ class _Reader:
         if self._slices:
             with self._source.block("if end > len(data):"):
                 self._line('raise genpy.DeserializationError("the message ends too early")')
+
         if raw:
             # The slots are emptied: reading one of them then calls __getattr__.
             self._line(" = ".join(f"self.{name}" for name in raw) + " = []")
@@ -395,19 +398,23 @@ class _Reader:
         """Read a run, and the length of what follows; the local name of that length, or the length itself."""
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
+
         for leaf in chunk.run:
             if leaf.type.base in _TIMES:
                 time = names.get(leaf.path, leaf.path)
                 targets += [f"{time}.secs", f"{time}.nsecs"]
             else:
                 targets.append(self._target(leaf.path, names))
+
         count = ""
+
         if chunk.tail and chunk.tail.has_length:
             letters += "I"
             count = self._source.local("count")
             targets.append(count)
         elif chunk.tail:
             count = str(chunk.tail.type.length)
+
         if letters:
             comma = "," if len(targets) == 1 else ""
             self._line(
@@ -419,6 +426,7 @@ class _Reader:
                 if leaf.type.base == "bool" and not leaf.type.is_array:
                     target = self._target(leaf.path, names)
                     self._line(f"{target} = bool({target})")
+
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
@@ -459,8 +467,10 @@ class _Reader:
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
+
         values = self._source.local(target.rpartition(".")[2])
         self._line(f"{target} = {values} = []")
+
         if type_.base == "string":
             one = self._source.local("size")
             with self._source.block(f"for _ in range({count}):"):
@@ -468,10 +478,12 @@ class _Reader:
                 self._line("end += 4")
                 self._line(f"{values}.append({self._text(one)})")
             return
+
         each = self._source.local("each")
         if spec is None or _is_fixed(spec, self._lookup):
             self._fixed_elements(type_.base, spec, values, each, count)
             return
+
         with self._source.block(f"for _ in range({count}):"):
             self._line(f"{each} = {self._new(type_.base)}")
             self._line(f"{values}.append({each})")
@@ -489,6 +501,7 @@ class _Reader:
             for leaf in leaves
             for value in leaf.values()
         ]
+
         locals_ = ", ".join(local for _, local, _ in assigned)
         comma = "," if len(assigned) == 1 else ""
         block = self._slice(_times(count, _size(letters)))

@@ -85,6 +85,7 @@ def _md5_text(
     around += (spec.full_name,)
     known = {} if known is None else known
     lines = [f"{constant.type} {constant.name}={constant.text}" for constant in spec.constants]
+
     for field in spec.fields:
         type_ = str(field.type)
         if not field.type.is_primitive:
@@ -93,4 +94,5 @@ def _md5_text(
                 known[base] = _md5(_md5_text(lookup(base), lookup, around, known))
             type_ = known[base]
         lines.append(f"{type_} {field.name}")
+
     return "\n".join(lines)

@@ -134,6 +134,7 @@ def emit_package(package: str, kind: str, modules: dict[str, list[str]]) -> str:
     names = {name: module for module, held in modules.items() for name in held}
     for name in names:
         check_type_name(f"{package}/{name}")
+
     lines = [
         f'"""{package}.{kind}: generated from the definitions; each class is loaded when it is first used."""',
         "",
@@ -230,19 +231,23 @@ class _Module:
             "",
             "import genpy",
         ]
+
         for full_name, alias in sorted(self._source.classes.items()):
             package, name = full_name.split("/")
             if self._imports and full_name not in own:
                 lines.append(f"from {package}.msg._{name} import {name} as {alias}")
+
         lines.append("")
         if "_NATIVE" in helpers:
             lines += _NATIVE
         for letters, alias in structs.items():
             form = f'f"{{_NATIVE}}{letters}"' if letters in native else f'"<{letters}"'
             lines.append(f"{alias} = struct.Struct({form})")
+
         for name, helper in _HELPERS.items():
             if name in helpers:
                 lines += helper
+
         return lines
 
     def _message(self, spec: MessageSpec) -> None:
@@ -252,6 +257,7 @@ class _Module:
         base = self._source.use("_Arrays") if lazy else "genpy.Message"
         line()
         line()
+
         with self._source.block(f"class {spec.name}({base}):"):
             line(f'"""{spec.full_name}"""')
             line()

@@ -291,12 +291,14 @@ def _imported(name: str, kind: str) -> Any:
     package, _, short = name.partition("/")
     if not _has_definitions(package, kind):
         return None
+
     try:
         module = importlib.import_module(f"{package}.{kind}")
     except ModuleNotFoundError as error:
         if error.name and not f"{package}.{kind}".startswith(error.name):
             raise
         return None
+
     found = getattr(module, short, None)
     return found if hasattr(found, "_md5sum") and hasattr(found, "_type") else None
 

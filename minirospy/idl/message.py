@@ -161,6 +161,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
         return data_class(**kwds)
     if not args:
         return data_class()
+
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
@@ -170,6 +171,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")  # type: ignore[attr-defined]
         if isinstance(only, list | tuple) and len(data_class.__slots__) != 1:
             return data_class(*only)
+
     return data_class(*args)
 
 
@@ -184,10 +186,12 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
     words = keys or {}
     if msg_args is None:
         msg_args = []
+
     if isinstance(msg_args, dict):
         msg_args = [msg_args] if msg_args else [{}]
     elif not isinstance(msg_args, list | tuple):
         raise ValueError(f"invalid msg_args type: {msg_args}")
+
     if len(msg_args) == 1 and isinstance(msg_args[0], dict):
         _fill(msg, msg_args[0], words, "")
     elif len(msg_args) == 1 and msg_args[0] is None and not msg.__slots__:
@@ -235,6 +239,7 @@ def strify_message(
         return _time_text(val, indent, time_offset, fixed_numeric_width)
     if isinstance(val, bytes | bytearray | memoryview):
         return str(val)
+
     options = _Options(time_offset, current_time, field_filter, fixed_numeric_width)
     if isinstance(val, list | tuple):
         return _list_text(val, indent, options)
@@ -464,6 +469,7 @@ def _filled_time(current: TVal, value: object, words: Mapping[str, object]) -> o
             return type(current)(0, value)
         case TVal():
             return value
+
     raise ValueError(f"invalid msg_args type: {value}")
 
 

@@ -51,6 +51,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
     """Return a .action text. Raise DefinitionError."""
     where = where or f"{package}/{name}"
     parts = _split(text, 3, where, "goal --- result --- feedback")
+
     status = "\nHeader header\nactionlib_msgs/GoalStatus status\n"
     texts = {
         "Goal": parts[0][0],
@@ -64,6 +65,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
             f"{name}ActionFeedback action_feedback\n"
         ),
     }
+
     lines = {"Goal": parts[0][1], "Result": parts[1][1], "Feedback": parts[2][1]}
     messages = tuple(
         # The line that genaction.py puts first: full texts are the same as real ROS has them.
@@ -81,17 +83,21 @@ def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]
     parts: list[tuple[str, int]] = []
     current: list[str] = []
     first = 1
+
     for number, line in enumerate(text.split("\n"), 1):
         if line.startswith("---"):
             parts.append(("".join(f"{kept}\n" for kept in current), first))
             current, first = [], number + 1
         else:
             current.append(line)
+
     parts.append(("".join(f"{kept}\n" for kept in current), first))
+
     if len(parts) != count:
         raise DefinitionError(
             where, 1, f"{len(parts) - 1} lines of '---' instead of {count - 1}: write {form}"
         )
+
     return parts
 
 
@@ -99,6 +105,7 @@ def _parse(text: str, package: str, name: str, where: str, first_line: int) -> M
     fields: list[Field] = []
     constants: list[Constant] = []
     seen: set[str] = set()
+
     for number, line in enumerate(text.split("\n"), first_line):
         bare = line.split("#", 1)[0].strip()
         if not bare:
@@ -122,6 +129,7 @@ def _parse(text: str, package: str, name: str, where: str, first_line: int) -> M
         if declared in seen:
             raise DefinitionError(where, number, f"[{_cut(declared)}] is declared twice")
         seen.add(declared)
+
     return MessageSpec(package, name, tuple(fields), tuple(constants), text)
 
 

@@ -69,6 +69,7 @@ class Echo:
         self._width = width
         self._offset = offset
         self._now = now
+
         self._type = ""
         self._classes = MessageClasses()
         self._checked: type[Message] | None = None
@@ -138,6 +139,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         if len(values) and is_message(values[0]):
             return [elided(each, element, strings, arrays) for each in values]
         return value
+
     if isinstance(value, str):
         return value if strings else f"<string length: {len(value)}>"
     if not is_message(value):

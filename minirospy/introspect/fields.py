@@ -44,6 +44,7 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
     Raise NotFoundError where a field is not there, IndexError where an array is too short.
     """
     value: object = message
+
     for at, (name, index) in enumerate(steps):
         if isinstance(value, list | tuple | bytes):
             raise _array_as_message(steps[at - 1].name, name)
@@ -60,6 +61,7 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
             value = value[index]
         except IndexError:
             raise IndexError(f"{name}[{index}]: the array has {size} elements") from None
+
     return value
 
 

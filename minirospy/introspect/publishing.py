@@ -31,17 +31,21 @@ def values_to_publish(
     if arguments or (file is None and not fields):
         yield parse_arguments(arguments)
         return
+
     where = file or "standard input"
+
     if file is not None:
         documents = parse_documents(_read_text(file), where)
     elif sys.stdin.isatty():
         raise UsageError(f"please specify message values: {' '.join(fields)}")
     else:
         documents = parse_lines(sys.stdin, where)
+
     found = False
     for values in message_values(documents):
         found = True
         yield values
+
     if not found:
         raise UsageError(f"{where} holds no message; please specify message values: {' '.join(fields)}")
 
@@ -58,12 +62,14 @@ def publish_all(
     Where time jumps back (a simulation that starts again), it goes on from there.
     """
     start, sent = node.clock.now(), 0
+
     for message in messages:
         on_message(message)
         publisher.publish(message)
         sent += 1
         # From the start, not from the last message: pauses that come out too long do not add up.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
+
         try:
             if pause > 2e9 / rate:
                 raise ROSTimeMovedBackwardsException(pause / 1e9)

@@ -79,11 +79,13 @@ class ToolNode:
         self._on_end: list[Callable[[], object]] = []
         self._loop = LoopThread(f"{tool}-loop")
         self._node = Node(self.name, environment, on_shutdown=self._asked_to_stop)
+
         try:
             self._loop.run(self._node.start())
         except BaseException:
             self._loop.close()
             raise
+
         if ros_time:
             self._follow_clock(environment.master_uri)
 

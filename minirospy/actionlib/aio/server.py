@@ -117,6 +117,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._last_cancel = 0
         self._kept_nanoseconds = 0
         self._changed = asyncio.Event()
+
         self._result: Publisher[Any] = node.advertise(
             self._topic("result"), types.action_result, queue_size=50, tcp_nodelay=True
         )
@@ -126,6 +127,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._status: Publisher[Any] = node.advertise(
             self._topic("status"), StatusList, queue_size=50, tcp_nodelay=True, latch=True
         )
+
         self._subscriptions: list[Subscription[Any]] = []
         self._registration = self._start(self._register())
 
@@ -178,6 +180,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._goals[goal.id] = goal
         stamp = message.goal_id.stamp.to_nsec()
         others = [] if self._concurrent else self._running(but=goal)
+
         if self._canceled_early.pop(goal.id, 0) or stamp <= self._last_cancel:
             goal.text = "it was cancelled before it came"
             await self._finish(goal, GoalEvent.CANCEL)
@@ -220,6 +223,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         """Work on a goal, when those before it have made way."""
         event, result, returned = GoalEvent.SUCCEED, None, None
         goal._has_begun = True
+
         try:
             if goal.is_cancel_requested:
                 raise asyncio.CancelledError
@@ -236,6 +240,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         except Exception as error:
             event, goal.text = GoalEvent.ABORT, f"Exception in execute callback: {error}"
             self._node.log.exception("Exception in your execute callback: %s", error)
+
         try:
             if returned is not None:
                 result = to_response(self._types.result, returned)
@@ -243,6 +248,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         except Exception as error:  # noqa: BLE001 - the edge to user code: whatever it has put there
             event, result, goal.text = GoalEvent.ABORT, None, f"the result does not fit: {error}"
             self._node.log.error("the result of your execute callback does not fit: %s", error)
+
         if goal.is_cancel_requested and event is GoalEvent.SUCCEED:
             event = GoalEvent.CANCEL
         await self._finish(goal, event, result)

@@ -114,17 +114,20 @@ def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, 
             f"are registered as being at '{host}', a name that this machine does not know",
             f"on '{host}' set ROS_IP to its address and start them again, or add '{host}' to the hosts file here",
         )
+
     if is_loopback(host) and not place.is_local:
         return (
             f"are registered as being at '{host}', by which each machine reaches itself alone",
             "on their machine set ROS_IP to its address and start them again",
         )
+
     if trouble.fault is Fault.REFUSED:
         return (
             f"nothing listens at their port on '{host}'",
             "if they were killed, `rosnode cleanup` makes the master forget them; if they run, they registered a wrong address: "
             "set ROS_IP on their machine",
         )
+
     if trouble.fault is Fault.STRANGER:
         return f"another program answers at their port on '{host}': {trouble.text}", "`rosnode cleanup`"
     if trouble.fault is Fault.OTHER:
@@ -139,6 +142,7 @@ def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
     """Topics whose nodes name different types, and those that nobody publishes."""
     differing = 0
+
     for topic in sorted({*state.publishers, *state.subscribers}):
         types = _types(topic, answers)
         if len(types) > 1:
@@ -149,6 +153,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
                 f"{topic} has nodes of different types, which never connect: {told}",
                 "use one type, or two names",
             )
+
     published = {topic for topic, nodes in state.publishers.items() if nodes} - {"/rosout", "/rosout_agg"}
     alone = [
         f"{topic} ({', '.join(sorted(nodes))}{_near(topic, published)})"
@@ -159,6 +164,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
         yield warning(
             "topics", f"nobody publishes {_names(alone)}", "start the publisher, or correct the topic's name"
         )
+
     if not differing and not alone:
         yield ok(
             "topics", f"{len({*state.publishers, *state.subscribers})}, every type the same at both ends"
@@ -195,9 +201,11 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
         )
         now = {**answers, **{each.node.name: each for each in again if isinstance(each, NodeAnswer)}}
         missing = [pair for pair in missing if not _is_connected(pair, now)]
+
     ends: dict[tuple[str, str], list[_Pair]] = {}
     for pair in missing:
         ends.setdefault((pair.publisher, pair.subscriber), []).append(pair)
+
     for (publisher, subscriber), lost in ends.items():
         host = host_port(answers[publisher].node.uri or "")[0]
         yield problem(
@@ -207,6 +215,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
             or f"run `minirospy doctor` on the machine of {subscriber}: it does not reach '{host}', or has another "
             "definition of the type",
         )
+
     if not missing:
         yield ok("connections", f"{len(pairs)} between publishers and subscribers, all there")
 
@@ -220,6 +229,7 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
     ]
     found = in_parallel(lambda name: _probe_service(graph, name), names, _ALL_SECONDS)
     bad = 0
+
     for name, result in zip(names, found, strict=True):
         if isinstance(result, RpcRefused):
             continue  # it has gone meanwhile
@@ -234,6 +244,7 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
         elif result:
             bad += 1
             yield problem("services", f"{name}: {result}", "build both machines from the same definition")
+
     if not bad:
         yield ok("services", f"{len(names)}, all answer")
 

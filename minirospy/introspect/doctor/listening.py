@@ -52,12 +52,15 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
         caller = fields.get("callerid", "")
         trouble: Trouble | None = None
         uri = ""
+
         try:
             uri = graph.master.lookup_node(caller)
             read_topic(uri, caller + "/letter", own.name, wait=True)
         except (MasterUnreachableError, RpcError, MinirospyError, OSError) as error:
             trouble = trouble_of(error)
+
         where = host_port(uri)[0] or caller
+
         if trouble:
             text = (
                 f"it reaches this machine, and this one does not reach it at {uri or caller}: {trouble.text}"
@@ -65,6 +68,7 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
             report(problem("both ways", f"{where}: {text}", "see there what to do"))
         else:
             report(ok("both ways", f"{where} ({caller}): it reaches this machine, and this one reaches it"))
+
         answer = {
             "host": socket.gethostname(),
             "time": time.time(),

@@ -77,6 +77,7 @@ def _host_findings(
     )
     export = f"export ROS_IP={master.own_address or '<an address of this machine>'}"
     correct = f"unset ROS_HOSTNAME; {export}" if hostname else export
+
     if hostname and ip and hostname != ip:
         same = ip in known[hostname]
         yield (warning if same else problem)(
@@ -86,6 +87,7 @@ def _host_findings(
             + ": ROS_HOSTNAME counts",
             "unset ROS_HOSTNAME" if is_own_address(ip) else "unset ROS_IP",
         )
+
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
@@ -96,6 +98,7 @@ def _host_findings(
             f"ROS_IP={ip} is {'a name, not an IP address' if is_name else 'not a whole IP address'}",
             f"export ROS_HOSTNAME={ip}; unset ROS_IP" if is_name else export,
         )
+
     if not own:
         what = "neither an IP address nor a" if by_ip else "no"
         yield problem("variables", f"{variable} is {what} name that this machine itself knows", correct)
@@ -134,12 +137,14 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     ipv6 = environ.get("ROS_IPV6", "")
     if ipv6 and ipv6 != "on":
         yield warning("variables", f"ROS_IPV6={ipv6} has no effect", "export ROS_IPV6=on, or unset it")
+
     if not names.is_legal_name(environment.namespace):
         yield problem(
             "variables",
             f"ROS_NAMESPACE={environ.get('ROS_NAMESPACE')} is not a legal name",
             "letters, digits, _ and /, a letter first",
         )
+
     for folder in environment.package_path:
         if not folder.is_dir():
             yield warning(
@@ -147,9 +152,11 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
                 f"ROS_PACKAGE_PATH names {folder}, which is not a folder",
                 "take it out of the variable",
             )
+
     config = environ.get("ROS_PYTHON_LOG_CONFIG_FILE", "")
     if config and not Path(config).is_file():
         yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
+
     # Of a folder that is not there yet, the nearest one above it counts.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)

@@ -32,6 +32,7 @@ def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
             f"use the address of that machine, or add '{place.host}' to the hosts file of this one",
         )
         return
+
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
@@ -39,6 +40,7 @@ def check_master(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
+
     status = _status(master)
     name = (
         f"minirospy {status['version']}" if "version" in status else "rosmaster" if pid else "a foreign one"
@@ -78,6 +80,7 @@ def clock_finding(who: str, told: float, before: float, after: float) -> Finding
 
 def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
     where = uri if place.host == place.addresses[0] else f"{uri} ({place.addresses[0]})"
+
     if place.is_local:
         if trouble.fault is Fault.REFUSED:
             return problem(
@@ -105,12 +108,14 @@ def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
             f"no way leads to {where}: {trouble.text}",
             "see that both machines are in one network, and that no firewall refuses",
         )
+
     if trouble.fault is Fault.STRANGER:
         return problem(
             "master",
             f"what answers at {where} is not a ROS master: {trouble.text}",
             "correct the port in ROS_MASTER_URI, or end that program",
         )
+
     return problem("master", f"{where}: {trouble.text}", "see docs/network.md")
 
 

@@ -31,11 +31,14 @@ def check_machine(host: str, port: int) -> Iterator[Finding]:
             f"give the address of that machine, or add '{host}' to the hosts file of this one",
         )
         return
+
     where = host if host == known[0] else f"{host} ({known[0]})"
     if is_own_address(known[0]):
         yield ok("other machine", f"{where} is this machine")
         return
+
     heard = f"a server listens at its port {port}"
+
     try:
         socket.create_connection((known[0], port), CONNECT_SECONDS).close()
     except OSError as error:
@@ -51,6 +54,7 @@ def check_machine(host: str, port: int) -> Iterator[Finding]:
             )
             return
         heard = f"it answers, and no master listens at its port {port}"
+
     yield ok(
         "other machine", f"{where} is reached: {heard}; this machine is {own_address_towards(known[0])} to it"
     )

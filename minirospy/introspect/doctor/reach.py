@@ -102,16 +102,19 @@ def trouble_of(error: Exception) -> Trouble:
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
+
     if isinstance(error, RpcUnreachable):
         text = error.why
         if isinstance(error.__cause__, Exception):
             error = error.__cause__
+
     if isinstance(error, socket.gaierror):
         return Trouble(Fault.NAME, "the name is not known")
     if isinstance(error, TimeoutError):
         return Trouble(Fault.SILENT, "no answer")
     if isinstance(error, ConnectionRefusedError):
         return Trouble(Fault.REFUSED, "connection refused")
+
     if isinstance(error, OSError) and error.errno in (
         errno.EHOSTUNREACH,
         errno.ENETUNREACH,
@@ -120,6 +123,7 @@ def trouble_of(error: Exception) -> Trouble:
         errno.EHOSTDOWN if hasattr(errno, "EHOSTDOWN") else errno.EHOSTUNREACH,
     ):
         return Trouble(Fault.NO_ROUTE, error.strerror or str(error))
+
     if isinstance(error, EOFError | RpcProtocolError | WireError | ConnectionError):
         return Trouble(Fault.STRANGER, text)
     return Trouble(Fault.OTHER, text)
@@ -202,11 +206,13 @@ def read_topic(
     look_up(host_port(uri)[0])
     with contextlib.closing(SlaveProxy(uri, caller_id, timeout, nearby=False)) as slave:
         answer = slave.request_topic(topic, [["TCPROS"]])
+
     match answer:
         case ["TCPROS", str(host), int(port), *_]:
             look_up(host)
         case _:
             raise WireError(f"{uri} answered requestTopic for {topic} with {answer!r}")
+
     with socket.create_connection((host, port), timeout) as sock:
         fields = subscriber_header(topic, InterfaceType(ANY, ANY), caller_id)
         sock.sendall(serialize_header(fields))
