@@ -24,8 +24,8 @@ LAYERS = [
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
-WITH_CYCLES = {"actionlib", "aio", "client", "idl", "introspect", "runtime"}
-"""Rooms whose modules still import each other in circles."""
+WITH_CYCLES = {"idl"}
+"""Rooms whose modules still import each other in cycles."""
 PURE = {"graph", "wire", "idl"}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
@@ -36,10 +36,19 @@ FILES = sorted(
 )
 
 
-def imports(path: Path) -> set[str]:
-    """Every module that a file imports, wherever in the file."""
+def imports(path: Path, *, for_types: bool = True) -> set[str]:
+    """Return every module that a file imports, wherever in the file; without ``for_types`` only what runs."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    unseen: set[ast.AST] = set()
+    if not for_types:
+        for block in ast.walk(tree):
+            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING":
+                unseen.update(child for statement in block.body for child in ast.walk(statement))
+
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree):
+        if node in unseen:
+            continue
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -49,10 +58,10 @@ def imports(path: Path) -> set[str]:
 
 
 def graph_of_imports(room: str) -> dict[str, set[str]]:
-    """The modules of a room that each of its modules imports, imports inside functions included."""
+    """The modules of a room that each of its modules imports, imports inside functions included, those for types alone not."""
     files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
     modules = {module_name(path): path for path in files}
-    found = {module: imports(path) for module, path in modules.items()}
+    found = {module: imports(path, for_types=False) for module, path in modules.items()}
     # `from package.module import name` and `from package import module` look alike.
     named = {module: names | {name.rpartition(".")[0] for name in names} for module, names in found.items()}
     for module in modules:

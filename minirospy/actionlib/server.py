@@ -24,7 +24,6 @@ from minirospy.actionlib.spec import (
     action_types,
 )
 from minirospy.actionlib.statuses import StatusList
-from minirospy.client.process import process
 from minirospy.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
 from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
@@ -302,7 +301,7 @@ class ActionServer:
 
     @staticmethod
     def _publish(publisher: rospy.Publisher[_M] | None, message: _M) -> None:
-        if publisher and publisher.impl and not process.is_shutdown():
+        if publisher and publisher.impl and not rospy.is_down():
             publisher.publish(message)
 
 
@@ -331,7 +330,7 @@ class _Teller:
         self._wake.set()
 
     def _run(self) -> None:
-        with process.interrupting(self.stop):
+        with rospy.interrupting(self.stop):
             while not self._stopped:
                 if self._wake.wait(max(0.0, self._due - time.monotonic())):
                     self._wake.clear()

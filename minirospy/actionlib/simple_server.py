@@ -15,7 +15,6 @@ from actionlib_msgs.msg import GoalStatus
 from minirospy import client as rospy
 from minirospy.actionlib.handle import ServerGoalHandle
 from minirospy.actionlib.server import ActionServer
-from minirospy.client.process import process
 from minirospy.idl.protocols import Action, Message
 from minirospy.runtime.limits import naming_thread_limit
 
@@ -189,17 +188,17 @@ class SimpleActionServer:
 
     def executeLoop(self) -> None:
         """Run the execute callback for each goal, in its thread."""
-        with process.interrupting(self._wake_soon):
+        with rospy.interrupting(self._wake_soon):
             while True:
                 with self.execute_condition:
                     self.execute_condition.wait_for(self._has_work)
-                    if self.need_to_terminate or process.is_shutdown():
+                    if self.need_to_terminate or rospy.is_down():
                         return
                     goal = self.accept_new_goal()
                 self._execute(goal)
 
     def _has_work(self) -> bool:
-        return self.need_to_terminate or process.is_shutdown() or (self.new_goal and not self.is_active())
+        return self.need_to_terminate or rospy.is_down() or (self.new_goal and not self.is_active())
 
     def _execute(self, goal: Message) -> None:
         assert self.execute_callback
@@ -207,11 +206,11 @@ class SimpleActionServer:
             self.execute_callback(goal)
         except Exception as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
             # Ctrl-C ends its sleep with an exception, and a shutdown hook may have closed what it works with.
-            if not process.is_shutdown_requested:
+            if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())
                 self.set_aborted(None, f"Exception in execute callback: {error}")
         else:
-            if self.is_active() and not process.is_shutdown_requested:
+            if self.is_active() and not rospy.is_shutdown_requested():
                 rospy.logwarn(_NOT_ENDED)
                 self.set_aborted(None, "No terminal state was set.")
 

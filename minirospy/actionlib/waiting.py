@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 from minirospy import client as rospy
 from minirospy import times
-from minirospy.client.process import process
-from minirospy.clock import SignalSafeEvent, SimulatedClock, wait_for_event
+from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Waiting"]
 
@@ -37,14 +36,14 @@ class Waiting:
         self._events.append(event)
 
         try:
-            with process.interrupting(event.set):
-                while not condition() and not process.is_shutdown():
+            with rospy.interrupting(event.set):
+                while not condition() and not rospy.is_down():
                     seconds = None
                     if deadline is not None:
                         seconds = (deadline - rospy.get_rostime()).to_sec()
                         if seconds <= 0:
                             break
-                        if isinstance(process.clock, SimulatedClock):
+                        if not rospy.is_wallclock():
                             seconds = _SIMULATED_SLICE
                     wait_for_event(event, seconds)
                     event.clear()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Any
 
 from minirospy import names
@@ -48,9 +49,10 @@ from minirospy.client.params import (
     search_param,
     set_param,
 )
-from minirospy.client.process import process
 from minirospy.client.services import Service, ServiceProxy, wait_for_service
-from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, sleep
+from minirospy.client.session import current_session
+from minirospy.client.startup import init_node
+from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, is_wallclock, sleep
 from minirospy.client.topics import (
     AnyMsg,
     Publisher,
@@ -113,7 +115,11 @@ __all__ = [
     "get_time",
     "has_param",
     "init_node",
+    "interrupting",
+    "is_down",
     "is_shutdown",
+    "is_shutdown_requested",
+    "is_wallclock",
     "logdebug",
     "logdebug_once",
     "logdebug_throttle",
@@ -149,62 +155,31 @@ __all__ = [
 ]
 
 
-def init_node(
-    name: str,
-    argv: Sequence[str] | None = None,
-    anonymous: bool = False,
-    log_level: int | None = None,
-    disable_rostime: bool = False,
-    disable_rosout: bool = False,
-    disable_signals: bool = False,
-    xmlrpc_port: int = 0,
-    tcpros_port: int = 0,
-) -> None:
-    """Make this process the node ``name``; waits for a master.
-
-    ``anonymous`` adds a number, so that many of a name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
-    Raises ValueError on a name that is empty or has a namespace, ROSException when called again with other
-    arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut down while it
-    waits.
-    """
-    process.init_node(
-        name,
-        argv,
-        anonymous,
-        log_level,
-        disable_rostime,
-        disable_rosout,
-        disable_signals,
-        xmlrpc_port,
-        tcpros_port,
-    )
-
-
 def spin() -> None:
     """Wait until the node shuts down. Raises ROSInitException before init_node."""
-    process.spin()
+    current_session().spin()
 
 
 def is_shutdown() -> bool:
     """Whether the node has shut down."""
-    return process.poll_shutdown()
+    return current_session().poll_shutdown()
 
 
 def on_shutdown(h: Callable[[], object]) -> None:
     """Call ``h`` when the node shuts down, before it leaves the graph. Raises TypeError."""
-    process.on_shutdown(h)
+    current_session().lifecycle.on_shutdown(h)
 
 
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; hooks run in this thread."""
-    process.signal_shutdown(reason)
+    current_session().lifecycle.signal_shutdown(reason)
     # The caller needs no notification: what the thread does now is its clean-up, and may sleep.
-    process.poll_shutdown()
+    current_session().poll_shutdown()
 
 
 def get_name() -> str:
     """This node's global name; ``/unnamed`` before init_node."""
-    return process.name
+    return current_session().name
 
 
 get_caller_id = get_name
@@ -212,22 +187,38 @@ get_caller_id = get_name
 
 def get_namespace() -> str:
     """The namespace of this node, with a slash at its end."""
-    return names.namespace_of(process.name)
+    return names.namespace_of(current_session().name)
 
 
 def get_node_uri() -> str | None:
     """The URI of this node's Slave API; None before init_node."""
-    return process.node.uri if process.node else None
+    node = current_session().node
+    return node.uri if node else None
+
+
+def is_shutdown_requested() -> bool:
+    """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
+    return current_session().lifecycle.is_shutdown_requested
+
+
+def is_down() -> bool:
+    """Return whether the node has shut down, for a library: the calling thread does not count as one that polls."""
+    return current_session().is_shutdown()
+
+
+def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
+    """Have a shutdown call ``interrupt`` while a block runs: it ends what blocks in it, from any thread."""
+    return current_session().lifecycle.interrupting(interrupt)
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
     """The global name of ``name`` as this node, or the node ``caller_id``, sees it, remapped."""
-    return process.resolve(name, caller_id)
+    return current_session().resolve(name, caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
     """What the command line has in place of ``name``, as a global name; ``name`` itself where it has nothing."""
-    return process.remap(name, caller_id)
+    return current_session().identity.remap(name, caller_id)
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:

@@ -23,14 +23,15 @@ _UNNAMED = "unnamed"
 
 
 class Identity:
-    """A name, and how others' names look from there. Before :meth:`_take_name` that of a program without a node."""
+    """A name, and how other names are resolved from there. Before :meth:`take_name` that of a program without a node."""
 
-    def __init__(self) -> None:
-        self.remappings: dict[str, str] = {}
+    def __init__(self, previous: Identity | None = None) -> None:
+        """``previous``: the identity that is kept until :meth:`take_name`, but for topics, which are resolved as without."""
+        self.remappings: dict[str, str] = previous.remappings if previous else {}
         """By resolved names; empty before init_node."""
-        self._name: str | None = None
-        self._arguments: names.Arguments | None = None
-        self._environment: Environment | None = None
+        self._name: str | None = previous._name if previous else None
+        self._arguments: names.Arguments | None = previous._arguments if previous else None
+        self._environment: Environment | None = previous._environment if previous else None
         self._is_named = False
 
     @property
@@ -103,10 +104,6 @@ class Identity:
             name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
         self._name = names.resolve(name, names.join(self.environment.namespace, _UNNAMED))
         self.remappings = arguments.resolved_remappings(self._name)
-
-    def forget_name(self) -> None:
-        """Topics are resolved as before :meth:`take_name`."""
-        self._is_named = False
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, Any]:

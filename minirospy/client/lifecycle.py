@@ -79,12 +79,10 @@ class Deferral:
 class Lifecycle:
     """From the first hook to the last: what runs when the node shuts down, and in which order."""
 
-    def __init__(self) -> None:
-        self.lock = threading.RLock()
-        self.begin_lifecycle()
-
-    def begin_lifecycle(self) -> None:
-        """Nothing has happened yet, and no thread was notified of anything."""
+    def __init__(self, leave: Callable[[], object], *, is_down: bool = False) -> None:
+        """``leave()`` takes the node out of the graph. ``is_down``: in a fork of a process that has shut down."""
+        self._leave = leave
+        self._lock = threading.RLock()
         self.shutting_down = SignalSafeEvent()
         """Set once the shutdown hooks have run: every blocking call ends."""
         self.left = SignalSafeEvent()
@@ -100,6 +98,8 @@ class Lifecycle:
         self.machine = ShutdownMachine(self._main)
         # A lock, since it is claimed in one step: a signal's handler may come between any two.
         self._claim = threading.Lock()
+        if is_down:
+            self.shutting_down.set()
 
     # --- the shutdown
 
@@ -130,7 +130,7 @@ class Lifecycle:
                 self.machine.phase = Phase.HOOKS
                 self._run_hooks(self.hooks, ())
                 self._run_hooks(self._hooks_before, (reason,))
-                with self.lock:
+                with self._lock:
                     # A hook that is added from now on is called immediately.
                     self.shutting_down.set()
                 self.machine.phase = Phase.DOWN
@@ -138,14 +138,11 @@ class Lifecycle:
             finally:
                 # Also where an exception ends a hook.
                 self.shutting_down.set()
-                self._leave()
+                self._finish()
         return True
 
-    def leave(self) -> None:
-        """Leave the graph."""
-
     def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
-        """``with process.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it.
+        """``with lifecycle.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it.
 
         A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
         """
@@ -209,20 +206,13 @@ class Lifecycle:
 
     # --- helpers
 
-    def begin_lifecycle_in_fork(self) -> None:
-        """Start anew: this process is a copy, with one thread. The hooks are for the parent's shutdown."""
-        was_down = self.is_shutdown()
-        self.lock = threading.RLock()
-        self.begin_lifecycle()
-        if was_down:
-            self.shutting_down.set()
-
-    def _leave(self) -> None:
+    def _finish(self) -> None:
+        """End what blocks, and leave the graph."""
         for interrupt in list(self._interrupts):
             with contextlib.suppress(Exception):
                 interrupt()
         try:
-            self.leave()
+            self._leave()
         finally:
             self.machine.phase = Phase.LEFT
             self.left.set()
@@ -230,7 +220,7 @@ class Lifecycle:
     def _add_hook(self, hooks: list[Any], hook: Callable[..., object], given: tuple[object, ...]) -> None:
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        with self.lock:
+        with self._lock:
             if not self.is_shutdown():
                 hooks.append(hook)
                 return

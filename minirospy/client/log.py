@@ -19,11 +19,11 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
 
 from minirospy import times
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.clock import SimulatedClock
 
 if TYPE_CHECKING:
-    from minirospy.client.process import NodeProcess
+    from minirospy.client.session import Session
 
 __all__ = [
     "DEBUG",
@@ -115,7 +115,7 @@ class ThrottledLogFunction(Protocol):
         """Log, but from this place in the code at most once in ``period`` seconds."""
 
 
-def configure(node: NodeProcess, log_level: int | None, log_file: str | None) -> None:
+def configure(session: Session, log_level: int | None, log_file: str | None) -> None:
     """Set up the handlers for the node: terminal, log file. ``log_file``: the ``__log:=`` argument.
 
     A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
@@ -126,17 +126,21 @@ def configure(node: NodeProcess, log_level: int | None, log_file: str | None) ->
         raise ValueError(
             f"log_level [{log_level}] is none of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
         )
-    path = Path(log_file).absolute() if log_file else node.environment.log_dir / _log_file_name(node.name)
+    path = (
+        Path(log_file).absolute()
+        if log_file
+        else session.identity.environment.log_dir / _log_file_name(session.name)
+    )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
     # For a configuration file of the user's, and for programs that look for their log.
     os.environ["ROS_LOG_FILENAME"] = str(path)
-    if not _configured_by_file(node):
+    if not _configured_by_file(session):
         _rosout.setLevel(logging.INFO)
-        _add_handler(node, _rosout, RosStreamHandler())
-        _log_to_file(node, path)
+        _add_handler(session, _rosout, RosStreamHandler())
+        _log_to_file(session, path)
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
     # Our own library speaks through the same lines, where something is wrong.
@@ -144,31 +148,31 @@ def configure(node: NodeProcess, log_level: int | None, log_file: str | None) ->
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    _add_handler(node, ours, terminal)
-    if path.parent.parent == node.environment.log_dir:
+    _add_handler(session, ours, terminal)
+    if path.parent.parent == session.identity.environment.log_dir:
         _link_latest(path.parent)
 
 
-def start(node: NodeProcess, *, rosout: bool) -> None:
+def start(session: Session, *, rosout: bool) -> None:
     """The node is in the graph: offer its logger services, and publish to ``/rosout`` where that is wanted."""
     _offer_logger_services()
     if rosout:
-        _start_rosout(node)
-    _log.debug("init_node, name[%s], pid[%s]", node.name, os.getpid())
+        _start_rosout(session)
+    _log.debug("init_node, name[%s], pid[%s]", session.name, os.getpid())
 
 
-def _start_rosout(node: NodeProcess) -> None:
+def _start_rosout(session: Session) -> None:
     """Publish log lines to /rosout."""
     from minirospy.client.params import get_param
 
     tell_topics = not get_param("/rosout_disable_topics_generation", False)
-    _add_handler(node, _rosout, RosOutHandler(tell_topics=tell_topics))
+    _add_handler(session, _rosout, RosOutHandler(tell_topics=tell_topics))
 
 
-def _add_handler(node: NodeProcess, logger: logging.Logger, handler: logging.Handler) -> None:
-    """Have ``logger`` write by ``handler``, until the process becomes another node."""
+def _add_handler(session: Session, logger: logging.Logger, handler: logging.Handler) -> None:
+    """Have ``logger`` write by ``handler``, until the process becomes another session."""
     logger.addHandler(handler)
-    node.before_new_life.append(lambda: logger.removeHandler(handler))
+    session.on_replaced.append(lambda: logger.removeHandler(handler))
 
 
 def _offer_logger_services() -> None:
@@ -207,7 +211,7 @@ class _DeferringHandler(logging.Handler):
 
     def handle(self, record: logging.LogRecord) -> bool:
         """Write one record."""
-        with process.deferral:
+        with current_session().lifecycle.deferral:
             return super().handle(record)
 
 
@@ -258,7 +262,7 @@ class RosOutHandler(_DeferringHandler):
         """``tell_topics``: say what the node publishes in each line."""
         from rosgraph_msgs.msg import Log
 
-        from minirospy.client.topics import Publisher
+        from minirospy.client.publisher import Publisher
 
         super().__init__(level)
         self._publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
@@ -267,21 +271,23 @@ class RosOutHandler(_DeferringHandler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Publish one record, unless publishing itself is what logs."""
-        if getattr(self._busy, "yes", False) or not process.initialized or process.is_shutdown():
+        session = current_session()
+        node = session.node
+        if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
             return
         self._busy.yes = True
         try:
             message = self._publisher.data_class()
             stamp = message.header.stamp
-            stamp.secs, stamp.nsecs = divmod(process.clock.now(), 10**9)
+            stamp.secs, stamp.nsecs = divmod(session.clock.now(), 10**9)
             message.level = _ROS_LEVEL[_known_level(record.levelno)]
-            message.name = process.name
+            message.name = session.name
             message.msg = _message(record)
             message.file = record.filename
             message.function = record.funcName or ""
             message.line = record.lineno
-            if self._tell_topics and process.node:
-                message.topics = list(process.node.publications)
+            if self._tell_topics:
+                message.topics = list(node.publications)
             self._publisher.publish(message)
         except Exception as error:  # noqa: BLE001 - a log line must never stop the program that logs
             print(f"Unable to report rosout: {error}", file=sys.stderr)
@@ -289,10 +295,10 @@ class RosOutHandler(_DeferringHandler):
             self._busy.yes = False
 
 
-def _configured_by_file(node: NodeProcess) -> bool:
+def _configured_by_file(session: Session) -> bool:
     """Follow the user's own configuration of ``logging``, where there is one."""
     named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
-    folder = node.environment.home / "config"
+    folder = session.identity.environment.home / "config"
     found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
     for path in [Path(named)] if named else [path for path in found if path.is_file()]:
         import logging.config
@@ -315,7 +321,7 @@ def _configured_by_file(node: NodeProcess) -> bool:
     return False
 
 
-def _log_to_file(node: NodeProcess, path: Path) -> None:
+def _log_to_file(session: Session, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
     from minirospy.runtime.log_file import LogFileHandler
 
@@ -337,7 +343,7 @@ def _log_to_file(node: NodeProcess, path: Path) -> None:
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
-    _add_handler(node, root, file)
+    _add_handler(session, root, file)
 
 
 def _is_not_ours(record: logging.LogRecord) -> bool:
@@ -392,7 +398,7 @@ def _line(record: logging.LogRecord) -> str:
         "file": lambda _: record.pathname,
         "line": lambda _: record.lineno,
         "function": lambda _: record.funcName,
-        "node": lambda _: process.name,
+        "node": lambda _: current_session().name,
     }
 
     def field(found: re.Match[str]) -> str:
@@ -411,7 +417,7 @@ def _wall_time(record: logging.LogRecord, form: str | None = None) -> str:
 def _stamp(record: logging.LogRecord, form: str | None = None) -> str:
     """Wall time, and behind it the simulated time where that is used."""
     wall = _wall_time(record, form)
-    clock = process.clock
+    clock = current_session().clock
     return f"{wall}, {clock.now() / 1e9:f}" if isinstance(clock, SimulatedClock) else wall
 
 
@@ -450,7 +456,7 @@ def _write(
         stack = "Stack (most recent call last):\n" + "".join(traceback.format_stack(at)).rstrip("\n")
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, exc_info, function, extra, stack)
-    with process.deferral:
+    with current_session().lifecycle.deferral:
         logger.handle(record)
 
 
@@ -481,7 +487,7 @@ class _Places:
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
         """Whether the call at ``frame`` was last due more than ``period`` seconds ago."""
-        place, now = _place(frame), process.clock.now()
+        place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
         # Simulated time that jumped back starts anew.

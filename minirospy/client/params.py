@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.graph.parameter_cache import NOT_SET
 
@@ -51,7 +51,7 @@ def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
     Raises KeyError where it is not set and there is no default, ROSException where the master fails.
     """
-    value = _get(process.resolve(param_name))
+    value = _get(current_session().resolve(param_name))
     if value is not NOT_SET:
         return _as_rospy(value)
     if default is UNSPECIFIED:
@@ -61,19 +61,19 @@ def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
 
 def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
     """The same, without asking the master each time: it tells of changes. Before init_node, no different."""
-    name = process.resolve(param_name)
-    cache, node = process.parameters, process.node
-    if node is None or process.is_shutdown():
+    name = current_session().resolve(param_name)
+    cache, node = current_session().parameters, current_session().node
+    if node is None or current_session().is_shutdown():
         return get_param(param_name, default)
     try:
         value = cache.get(name)
     except LookupError:
         changes = cache.changes
         if name not in node.parameters:
-            _ask("get", name, lambda: process.master.subscribe_param(node.uri, name))
+            _ask("get", name, lambda: current_session().master.subscribe_param(node.uri, name))
             node.parameters.add(name)
         value = _get(name)
-        with process.lock:
+        with current_session().lock:
             cache.store(name, value, changes)
     if value is not NOT_SET:
         return _as_rospy(copy.deepcopy(value))
@@ -88,33 +88,33 @@ def set_param(param_name: str, param_value: Any) -> None:
     Raises TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
     fails.
     """
-    name = process.resolve(param_name)
+    name = current_session().resolve(param_name)
     warn_of_illegal_name(param_name)
     try:
-        _ask("set", name, lambda: process.master.set_param(name, param_value))
+        _ask("set", name, lambda: current_session().master.set_param(name, param_value))
     except ROSException:
         _check_sendable(param_value)
         raise
     # The master does not tell who has set it.
-    process.parameter_changed(name)
+    current_session().parameter_changed(name)
 
 
 def has_param(param_name: str) -> bool:
     """Whether a parameter, or a namespace of that name, is set. Raises ROSException."""
-    name = process.resolve(param_name)
-    return _ask("look for", name, lambda: process.master.has_param(name))
+    name = current_session().resolve(param_name)
+    return _ask("look for", name, lambda: current_session().master.has_param(name))
 
 
 def delete_param(param_name: str) -> None:
     """Delete a parameter. Raises KeyError where it is not set, ROSException where the master fails."""
-    name = process.resolve(param_name)
+    name = current_session().resolve(param_name)
     try:
-        _ask("delete", name, lambda: process.master.delete_param(name))
+        _ask("delete", name, lambda: current_session().master.delete_param(name))
     except ROSException as error:
         if isinstance(error.__cause__, RpcRefused):
             raise KeyError(param_name) from error
         raise
-    process.parameter_changed(name)
+    current_session().parameter_changed(name)
 
 
 def search_param(param_name: str) -> str | None:
@@ -122,9 +122,9 @@ def search_param(param_name: str) -> str | None:
 
     Raises ROSException where the master fails, or the name is a private one.
     """
-    name = process.arguments.remappings.get(param_name, param_name)
+    name = current_session().identity.arguments.remappings.get(param_name, param_name)
     try:
-        return str(_ask("search", name, lambda: process.master.call("searchParam", name)))
+        return str(_ask("search", name, lambda: current_session().master.call("searchParam", name)))
     except ROSException as error:
         why = error.__cause__
         if isinstance(why, RpcRefused):
@@ -136,7 +136,7 @@ def search_param(param_name: str) -> str | None:
 
 def get_param_names() -> list[str]:
     """The names of all parameters. Raises ROSException."""
-    return _ask("list", "/", process.master.get_param_names)
+    return _ask("list", "/", current_session().master.get_param_names)
 
 
 class KeptParameters:
@@ -147,11 +147,12 @@ class KeptParameters:
 
     def __init__(self) -> None:
         self._notifier: Callable[[str, Any], object] | None = None
-        process.parameter_listeners.append(self._told)
+        current_session().parameter_listeners.append(self._told)
 
     def get(self, key: str) -> Any:
         """A parameter that get_param_cached was asked for before. Raises KeyError."""
-        if process.node is None or process.resolve(key) not in process.node.parameters:
+        session = current_session()
+        if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
         return get_param_cached(key)
 
@@ -177,7 +178,7 @@ def get_param_server_cache() -> KeptParameters:
 def _get(name: str) -> Any:
     """Return the value, or NOT_SET."""
     try:
-        return _ask("get", name, lambda: process.master.get_param(name))
+        return _ask("get", name, lambda: current_session().master.get_param(name))
     except ROSException as error:
         if isinstance(error.__cause__, RpcRefused):
             return NOT_SET

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from minirospy.client.process import process
+from minirospy.client.session import Session
 from minirospy.client.topic import (
     AnyMsg,
     Shared,
@@ -79,13 +79,15 @@ class Publisher(Topic[_M]):
             )
         size = _checked_size(queue_size)
         fields = dict(headers or {})
-        with process.lock:
-            state = process.published.get(self.resolved_name)
+        with self._session.lock:
+            state = self._session.published.get(self.resolved_name)
             if state is None:
-                state = process.published[self.resolved_name] = Published(self.resolved_name, data_class)
+                state = self._session.published[self.resolved_name] = Published(
+                    self._session, self.resolved_name, data_class
+                )
             state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
         self.impl = state
-        process.when_ready(state.register)
+        self._session.when_ready(state.register)
 
     def publish(self, *args: Any, **kwds: Any) -> None:
         """Publish a message, or the message that these field values make.
@@ -120,11 +122,12 @@ class Publisher(Topic[_M]):
 class Published(Shared):
     """One published topic of the process: what its Publishers share."""
 
-    def __init__(self, topic: str, data_class: type[Any]) -> None:
+    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
         # asyncio comes with it.
         from minirospy.runtime.topics import Publication
 
-        super().__init__(topic, data_class)
+        super().__init__(session, topic, data_class)
+        self._deferral = session.lifecycle.deferral
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Any]] = set()
         self.subscriber_listeners: list[SubscribeListener] = []
@@ -164,25 +167,25 @@ class Published(Shared):
 
     def register(self) -> None:
         """Tell the master, once."""
-        with process.lock:
-            if self._registered or not self._handles or not process.node or process.is_shutdown():
+        with self._session.lock:
+            if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
             # Before the master knows: a subscriber may come at once, and a publish() before it answers counts.
             self._registered = True
-            wait = process.begin(process.node.advertise(self.publication))
+            wait = self._session.begin(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
 
     def leave(self, handle: Publisher[Any]) -> None:
-        with process.lock:
+        with self._session.lock:
             self._handles.discard(handle)
             # A process that has forked, or is another node by now, has forgotten it.
-            if self._handles or process.published.get(self.resolved_name) is not self:
+            if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
-            del process.published[self.resolved_name]
-            if not process.node or process.is_shutdown():
+            del self._session.published[self.resolved_name]
+            if not self._session.node or self._session.is_shutdown():
                 return
             # Begun before another thread can publish the topic anew.
-            wait = process.begin(process.node.unadvertise(self.publication))
+            wait = self._session.begin(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
     @property
@@ -204,7 +207,7 @@ class Published(Shared):
 
     def check_initialized(self) -> None:
         """Raise ROSException before init_node."""
-        if not self._registered and not process.is_shutdown():
+        if not self._registered and not self._session.is_shutdown():
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
 
     def publish(self, message: Any) -> None:
@@ -214,8 +217,8 @@ class Published(Shared):
             self.check_initialized()
         elif publication.links or publication.latch:
             publication.publish(self._frame(message))
-            if process.deferral.pending:
-                process.deferral.poll()
+            if self._deferral.pending:
+                self._deferral.poll()
         elif not self._was_heard:
             self._was_heard = True
             self._tell_unheard()
@@ -231,18 +234,18 @@ class Published(Shared):
         enough = SignalSafeEvent()
 
         def look() -> None:
-            if len(self.publication.links) >= count or process.is_shutdown():
+            if len(self.publication.links) >= count or self._session.is_shutdown():
                 enough.set()
 
-        with process.interrupting(enough.set):
+        with self._session.lifecycle.interrupting(enough.set):
             self._waiting.append(look)
             try:
                 look()
                 wait_for_event(enough, timeout)
             finally:
                 self._waiting.remove(look)
-        if process.is_shutdown():
-            raise process.interrupted("rospy shutdown")
+        if self._session.is_shutdown():
+            raise self._session.lifecycle.interrupted("rospy shutdown")
         return enough.is_set()
 
     @property
@@ -259,7 +262,7 @@ class Published(Shared):
 
         That most topics have no subscriber at first, or ever, is in order.
         """
-        if self.publication.expected and not process.is_shutdown():
+        if self.publication.expected and not self._session.is_shutdown():
             _log.warning(
                 "the first message on %s went to nobody: %d known to the master, not connected yet. "
                 "wait_for_subscribers() waits for them, latch=True keeps the last message for them",
@@ -291,10 +294,10 @@ class Published(Shared):
         self._was_heard = True
         for look in list(self._waiting):
             look()
-        if not self.subscriber_listeners or not process.node:
+        if not self.subscriber_listeners or not self._session.node:
             return
         if self._events is None:
-            self._events = InOrder(process.node.workers)
+            self._events = InOrder(self._session.node.workers)
         topic = self.publication.topic
 
         def publish_to_all(*args: Any, **kwds: Any) -> None:

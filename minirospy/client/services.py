@@ -12,7 +12,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.client.topic import unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import (
@@ -68,7 +68,8 @@ class Service(Generic[_S]):
         if not name or not isinstance(name, str):
             raise ValueError("service name is not a non-empty string")
         warn_of_illegal_name(name)
-        self.resolved_name = process.resolve(name)
+        self._session = current_session()
+        self.resolved_name = self._session.resolve(name)
         self.service_class = service_class
         self.request_class: type[Any] = service_class._request_class
         self.response_class: type[Any] = service_class._response_class
@@ -80,15 +81,15 @@ class Service(Generic[_S]):
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
-        with process.lock:
-            if process.offered.setdefault(self.resolved_name, self) is not self:
+        with self._session.lock:
+            if self._session.offered.setdefault(self.resolved_name, self) is not self:
                 raise ServiceException(f"service [{self.resolved_name}] already registered")
-        process.when_ready(self._register)
+        self._session.when_ready(self._register)
 
     @property
     def uri(self) -> str | None:
         """Where the service is called, ``rosrpc://host:port``; None before init_node."""
-        return process.node.service_uri if process.node else None
+        return self._session.node.service_uri if self._session.node else None
 
     @property
     def done(self) -> bool:
@@ -98,29 +99,29 @@ class Service(Generic[_S]):
     def shutdown(self, reason: str = "") -> None:
         """Stop offering the service; a call under way gets its answer."""
         self._ended.set()
-        with process.lock:
+        with self._session.lock:
             server, self._server = self._server, None
-            if process.offered.get(self.resolved_name) is not self:
+            if self._session.offered.get(self.resolved_name) is not self:
                 return
-            del process.offered[self.resolved_name]
-            if not server or not process.node or process.is_shutdown():
+            del self._session.offered[self.resolved_name]
+            if not server or not self._session.node or self._session.is_shutdown():
                 return
             # Begun before another thread can offer the service anew.
-            wait = process.begin(process.node.unserve(server))
+            wait = self._session.begin(self._session.node.unserve(server))
         unregister_from_master(wait)
 
     def spin(self) -> None:
         """Wait until the service or the node shuts down."""
-        with process.interrupting(self._ended.set):
+        with self._session.lifecycle.interrupting(self._ended.set):
             try:
                 wait_for_event(self._ended, None)
             except KeyboardInterrupt:
-                process.signal_shutdown("keyboard interrupt")
+                self._session.lifecycle.signal_shutdown("keyboard interrupt")
 
     def _register(self) -> None:
-        with process.lock:
-            node = process.node
-            if node is None or self.done or process.is_shutdown():
+        with self._session.lock:
+            node = self._session.node
+            if node is None or self.done or self._session.is_shutdown():
                 return
             self._server = node.make_service(
                 self.resolved_name,
@@ -129,7 +130,7 @@ class Service(Generic[_S]):
                 request_type=self.request_class._type,
                 response_type=self.response_class._type,
             )
-            wait = process.begin(node.serve(self._server))
+            wait = self._session.begin(node.serve(self._server))
         try:
             wait()
         except (MasterUnreachableError, RpcError) as error:
@@ -173,7 +174,7 @@ class ServiceProxy(Generic[_S]):
         headers: Mapping[str, str] | None = None,
     ) -> None:
         # A name that was never set (None) is an error only when it is called.
-        self.resolved_name = process.resolve(str(name) if name else "")
+        self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
         self.request_class: type[Any] = service_class._request_class
         self.response_class: type[Any] = service_class._response_class
@@ -239,9 +240,10 @@ class ServiceProxy(Generic[_S]):
         """
         from minirospy.runtime.service_client import parse_service_uri
 
-        if self.uri and process.node:
+        node = current_session().node
+        if self.uri and node:
             with contextlib.suppress(OSError, WireError):
-                if parse_service_uri(self.uri)[0] in ("127.0.0.1", process.node.environment.host):
+                if parse_service_uri(self.uri)[0] in ("127.0.0.1", node.environment.host):
                     return self._client_of(self.uri, waits=False)
         return None
 
@@ -252,16 +254,16 @@ class ServiceProxy(Generic[_S]):
             uri,
             self.resolved_name,
             self.md5sum,
-            process.name,
+            current_session().name,
             persistent=self.persistent,
             headers=self._headers,
             waits=waits,
-            nearby=process.environment.nearby,
+            nearby=current_session().identity.environment.nearby,
         )
 
     def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
         try:
-            self.uri = uri = process.master.lookup_service(self.resolved_name)
+            self.uri = uri = current_session().master.lookup_service(self.resolved_name)
         except RpcRefused:
             raise ServiceException(f"service [{self.resolved_name}] unavailable") from None
         except (MasterUnreachableError, RpcError) as error:
@@ -282,7 +284,7 @@ class ServiceProxy(Generic[_S]):
     def _exchange(self, client: ServiceClient, request: bytes, *, keep: bool) -> Any:
         keeping = False
         try:
-            with process.interrupting(client.hang_up):
+            with current_session().lifecycle.interrupting(client.hang_up):
                 body = client.call(request)
             keeping = keep
         except CallFailed as error:
@@ -291,8 +293,10 @@ class ServiceProxy(Generic[_S]):
                 f"service [{self.resolved_name}] responded with an error: {error.text!r}"
             ) from None
         except (OSError, WireError) as error:
-            if process.is_shutdown():
-                raise process.interrupted("node shutdown interrupted service call") from error
+            if current_session().is_shutdown():
+                raise current_session().lifecycle.interrupted(
+                    "node shutdown interrupted service call"
+                ) from error
             raise ServiceException(f"transport error completing service call: {error}") from error
         finally:
             if not keeping:
@@ -317,14 +321,15 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
     Raises ROSException after ``timeout`` seconds, ROSInterruptException where the node shuts down, ValueError
     on a timeout of 0.
     """
-    name = process.resolve(str(service) if service else "")
+    session = current_session()
+    name = session.resolve(str(service) if service else "")
     seconds = timeout.to_sec() if isinstance(timeout, Duration) else timeout
     if seconds == 0:
         raise ValueError("timeout must be non-zero")
     begin = time.monotonic()
     end = None if seconds is None else begin + seconds
     told: set[str] = set()
-    while not process.is_shutdown():
+    while not session.is_shutdown():
         rest = _PROBE_SECONDS if end is None else end - time.monotonic()
         if rest <= 0:
             raise ROSException(f"timeout exceeded while waiting for service {name}")
@@ -339,23 +344,24 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
             told.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
-        wait_for_event(process.shutting_down, pause)
-    raise process.interrupted("rospy shutdown")
+        wait_for_event(session.lifecycle.shutting_down, pause)
+    raise session.lifecycle.interrupted("rospy shutdown")
 
 
 def _probe(name: str, timeout: float) -> str | None:
     """Why the service cannot be called yet; None where it can."""
     from minirospy.runtime.service_client import ServiceClient
 
+    session = current_session()
     try:
-        uri = process.master.lookup_service(name)
+        uri = session.master.lookup_service(name)
     except RpcRefused:
         return "not registered yet"
     except (MasterUnreachableError, RpcError) as error:
         return f"the master does not answer ({error})"
     try:
-        nearby = process.environment.nearby
-        ServiceClient(uri, name, ANY, process.name, probe=True, timeout=timeout, nearby=nearby).close()
+        nearby = session.identity.environment.nearby
+        ServiceClient(uri, name, ANY, session.name, probe=True, timeout=timeout, nearby=nearby).close()
     except (OSError, WireError):
         return _NO_CONTACT
     return None

@@ -11,7 +11,6 @@ import os
 import signal
 import socket
 import sys
-import sysconfig
 import threading
 import time
 from collections.abc import Callable
@@ -228,16 +227,19 @@ class SignalWatchdog:
                 self._sending.send(bytes([byte]))
 
 
-def suppress_interrupt_tracebacks(lifecycle: Lifecycle) -> None:
-    """Let a program, or a thread of it, that does not catch what interrupts it end without a traceback, with status 0."""
+def suppress_interrupt_tracebacks(lifecycle: Callable[[], Lifecycle]) -> None:
+    """Let a program, or a thread of it, that does not catch what interrupts it end without a traceback, with status 0.
+
+    ``lifecycle()`` is that of the process at the time.
+    """
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_expected(error: BaseException | None) -> bool:
         # An interrupted wait may find its lock not acquired, which is a RuntimeError.
         while error is not None:
-            if isinstance(error, PlainInterruptException) and lifecycle.is_shutdown():
+            if isinstance(error, PlainInterruptException) and lifecycle().is_shutdown():
                 return True
-            if isinstance(error, KeyboardInterrupt) and lifecycle.machine.signals:
+            if isinstance(error, KeyboardInterrupt) and lifecycle().machine.signals:
                 return True
             error = error.__context__ if isinstance(error, RuntimeError) else None
         return False
@@ -276,7 +278,7 @@ def _what_runs() -> str:
 
 def _place(frame: FrameType | None) -> str:
     """Return file:line of the program's own code that is innermost; "" where there is none."""
-    libraries = (sysconfig.get_path("stdlib"), os.path.dirname(os.path.dirname(__file__)), "<frozen")
+    libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
     while frame is not None and frame.f_code.co_filename.startswith(libraries):
         frame = frame.f_back
     return f"{frame.f_code.co_filename}:{frame.f_lineno}" if frame else ""

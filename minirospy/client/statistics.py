@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.client.time import Duration, Time
 from minirospy.wire.header import Header
 
@@ -144,7 +144,7 @@ class StatisticsPublisher:
         from rosgraph_msgs.msg import TopicStatistics
 
         from minirospy.client.params import get_param
-        from minirospy.client.topics import Publisher
+        from minirospy.client.publisher import Publisher
 
         self._topic = topic
         self._message_class: Any = TopicStatistics
@@ -153,7 +153,7 @@ class StatisticsPublisher:
 
     def count(self, message: Any, header: Header, size: int) -> None:
         """Count one message of ``size`` bytes."""
-        report = self._counter.count(message, header, size, process.clock.now())
+        report = self._counter.count(message, header, size, current_session().clock.now())
         if report:
             self._publisher.publish(self._as_message(report))
 
@@ -161,7 +161,7 @@ class StatisticsPublisher:
         message = self._message_class()
         message.topic = self._topic
         message.node_pub = report.publisher
-        message.node_sub = process.name
+        message.node_sub = current_session().name
         message.window_start = Time(nsecs=report.start)
         message.window_stop = Time(nsecs=report.stop)
         message.delivered_msgs = report.delivered

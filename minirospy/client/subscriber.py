@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from minirospy.client.process import process
+from minirospy.client.session import Session, current_session
 from minirospy.client.topic import Shared, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
@@ -67,16 +67,18 @@ class Subscriber(Topic[_M]):
         if buff_size <= 0:
             raise ROSException("buffer size must be a positive integer")
         self._newest = max(0, queue_size or 0)
-        with process.lock:
-            state = process.subscribed.get(self.resolved_name)
+        with self._session.lock:
+            state = self._session.subscribed.get(self.resolved_name)
             if state is None:
-                state = process.subscribed[self.resolved_name] = Subscribed(self.resolved_name, data_class)
+                state = self._session.subscribed[self.resolved_name] = Subscribed(
+                    self._session, self.resolved_name, data_class
+                )
             state.join(self, tcp_nodelay)
             # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
             links = state.connections
         self.impl = state
         try:
-            process.when_ready(state.register)
+            self._session.when_ready(state.register)
         except ThreadLimitError:
             self.unregister()
             raise
@@ -103,7 +105,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
         got.append(message)
         arrived.set()
 
-    with process.interrupting(arrived.set):
+    with current_session().lifecycle.interrupting(arrived.set):
         subscriber = Subscriber(topic, topic_type, on_message)
         try:
             wait_for_event(arrived, timeout)
@@ -111,8 +113,8 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
             subscriber.unregister()
     if got:
         return got[0]
-    if process.is_shutdown():
-        raise process.interrupted("rospy shutdown")
+    if current_session().is_shutdown():
+        raise current_session().lifecycle.interrupted("rospy shutdown")
     raise ROSException(f"timeout exceeded while waiting for message on topic {topic}")
 
 
@@ -134,8 +136,8 @@ class _Receiver(NamedTuple):
 class Subscribed(Shared):
     """One subscribed topic of the process: what its Subscribers share."""
 
-    def __init__(self, topic: str, data_class: type[Any]) -> None:
-        super().__init__(topic, data_class)
+    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
+        super().__init__(session, topic, data_class)
         self.subscription: Subscription | None = None
         self._tcp_nodelay = False
         self._handles: list[Subscriber[Any]] = []
@@ -160,22 +162,22 @@ class Subscribed(Shared):
         self._update()
 
     def leave(self, handle: Subscriber[Any]) -> None:
-        with process.lock:
+        with self._session.lock:
             self._handles.remove(handle)
             self._update()
-            if self._handles or process.subscribed.get(self.resolved_name) is not self:
+            if self._handles or self._session.subscribed.get(self.resolved_name) is not self:
                 return
-            del process.subscribed[self.resolved_name]
-            if not process.node or not self.subscription or process.is_shutdown():
+            del self._session.subscribed[self.resolved_name]
+            if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
             # Begun before another thread can subscribe to the topic anew.
-            wait = process.begin(process.node.unsubscribe(self.subscription))
+            wait = self._session.begin(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
         """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
         callback = _Callback(cb, cb_args)
-        with process.lock:
+        with self._session.lock:
             self._added.append(callback)
             self._update()
             links = self.connections
@@ -183,7 +185,7 @@ class Subscribed(Shared):
 
     def remove_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
         """Call ``cb`` no more, which add_callback or a Subscriber was given. Raises KeyError."""
-        with process.lock:
+        with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)
             else:
@@ -192,7 +194,7 @@ class Subscribed(Shared):
 
     def set_queue_size(self, queue_size: int | None) -> None:
         """Keep so many messages, as a Subscriber's ``queue_size`` has it."""
-        with process.lock:
+        with self._session.lock:
             for handle in self._handles:
                 handle._newest = max(0, queue_size or 0)
             self._update()
@@ -202,9 +204,9 @@ class Subscribed(Shared):
 
     def register(self) -> None:
         """Tell the master, once."""
-        with process.lock:
-            node = process.node
-            if self._registered or not self._handles or not node or process.is_shutdown():
+        with self._session.lock:
+            node = self._session.node
+            if self._registered or not self._handles or not node or self._session.is_shutdown():
                 return
             self._registered = True
             self.subscription = node.make_subscription(
@@ -214,7 +216,7 @@ class Subscribed(Shared):
                 newest=self._newest(),
                 tcp_nodelay=self._tcp_nodelay,
             )
-            wait = process.begin(node.subscribe(self.subscription))
+            wait = self._session.begin(node.subscribe(self.subscription))
         try:
             if self.resolved_name not in _WITHOUT_STATISTICS:
                 node.workers.start(self._look_for_statistics)
@@ -229,7 +231,7 @@ class Subscribed(Shared):
     def _look_for_statistics(self) -> None:
         """Count what comes where the parameter says so. In a worker: no Subscriber waits for the answer."""
         try:
-            is_on = process.master.get_param("/enable_statistics")
+            is_on = self._session.master.get_param("/enable_statistics")
         except (MasterUnreachableError, RpcError):
             return
         if is_on:
@@ -303,5 +305,5 @@ def _call(callback: _Callback, message: Any) -> None:
             callback.function(message, callback.args)
     except Exception:  # noqa: BLE001 - the user's function: its fault must not end the connection
         # While a shutdown hook releases what the callback uses, an error of it says nothing.
-        if not process.is_shutdown_requested:
+        if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

@@ -8,11 +8,10 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 from minirospy import errors, times
 from minirospy.client.lifecycle import ROSInterruptException
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.clock import SignalSafeEvent, SimulatedClock
 from minirospy.errors import ROSInitException
 from minirospy.runtime.limits import naming_thread_limit
@@ -26,6 +25,7 @@ __all__ = [
     "TimerEvent",
     "get_rostime",
     "get_time",
+    "is_wallclock",
     "sleep",
 ]
 
@@ -71,16 +71,21 @@ class Time(times.Time):
 
 def get_rostime() -> Time:
     """The current time. Raises ROSInitException before init_node."""
-    if not process.has_time:
+    if not current_session().has_time:
         raise ROSInitException(_NOT_INITIALIZED)
-    return _time(process.clock.now())
+    return _time(current_session().clock.now())
 
 
 def get_time() -> float:
     """The current time in seconds. Raises ROSInitException before init_node."""
-    if not process.has_time:
+    if not current_session().has_time:
         raise ROSInitException(_NOT_INITIALIZED)
-    return process.clock.now() / 1e9
+    return current_session().clock.now() / 1e9
+
+
+def is_wallclock() -> bool:
+    """Return whether the node's time is the machine's, not a simulated one."""
+    return not isinstance(current_session().clock, SimulatedClock)
 
 
 def sleep(duration: float | times.Duration) -> None:
@@ -119,7 +124,7 @@ class Rate:
 
     def _sleep(self, stop: threading.Event | None) -> None:
         """The same, and ``stop`` ends it early."""
-        now = process.clock.now()
+        now = current_session().clock.now()
         try:
             _sleep(self._left(now), stop)
         except ROSTimeMovedBackwardsException:
@@ -130,7 +135,7 @@ class Rate:
         period = self.sleep_dur.to_nsec()
         began = self.last_time.to_nsec() + period
         # Far behind, as after a pause: do not rush through the turns that were missed.
-        now = process.clock.now()
+        now = current_session().clock.now()
         self.last_time = _time(now if now - began > 2 * period else began)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
@@ -209,7 +214,7 @@ class Timer(threading.Thread):
         last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
-        with process.interrupting(self._ended.set):
+        with current_session().lifecycle.interrupting(self._ended.set):
             while not self._is_over():
                 rate._sleep(self._ended)
                 if self._is_over():
@@ -224,34 +229,28 @@ class Timer(threading.Thread):
                 expected = expected + self._period
 
     def _is_over(self) -> bool:
-        return self._ended.is_set() or process.is_shutdown()
-
-
-def follow_clock_topic(clock: SimulatedClock) -> None:
-    """Set ``clock`` from /clock (rosgraph_msgs/Clock)."""
-    from rosgraph_msgs.msg import Clock
-
-    from minirospy.client.topics import Subscriber
-
-    def on_clock(message: Any) -> None:
-        clock.set(message.clock.to_nsec())
-
-    Subscriber("/clock", Clock, on_clock, queue_size=1)
+        return self._ended.is_set() or current_session().is_shutdown()
 
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
     """Sleep until ``stop`` is set, quietly; without it, until the node shuts down."""
     if nanoseconds <= 0:
         return
-    process.deferral.poll()
-    end = stop or (threading.Event() if process.thread_state.notified else process.shutting_down)
+    session = current_session()
+    lifecycle = session.lifecycle
+    if lifecycle.deferral.pending:
+        lifecycle.deferral.poll()
+    end = stop or (threading.Event() if lifecycle.thread_state.notified else lifecycle.shutting_down)
+
     try:
-        is_over = process.clock.sleep(nanoseconds, end)
+        is_over = session.clock.sleep(nanoseconds, end)
     except errors.ROSTimeMovedBackwardsException as error:
         raise ROSTimeMovedBackwardsException(error.time) from None
-    process.deferral.poll()
+
+    if lifecycle.deferral.pending:
+        lifecycle.deferral.poll()
     if not is_over and not stop:
-        process.check_interrupted_sleep()
+        lifecycle.check_interrupted_sleep()
 
 
 def _time(nanoseconds: int) -> Time:

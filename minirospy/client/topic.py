@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.process import process
+from minirospy.client.session import Session, current_session
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.idl.message import Message
 from minirospy.wire.tcpros import ANY
@@ -66,7 +66,8 @@ class Topic(Generic[_M]):
             raise ValueError(f"data_class [{data_class}] is not a class")
         if not hasattr(data_class, "_md5sum") or not hasattr(data_class, "serialize"):
             raise ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
-        self.resolved_name = process.resolve_topic(name)
+        self._session = current_session()
+        self.resolved_name = self._session.identity.resolve_topic(name)
         warn_of_illegal_name(name, stacklevel=4)
         self.name = self.resolved_name
         self.data_class = data_class
@@ -83,7 +84,7 @@ class Topic(Generic[_M]):
 
         As with rospy the handle then keeps its ``name`` only.
         """
-        with process.lock:
+        with self._session.lock:
             shared, self.impl = self.impl, None
         if shared:
             shared.leave(self)
@@ -93,7 +94,8 @@ class Topic(Generic[_M]):
 class Shared:
     """What the handles of one topic in this process share: the ``impl`` that user code sees of rospy's."""
 
-    def __init__(self, topic: str, data_class: type[Any]) -> None:
+    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
+        self._session = session
         self.resolved_name = self.name = topic
         self.data_class = data_class
         self.type: str = data_class._type

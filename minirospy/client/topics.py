@@ -5,8 +5,8 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 
 from __future__ import annotations
 
-from minirospy.client.process import process
 from minirospy.client.publisher import Publisher, SubscribeListener
+from minirospy.client.session import current_session
 from minirospy.client.subscriber import Subscriber, wait_for_message
 from minirospy.client.topic import AnyMsg, Topic
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
@@ -25,6 +25,6 @@ __all__ = [
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
     """[topic, type] of each published topic at or below ``namespace``. Raises ROSException."""
     try:
-        return [list(pair) for pair in process.master.get_published_topics(namespace or "")]
+        return [list(pair) for pair in current_session().master.get_published_topics(namespace or "")]
     except (MasterUnreachableError, RpcError) as error:
         raise ROSException(f"unable to get published topics: {error}") from error

@@ -141,8 +141,8 @@ print(max(sizes))
     def test_timeouts_run_on_simulated_time(self) -> None:
         said = run("""
 import minirospy.clock
-from minirospy.client.process import process
-clock = process.clock = minirospy.clock.SimulatedClock(10**9)
+from minirospy.client.session import current_session
+clock = current_session().clock = minirospy.clock.SimulatedClock(10**9)
 client.send_goal(TestGoal(3))
 answers = []
 waiting = threading.Thread(target=lambda: answers.append(client.wait_for_result(rospy.Duration(100))))

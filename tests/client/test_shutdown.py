@@ -102,7 +102,7 @@ def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachi
 
 @pytest.fixture
 def lifecycle() -> Lifecycle:
-    return Lifecycle()
+    return Lifecycle(lambda: None)
 
 
 @pytest.fixture

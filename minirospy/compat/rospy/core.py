@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Mapping
 
 from minirospy.client.log import logerr
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
 from minirospy.environment import split_uri
 from minirospy.errors import ROSException
@@ -48,32 +48,32 @@ logerror = logerr
 
 def is_initialized() -> bool:
     """Return whether init_node has been called."""
-    return process.initialized
+    return current_session().initialized
 
 
 def is_shutdown_requested() -> bool:
     """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
-    return process.is_shutdown_requested
+    return current_session().lifecycle.is_shutdown_requested
 
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
-    process.before_shutdown(h)
+    current_session().lifecycle.before_shutdown(h)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
-    process.after_shutdown(h)
+    current_session().lifecycle.after_shutdown(h)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
     """Call ``h()`` at shutdown, as rospy.on_shutdown."""
-    process.on_shutdown(h)
+    current_session().lifecycle.on_shutdown(h)
 
 
 def register_signals() -> None:
     """Let SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
-    process.signals.install()
+    current_session().signals.install()
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:

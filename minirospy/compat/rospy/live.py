@@ -13,7 +13,7 @@ import rospy.client
 import rospy.core
 import rospy.rostime
 
-from minirospy.client.process import process
+from minirospy.client.session import current_session, replace_session
 from minirospy.client.time import get_rostime
 from minirospy.compat.rospy.rostime import (
     is_rostime_initialized,
@@ -50,22 +50,22 @@ def _install(module: ModuleType, **names: tuple[Callable[[], Any], Callable[[Any
 
 def _restart_unless(value: object) -> None:
     if not value:
-        process.begin_again()
+        replace_session()
 
 
 # Programs that want another node after the first has shut down say so by setting the flags to False.
 _install(
     rospy.core,
-    _shutdown_flag=(process.is_shutdown, _restart_unless),
-    _in_shutdown=(lambda: process.is_shutdown_requested, _restart_unless),
+    _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),
+    _in_shutdown=(lambda: current_session().lifecycle.is_shutdown_requested, _restart_unless),
     _client_shutdown_hooks=(
-        lambda: process.hooks,
-        lambda value: process.hooks.__setitem__(slice(None), value),
+        lambda: current_session().lifecycle.hooks,
+        lambda value: current_session().lifecycle.hooks.__setitem__(slice(None), value),
     ),
 )
 _install(
     rospy.client,
-    _init_node_args=(lambda: process.init_arguments, _restart_unless),
+    _init_node_args=(lambda: current_session().init_arguments, _restart_unless),
 )
 _install(
     rospy.rostime,

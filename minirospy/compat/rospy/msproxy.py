@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from minirospy.client.params import get_param_cached
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime.rpc_client import RpcClient
 
@@ -49,7 +49,7 @@ class ServerProxy:
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
-        self._client = RpcClient(uri, nearby=process.environment.nearby)
+        self._client = RpcClient(uri, nearby=current_session().identity.environment.nearby)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("__"):
@@ -90,8 +90,8 @@ class MasterProxy:
 
         def call(*args: Any) -> Any:
             if args and name in _NAMES_FIRST:
-                args = (process.resolve(args[0]), *args[1:])
-            return method(process.name, *args)
+                args = (current_session().resolve(args[0]), *args[1:])
+            return method(current_session().name, *args)
 
         return call
 
@@ -118,7 +118,7 @@ class MasterProxy:
 
     def search_param(self, key: str) -> str | None:
         """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none."""
-        code, _, value = self.target.searchParam(process.name, key)
+        code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
@@ -129,7 +129,7 @@ class MasterProxy:
 def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
     """Return the master of this node, or of the ROS_MASTER_URI in an ``env`` that is not os.environ."""
     uri = None if env is os.environ else env.get("ROS_MASTER_URI")
-    return _master(uri or process.environment.master_uri, os.getpid())
+    return _master(uri or current_session().identity.environment.master_uri, os.getpid())
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from minirospy import names
-from minirospy.client.process import process
+from minirospy.client.session import current_session
 from minirospy.compat.ros_names import is_global, is_private
 from minirospy.errors import ROSException
 
@@ -30,7 +30,10 @@ __all__ = [
     "valid_name_validator_unresolved",
 ]
 
-_set_caller_id = process.be_called
+
+def _set_caller_id(name: str) -> None:
+    current_session().identity.be_called(name)
+
 
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
@@ -51,29 +54,33 @@ class ParameterInvalid(Exception):
 
 def get_mappings() -> dict[str, str]:
     """Return the remappings of this node's command line as they are spelled, ``__name`` and its like included."""
-    return {**process.arguments.remappings, **process.arguments.special}
+    arguments = current_session().identity.arguments
+    return {**arguments.remappings, **arguments.special}
 
 
 def get_resolved_mappings() -> dict[str, str]:
     """Return the remappings by global names; empty before init_node."""
-    return {**process.remappings, **process.arguments.special} if process.initialized else {}
+    session = current_session()
+    identity = session.identity
+    return {**identity.remappings, **identity.arguments.special} if session.initialized else {}
 
 
 def reload_mappings(argv: Sequence[str]) -> None:
     """Use ``argv`` as this node's command line."""
-    process.reload_arguments(argv)
+    current_session().identity.reload_arguments(argv)
 
 
 def initialize_mappings(node_name: str) -> None:
     """Resolve the remappings again, as the node ``node_name`` sees them."""
-    process.remappings = process.arguments.resolved_remappings(node_name)
+    identity = current_session().identity
+    identity.remappings = identity.arguments.resolved_remappings(node_name)
 
 
 def resolve_name_without_node_name(name: str) -> str:
     """Return the global name of a topic before init_node. Raises ValueError on a private one."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
-    return process.resolve_topic(name or "")
+    return current_session().identity.resolve_topic(name or "")
 
 
 def scoped_name(caller_id: str, name: str) -> str:

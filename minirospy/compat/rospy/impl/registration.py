@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from minirospy.client.process import process
 from minirospy.client.services import Service
+from minirospy.client.session import current_session
 
 __all__ = ["Registration", "ServiceManager", "TopicManager", "get_service_manager", "get_topic_manager"]
 
@@ -51,11 +51,12 @@ class TopicManager:
         return (stats[0], stats[1]) if stats else ([], [])
 
     def _query(self, method: str) -> list[Any]:
-        if process.node is None:
+        session = current_session()
+        if session.node is None:
             return []
         from minirospy.runtime.slave import SlaveApi
 
-        return list(getattr(SlaveApi(process.node), method)(process.name)[2])
+        return list(getattr(SlaveApi(session.node), method)(session.name)[2])
 
 
 class ServiceManager:
@@ -63,11 +64,11 @@ class ServiceManager:
 
     def get_services(self) -> list[tuple[str, Any]]:
         """Return the name and URI of each service."""
-        return [(name, service.uri) for name, service in list(process.offered.items())]
+        return [(name, service.uri) for name, service in list(current_session().offered.items())]
 
     def get_service(self, resolved_service_name: str) -> Service[Any] | None:
         """Return the service of this name; None where this node does not offer it."""
-        return process.offered.get(resolved_service_name)
+        return current_session().offered.get(resolved_service_name)
 
 
 def get_service_manager() -> ServiceManager:

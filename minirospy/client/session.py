@@ -1,0 +1,272 @@
+"""The one node of a process, as rospy has it: what rospy's functions share, in an object that is replaced and never reset.
+
+Publishers, services, time and log register with the session; it imports none of them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import threading
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from minirospy.client.identity import Identity
+from minirospy.client.lifecycle import Lifecycle
+from minirospy.client.signals import SignalWatchdog
+from minirospy.clock import Clock, WallClock, wait_for_event
+from minirospy.errors import ROSInitException
+from minirospy.graph.parameter_cache import ParameterCache
+from minirospy.runtime.master_proxy import MasterProxy
+
+if TYPE_CHECKING:
+    # A program that has no node yet does not pay for asyncio.
+    from minirospy.client.publisher import Published
+    from minirospy.client.services import Service
+    from minirospy.client.subscriber import Subscribed
+    from minirospy.runtime.loop import LoopThread
+    from minirospy.runtime.node import Node
+
+__all__ = ["Session", "current_session", "replace_session", "replace_session_in_fork"]
+
+_T = TypeVar("_T")
+_MASTER_SECONDS = 30.0
+"""How long the master may take to answer: one of many nodes that start at once on a small computer waits for its turn."""
+_REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
+_log = logging.getLogger(__name__)
+
+
+class Session:
+    """A node of this process, from before init_node to after its shutdown: its name, lifecycle, clock, tables and loop."""
+
+    def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
+        """``previous``: the session that this one replaces; name, clock and listeners go on until init_node."""
+        self.is_fork = is_fork
+        self.identity: Identity = Identity(previous.identity if previous else None)
+        self.lifecycle = Lifecycle(
+            self._leave, is_down=is_fork and previous is not None and previous.is_shutdown()
+        )
+        self.signals = SignalWatchdog(self.lifecycle, self._is_sending)
+        self.lock = threading.RLock()
+        """Orders registrations, and guards the tables."""
+        self.clock: Clock = previous.clock if previous else WallClock()
+        self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
+        """Notified of each simulated time."""
+        self.has_time: bool = bool(previous and previous.has_time)
+        """Whether the time may be asked for: from init_node on, or once a program without a node has said so."""
+        self.published: dict[str, Published] = {}
+        self.subscribed: dict[str, Subscribed] = {}
+        self.offered: dict[str, Service[Any]] = {}
+        self.parameters = ParameterCache()
+        self.parameter_listeners: list[Callable[[str, Any], object]] = (
+            previous.parameter_listeners if previous else []
+        )
+        """Called with the name and the value of each parameter that the master reports as changed."""
+        self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
+        """Called by the next init_node: removes what this one has installed in the process."""
+        self.init_arguments: tuple[object, ...] | None = None
+        """What init_node was called with; None before."""
+        self.node: Node | None = None
+        """The node, once init_node is done."""
+        self._opened: Node | None = None
+        self._loop: LoopThread | None = None
+        self._master: MasterProxy | None = None
+        self._waiting_for_node: list[Callable[[], object]] = []
+        self._installs_signals = is_fork and previous is not None and previous.signals.is_installed
+
+    # --- the node
+
+    @property
+    def name(self) -> str:
+        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        return self.identity.name
+
+    def resolve(self, name: str, caller_id: str | None = None) -> str:
+        """Return the global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        return self.identity.resolve(name, caller_id)
+
+    @property
+    def initialized(self) -> bool:
+        """Whether init_node has been called."""
+        return self.node is not None
+
+    @property
+    def master(self) -> MasterProxy:
+        """The master, called from the caller's own thread."""
+        if self._master is None or self._master.caller_id != self.name:
+            environment = self.identity.environment
+            self._master = MasterProxy(
+                environment.master_uri, self.name, _MASTER_SECONDS, nearby=environment.nearby
+            )
+        return self._master
+
+    def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
+        """Start the loop and the node's servers. Raises ROSInitException."""
+        # Imported here: a program that has no node need not pay for asyncio.
+        from minirospy.runtime.loop import LoopThread
+        from minirospy.runtime.node import Node
+
+        self._loop = LoopThread()
+        self._opened = Node(
+            self.name,
+            self.identity.environment,
+            on_shutdown=self._on_shutdown_request,
+            on_parameter=self._on_parameter,
+        )
+        self._opened.when_registered_again.append(self._forget_parameters)
+        try:
+            self.run(self._opened.start(xmlrpc_port, tcpros_port))
+        except OSError as error:
+            raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
+
+    def publish_node(self) -> None:
+        """Make the node that was opened the process's: what was made before registers now."""
+        with self.lock:
+            self.node = self._opened
+            waiting, self._waiting_for_node = self._waiting_for_node, []
+        for function in waiting:
+            function()
+
+    def when_ready(self, function: Callable[[], object]) -> None:
+        """Call ``function`` now, or in init_node where that has not been called yet."""
+        with self.lock:
+            if self.node is None:
+                self._waiting_for_node.append(function)
+                return
+        function()
+
+    def run(self, coroutine: Coroutine[Any, Any, _T]) -> _T:
+        """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
+        return self.begin(coroutine)()
+
+    def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[], _T]:
+        """Start ``coroutine`` on the node's loop, under a lock that orders the starts; what is returned waits for it.
+
+        Raises as :meth:`run` does.
+        """
+        assert self._loop is not None
+        loop = self._loop
+        wait = self._or_interrupted(lambda: loop.begin(coroutine))
+        return lambda: self._or_interrupted(lambda: wait(None))
+
+    def post(self, function: Callable[..., object], *args: object) -> None:
+        """Call ``function`` on the node's loop soon."""
+        if self._loop:
+            self._loop.post(function, *args)
+
+    def parameter_changed(self, key: str) -> None:
+        """Forget what was cached of the parameter ``key``, which was set or deleted."""
+        with self.lock:
+            self.parameters.changed(key)
+
+    # --- the shutdown
+
+    def is_shutdown(self) -> bool:
+        """Return whether the node has shut down."""
+        return self.lifecycle.is_shutdown()
+
+    def poll_shutdown(self) -> bool:
+        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        if self._installs_signals:
+            # A fork is left to the system until it polls.
+            self._installs_signals = False
+            self.signals.install()
+        return self.lifecycle.poll_shutdown()
+
+    def spin(self) -> None:
+        """Wait until the node shuts down. Raises ROSInitException before init_node."""
+        if not self.initialized and not self.is_shutdown() and not self.is_fork:
+            raise ROSInitException("client code must call rospy.init_node() first")
+        self.lifecycle.spin()
+
+    def shut_down_at_exit(self) -> None:
+        """Shut down at the program's exit. Where another thread does that, let it finish first."""
+        if self._opened or self.is_fork:
+            self.lifecycle.signal_shutdown("atexit")
+            wait_for_event(self.lifecycle.left, None)
+        self.signals.flush_at_exit()
+
+    def abandon_in_fork(self) -> None:
+        """Detach what is left of this session in a fork: the node, its sockets and its locks are the parent's."""
+        for published in self.published.values():
+            published.forget_subscribers()
+        self.published, self.subscribed, self.offered = {}, {}, {}
+        self.node = None
+        # Another thread of the parent's may have held it.
+        self.lock = threading.RLock()
+        self.signals.release()
+
+    # --- helpers
+
+    def _leave(self) -> None:
+        """Leave the graph. Takes as long as the master answers: see Node.close(), which sets the limits."""
+        if self._opened and self._loop:
+            try:
+                self._loop.run(self._opened.close())
+            except RuntimeError as error:
+                _log.debug("closing the node: %s", error)
+            self._loop.close()
+        if self._master:
+            self._master.close()
+
+    def _is_sending(self) -> bool:
+        return self._opened is not None and self._opened.is_sending
+
+    def _or_interrupted(self, function: Callable[[], _T]) -> _T:
+        from minirospy.runtime.loop import LoopClosedError
+
+        try:
+            return function()
+        except LoopClosedError as error:
+            self.poll_shutdown()
+            raise self.lifecycle.interrupted("rospy shutdown") from error
+
+    def _on_shutdown_request(self, reason: str) -> None:
+        """Shut down at a request from outside: as rospy does, print why."""
+        # There may be no terminal any more.
+        with contextlib.suppress(OSError, ValueError):
+            print(
+                "shutdown request" + (f": {asked[1]}" if (asked := _REQUEST.match(reason)) else ""),
+                flush=True,
+            )
+        self.lifecycle.signal_shutdown(reason)
+
+    def _on_parameter(self, key: str, value: Any) -> None:
+        self.parameter_changed(key)
+        for listener in self.parameter_listeners:
+            listener(key, value)
+
+    def _forget_parameters(self) -> None:
+        """Forget all cached parameters: the master has restarted, and the node is not subscribed to them any more."""
+        if self.node:
+            keys, self.node.parameters = self.node.parameters, set()
+            for key in keys:
+                self.parameter_changed(key)
+
+
+class _Process:
+    session = Session()
+
+
+def current_session() -> Session:
+    """Return the session of this process."""
+    return _Process.session
+
+
+def replace_session() -> None:
+    """Let init_node make another node, once the node has left the graph; without effect before, and after a signal.
+
+    What the program made for the old node, such as its publishers, stays with that.
+    """
+    session = _Process.session
+    if session.lifecycle.left.is_set() and not session.lifecycle.machine.signals:
+        session.signals.release()
+        _Process.session = Session(session)
+
+
+def replace_session_in_fork() -> None:
+    """Give a fork a session of its own: the name, the time and log lines go on, the node stays the parent's."""
+    session = _Process.session
+    _Process.session = Session(session, is_fork=True)
+    session.abandon_in_fork()

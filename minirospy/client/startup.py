@@ -1,0 +1,187 @@
+"""init_node: the steps that make a process a node.
+
+Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
+"""
+
+from __future__ import annotations
+
+import atexit
+import functools
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from minirospy import names
+from minirospy.client import log
+from minirospy.client.identity import private_parameters
+from minirospy.client.session import Session, current_session, replace_session_in_fork
+from minirospy.client.signals import suppress_interrupt_tracebacks
+from minirospy.client.subscriber import Subscriber
+from minirospy.clock import SimulatedClock, wait_for_event
+from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
+
+__all__ = ["init_node", "start_clock"]
+
+_POLL_SECONDS = 0.25
+
+
+def init_node(
+    name: str,
+    argv: Sequence[str] | None = None,
+    anonymous: bool = False,
+    log_level: int | None = None,
+    disable_rostime: bool = False,
+    disable_rosout: bool = False,
+    disable_signals: bool = False,
+    xmlrpc_port: int = 0,
+    tcpros_port: int = 0,
+) -> None:
+    """Make this process the node ``name``; waits for a master.
+
+    ``anonymous`` adds a number, so that many of a name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
+    Raises ValueError on a name that is empty or has a namespace, ROSException when called again with other
+    arguments, ROSInitException where the node cannot be set up, ROSInterruptException where it is shut down while it
+    waits.
+    """
+    _check_name(name)
+    session = current_session()
+    argv = list(sys.argv if argv is None else argv)
+    arguments = (name, argv, anonymous, log_level, disable_rostime, disable_signals)
+    if _is_repeated(session, arguments):
+        return
+    _warn_of_name(name)
+
+    session.init_arguments = arguments
+    session.identity.take_name(name, argv, anonymous)
+    parameters = private_parameters(session.identity.arguments)
+
+    _release_previous(session)
+    _install_process_hooks()
+    if not disable_signals:
+        session.signals.install()
+    if session.is_shutdown():
+        raise session.lifecycle.interrupted("rospy shutdown")
+
+    log.configure(session, log_level, session.identity.arguments.special.get("__log"))
+    session.open_node(xmlrpc_port, tcpros_port)
+    _wait_for_master(session)
+    _set_parameters(session, parameters)
+    if not disable_rostime:
+        start_clock()
+    session.has_time = True
+    session.publish_node()
+    log.start(session, rosout=not disable_rosout)
+
+
+def start_clock() -> None:
+    """Follow /clock where the master's /use_sim_time is set. Raises ROSInitException where the master fails."""
+    session = current_session()
+    try:
+        is_simulated = session.master.has_param("/use_sim_time") and session.master.get_param("/use_sim_time")
+    except RpcError as error:
+        raise ROSInitException(f"the master does not tell /use_sim_time: {error}") from error
+    if is_simulated:
+        clock = session.clock = SimulatedClock(changed=session.time_changed)
+        session.when_ready(lambda: _follow_clock_topic(clock))
+
+
+def _check_name(name: str) -> None:
+    if not name:
+        raise ValueError("name must not be empty")
+    if "/" in name:
+        raise ValueError("namespaces are not allowed in node names")
+
+
+def _is_repeated(session: Session, arguments: tuple[object, ...]) -> bool:
+    """Return whether init_node was called before with the same arguments. Raises ROSException where with others."""
+    if session.init_arguments is None:
+        return False
+    if session.init_arguments != arguments:
+        raise ROSException(
+            "rospy.init_node() has already been called with different arguments: "
+            + str(session.init_arguments)
+        )
+    return True
+
+
+def _warn_of_name(name: str) -> None:
+    if not names.is_legal_base_name(name):
+        warnings.warn(
+            f"'{name}' is not a legal ROS base name. This may cause problems with other ROS tools.",
+            stacklevel=4,
+        )
+
+
+def _release_previous(session: Session) -> None:
+    """Remove what the process's previous node has installed, such as its log handlers."""
+    for release in session.on_replaced:
+        release()
+    session.on_replaced.clear()
+
+
+@functools.cache
+def _install_process_hooks() -> None:
+    """Install, once for all sessions of the process, what its exit, its forks and its interrupts need."""
+    suppress_interrupt_tracebacks(lambda: current_session().lifecycle)
+    atexit.register(lambda: current_session().shut_down_at_exit())
+    if sys.platform != "win32":
+        mask: list[set[signal.Signals | int]] = []
+
+        # Python drops a signal that comes to the child before it is set up: Pool.terminate() would wait forever.
+        def block_signals() -> None:
+            mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
+
+        def restore_signals() -> None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask.pop())
+
+        def start_child() -> None:
+            replace_session_in_fork()
+            restore_signals()
+
+        os.register_at_fork(before=block_signals, after_in_parent=restore_signals, after_in_child=start_child)
+
+
+def _wait_for_master(session: Session) -> None:
+    """Wait until the master answers, and print once that it does not. Raises ROSInterruptException at a shutdown."""
+    uri = session.identity.environment.master_uri
+    is_reported = False
+    while not session.lifecycle.is_shutdown_requested:
+        try:
+            session.master.get_pid()
+        except MasterUnreachableError:
+            if not is_reported:
+                print(
+                    f"Unable to register with master node [{uri}]: master may not be running yet. Will keep trying. "
+                    "(Start one with `roscore`.)",
+                    file=sys.stderr,
+                    flush=True,
+                )
+                is_reported = True
+            if wait_for_event(session.lifecycle.shutting_down, _POLL_SECONDS):
+                break
+        except RpcFault:
+            return  # a master that lacks this call, as that of @foxglove/ros1
+        except RpcError as error:
+            raise ROSInitException(f"what answers at {uri} is no ROS master: {error}") from error
+        else:
+            return
+    raise session.lifecycle.interrupted(f"shut down while waiting for the master at {uri}")
+
+
+def _set_parameters(session: Session, parameters: Mapping[str, Any]) -> None:
+    """Set the private parameters of the command line."""
+    for key, value in parameters.items():
+        session.master.set_param(names.resolve("~" + key, session.name), value)
+
+
+def _follow_clock_topic(clock: SimulatedClock) -> None:
+    """Set ``clock`` from /clock (rosgraph_msgs/Clock)."""
+    from rosgraph_msgs.msg import Clock
+
+    def on_clock(message: Any) -> None:
+        clock.set(message.clock.to_nsec())
+
+    Subscriber("/clock", Clock, on_clock, queue_size=1)
