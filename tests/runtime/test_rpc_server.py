@@ -13,7 +13,7 @@ import pytest
 from minirospy.runtime import rpc_server
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.turns import Turns
-from minirospy.wire.http import serialize_request
+from minirospy.wire.http import HttpReader, serialize_request
 from minirospy.wire.xmlrpc import serialize_call
 
 
@@ -155,3 +155,48 @@ def test_who_asks_on_while_a_method_waits_is_not_read_from_meanwhile(last_closes
     answers = asyncio.run(scene())
     assert told == [f"greedy{number}" for number in range(501 if last_closes else 1000)]
     assert last_closes or answers.count(b"HTTP/1.1 200") == 1000
+
+
+def test_a_client_that_does_not_read_its_answers_is_not_read_from() -> None:
+    async def scene() -> None:
+        calls: list[int] = []
+
+        def dispatch(method: str, args: Sequence[Any]) -> str:
+            calls.append(args[0])
+            return "x" * 30_000
+
+        server = RpcServer(dispatch)
+        await server.start()
+        loop = asyncio.get_running_loop()
+        client = socket.socket()
+        client.setblocking(False)
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
+        await loop.sock_connect(client, ("127.0.0.1", server.port))
+
+        # More than the system's buffers take; a server that reads on would take it all.
+        asked = [call("m", number, "x" * 10_000) for number in range(4000)]
+        left = memoryview(b"".join(asked))
+        blocked = 0
+        while left and blocked < 200:
+            try:
+                left = left[client.send(left) :]
+                blocked = 0
+            except BlockingIOError:
+                blocked += 1
+            await asyncio.sleep(0)
+        assert left
+        assert len(calls) < 200
+
+        async def ask_rest() -> None:
+            await loop.sock_sendall(client, left)
+
+        asking = asyncio.ensure_future(ask_rest())
+        reader, answers = HttpReader(), 0
+        while answers < len(asked):
+            answers += len(reader.feed(await loop.sock_recv(client, 65536)))
+        await asking
+        assert calls == list(range(len(asked)))
+        client.close()
+        await server.close()
+
+    asyncio.run(scene())
