@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/ROS/Slave_API. The answers are ``[status code, text,
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from minirospy.runtime.topics import InLink
 
 __all__ = ["SlaveApi"]
+
+_BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
+"""What masters write, rosmaster and ours."""
 
 
 class SlaveApi:
@@ -147,7 +151,14 @@ class SlaveApi:
         return [SUCCESS, f"ready on {host}:{port}", ["TCPROS", host, port]]
 
     def shutdown(self, caller_id: str, reason: str = "") -> Answer:
-        """Stop the node."""
+        """Stop the node.
+
+        A master that bumps a node, since a new one of its name has registered, calls the address of the old one, which may
+        have gone long ago and its port to this node: the reason names the node that is meant.
+        """
+        meant = _BUMPED.fullmatch(reason) if caller_id == "/master" and isinstance(reason, str) else None
+        if meant and meant[1] != self._node.name:
+            return [ERROR, f"this is {self._node.name}", 0]
         self._node.request_shutdown(f"external shutdown request from [{caller_id}]: [{reason}]")
         return [SUCCESS, "shutdown", 0]
 

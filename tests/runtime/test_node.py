@@ -78,6 +78,19 @@ def test_the_slave_api_answers(call: tuple[Any, ...], answer: Any) -> None:
     assert (finish(found) if isinstance(found, Generator) else found) == answer
 
 
+def test_a_node_ignores_a_master_that_bumps_another_node_at_its_address() -> None:
+    node = Node("/node", Environment.read(NO_MASTER))
+    reasons: list[str] = []
+    node.request_shutdown = reasons.append  # type: ignore[method-assign]
+    api = SlaveApi(node)
+    text = "[{}] Reason: new node registered with same name"
+    assert api.dispatch("shutdown", ["/master", text.format("/old")]) == [-1, "this is /node", 0]
+    assert reasons == []
+    assert api.dispatch("shutdown", ["/master", text.format("/node")]) == [1, "shutdown", 0]
+    assert api.dispatch("shutdown", ["/rosnode", text.format("/old")]) == [1, "shutdown", 0]
+    assert len(reasons) == 2
+
+
 def test_a_method_that_is_not_there_is_a_fault() -> None:
     with pytest.raises(RpcFault, match="getNothing"):
         SlaveApi(Node("/node", Environment.read(NO_MASTER))).dispatch("getNothing", ["/me"])
