@@ -182,7 +182,12 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
     finally:
         master.close()
         process.send_signal(signal.SIGINT)
-        process.wait(20)
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            # A real rosmaster whose nodes have just exited.
+            process.kill()
+            process.wait()
 
 
 @contextmanager

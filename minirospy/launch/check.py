@@ -10,11 +10,11 @@ from minirospy.launch.load import Problems, Source, load_sources
 from minirospy.launch.spec import LaunchSpec
 from minirospy.workspace.packages import Packages
 
-__all__ = ["faults_of", "find_problems", "told"]
+__all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[Source], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """What the files say, and every fault: theirs, programs that are missing, machines that nobody declares."""
+    """Return the spec of the files, and every fault: theirs, missing programs, undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():
@@ -27,7 +27,7 @@ def find_problems(sources: Sequence[Source], packages: Packages) -> tuple[Launch
 
 
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
-    """The faults of a launch file.
+    """Return the faults of a launch file.
 
     With ``ignore_unset_args`` there are none where an arg has no value: what else is wrong may follow from that.
     """
@@ -36,7 +36,7 @@ def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False)
     return [] if is_unset and ignore_unset_args else problems
 
 
-def told(problem: LaunchError, kind: str = "error") -> str:
-    """A fault as a line that editors know: FILE:LINE: KIND: TEXT."""
+def problem_line(problem: LaunchError, kind: str = "error") -> str:
+    """Return a fault as a line that editors know: FILE:LINE: KIND: TEXT."""
     where = f"{problem.file}:{problem.line}" if problem.line else problem.file
     return f"{where}: {kind}: {problem.text}"

@@ -66,7 +66,7 @@ class _Child(Launcher):
         self._parent = parent
 
     def methods(self) -> dict[str, Any]:
-        """What the parent may call."""
+        """Return the methods that the parent calls."""
         return {
             "launch": self._launch,
             "shutdown": self._shutdown,
@@ -76,7 +76,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """End where the parent answers no more."""
+        """End where the parent does not answer any more."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

@@ -16,7 +16,7 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
-    """What runs a node's program, its path last. Raises MinirospyError."""
+    """Return the words that run a node's program, its path last. Raises MinirospyError."""
     try:
         return packages.find_executable(node.package, node.type)
     except (NotFoundError, NotExecutableError) as error:
@@ -24,7 +24,7 @@ def node_program(node: NodeSpec, packages: Packages) -> list[str]:
 
 
 def node_command(node: NodeSpec, packages: Packages) -> list[str]:
-    """The command that runs a node, with its name and remappings. Raises MinirospyError."""
+    """Return the command that runs a node, with its name and remappings. Raises MinirospyError."""
     program = node_program(node, packages)
     try:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
@@ -37,7 +37,7 @@ def node_command(node: NodeSpec, packages: Packages) -> list[str]:
 def node_environment(
     node: NodeSpec, environment: Environment, environ: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """The environment of a node's process."""
+    """Return the environment of a node's process."""
     variables = {**(os.environ if environ is None else environ), **dict(node.env)}
     variables["ROS_MASTER_URI"] = environment.master_uri
     export_local(variables)
@@ -50,12 +50,12 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """The folder that a node's process starts in. Raises MinirospyError."""
+    """Return the folder that a node's process starts in. Raises MinirospyError."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """A node's command as `roslaunch --args` prints it, with the variables that it sets. Raises MinirospyError."""
+    """Return a node's command as `roslaunch --args` prints it, with the variables that it sets. Raises MinirospyError."""
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
     if not os.environ.get("ROS_MASTER_URI"):
@@ -65,6 +65,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """A fault of a node, told with its line where a launch file says it."""
-    told = f"node [{node.base_name}]: {text}"
-    return LaunchError(node.file, node.line, told) if node.file else MinirospyError(told)
+    """Return a fault of a node, with file and line where a launch file declares it."""
+    message = f"node [{node.base_name}]: {text}"
+    return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

@@ -28,10 +28,10 @@ class FileNeeds(NamedTuple):
 def file_needs(
     files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
 ) -> dict[str, FileNeeds]:
-    """What each launch file needs, those that they include among them. Raises LaunchError.
+    """Return the needs of each launch file, and of those that they include. Raises LaunchError.
 
     It is no fault where an arg has no value or a file of parameters is missing: that need not be there yet. ``warn``
-    hears of each file that cannot be included.
+    is called for each file that cannot be included.
     """
     sources = []
     for file in files:
@@ -54,7 +54,7 @@ def file_needs(
 
 
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
-    """The packages that launch files need and the package.xml of their package does not name, by package, sorted.
+    """Return the packages that launch files need and the package.xml of their package does not name, by package, sorted.
 
     ``tests``: what it names for tests counts, too. Raises ManifestError.
     """
@@ -70,7 +70,7 @@ def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False)
 
 
 def package_of(file: str) -> str | None:
-    """The package that a file lies in."""
+    """Return the package that a file belongs to."""
     folder = _package_folder(file)
     return package_name(folder) if folder else None
 

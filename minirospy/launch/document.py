@@ -44,7 +44,7 @@ _CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
 @dataclass
 class Element:
-    """A tag as it stands in the file, on ``line``; ``text`` is what it holds beside its children."""
+    """A tag as it is in the file, on ``line``; ``text`` is its text without that of its children."""
 
     tag: str
     attributes: dict[str, str]
@@ -54,7 +54,7 @@ class Element:
 
 
 def parse_document(text: bytes, file: str) -> Element:
-    """The ``<launch>`` of a launch file. Raises LaunchError."""
+    """Return the ``<launch>`` of a launch file. Raises LaunchError."""
     parser = expat.ParserCreate()
     stack: list[Element] = []
     roots: list[Element] = []
@@ -92,7 +92,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An element with what its substitutions stand for: its attributes as values, its faults with their line."""
+    """An element with its substitutions made: its attributes as values, its faults with their line."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -101,36 +101,36 @@ class Tag:
 
     @property
     def name(self) -> str:
-        """What stands behind the ``<``."""
+        """The name behind the ``<``."""
         return self.element.tag
 
     @property
     def line(self) -> int:
-        """The line that it begins on."""
+        """The line that it starts on."""
         return self.element.line
 
     def children(self) -> Iterator[Tag]:
-        """The tags inside."""
+        """Return the tags inside."""
         return (Tag(child, self.file, self._substitution) for child in self.element.children)
 
     def has(self, key: str) -> bool:
-        """Whether an attribute is there, empty or not."""
+        """Return whether an attribute is there, empty or not."""
         return key in self.element.attributes
 
     def resolve(self, text: str) -> str:
-        """A text with its substitutions made. Raises LaunchError."""
+        """Return a text with its substitutions made. Raises LaunchError."""
         try:
             return self._substitution.apply(text)
         except (SubstitutionError, NotFoundError) as error:
             raise self.error(str(error)) from error
 
     def optional(self, key: str) -> str | None:
-        """An attribute, substitutions made; None where it is not there. Raises LaunchError."""
+        """Return an attribute, substitutions made; None where it is not there. Raises LaunchError."""
         text = self.element.attributes.get(key)
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """An attribute that has to be there. Raises LaunchError."""
+        """Return an attribute that has to be there. Raises LaunchError."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -142,7 +142,7 @@ class Tag:
         return text
 
     def flag(self, key: str) -> bool:
-        """An attribute that is true or false (where it is not there). Raises LaunchError."""
+        """Return an attribute that is true or false (where it is not there). Raises LaunchError."""
         text = self.optional(key)
         if text is None:
             return False
@@ -152,7 +152,7 @@ class Tag:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """An attribute that is a number. Raises LaunchError."""
+        """Return an attribute that is a number. Raises LaunchError."""
         text = self.optional(key)
         try:
             return default if text is None else float(text)
@@ -160,14 +160,14 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """An attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
+        """Return an attribute that is one of ``choices`` (the first where it is not there). Raises LaunchError."""
         text = self.optional(key)
         if text is not None and text not in choices:
             raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
         return text or choices[0]
 
     def applies(self) -> bool:
-        """What its ``if`` or ``unless`` says. Raises LaunchError."""
+        """Return the value of its ``if`` or ``unless``. Raises LaunchError."""
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
         for key in ("if", "unless"):
@@ -191,5 +191,5 @@ class Tag:
                 warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
 
     def error(self, text: str) -> LaunchError:
-        """A fault of this tag, to be raised."""
+        """Return a fault of this tag, to be raised."""
         return LaunchError(self.file, self.line, text)

@@ -54,7 +54,7 @@ def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: fl
 
 
 def send(pid: int, name: str) -> bool:
-    """Send a signal to a process group; whether there was one to take it."""
+    """Send a signal to a process group; return whether there was one."""
     if sys.platform == "win32":
         import subprocess
 
@@ -69,7 +69,7 @@ def send(pid: int, name: str) -> bool:
 
 
 def is_running(pid: int) -> bool:
-    """Whether the first process of a group has not ended; one that nobody has buried yet has."""
+    """Return whether the first process of a group runs; a zombie does not."""
     try:
         os.kill(pid, 0)
         with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
@@ -77,7 +77,7 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        # No /proc (macOS), whose first process buries at once.
+        # No /proc (macOS), whose first process reaps zombies immediately.
         return True
 
 

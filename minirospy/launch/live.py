@@ -1,4 +1,4 @@
-"""`roslaunch --ui`: the nodes in a table that is drawn anew, twice a second."""
+"""`roslaunch --ui`: the nodes in a table that is redrawn twice a second."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class LiveTable:
         self._live.__exit__(kind, value, trace)
 
     def rows(self) -> list[Row]:
-        """The nodes as they are now."""
+        """Return the nodes as they are now."""
         return [self._row(process) for process in tuple(self._launcher.processes)]
 
     def _row(self, process: Process) -> Row:
@@ -74,7 +74,7 @@ class LiveTable:
             process.pid,
             cpu,
             memory,
-            time.monotonic() - process.begun,
+            time.monotonic() - process.started,
             process.starts - 1,
             last_line(process.stdout_file),
         )
@@ -84,7 +84,7 @@ class LiveTable:
         with contextlib.suppress(psutil.Error):
             top = psutil.Process(pid)
             for each in (top, *top.children(recursive=True)):
-                # A process is asked for its share since the last time: so it has to be the same object.
+                # psutil reports the share since the last call: so it has to be the same object.
                 known = self._known.setdefault(each.pid, each)
                 with contextlib.suppress(psutil.Error):
                     cpu += known.cpu_percent()
@@ -109,7 +109,7 @@ class LiveTable:
 
 
 def last_line(file: Path | None) -> str:
-    """The last line of a file that is not empty."""
+    """Return the last line of a file that is not empty."""
     if file is None:
         return ""
     try:

@@ -48,7 +48,7 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """What a tag inherits from those around it. ``private``: parameters of every node that follows."""
+    """The settings that a tag inherits from those around it. ``private``: parameters of every node that follows."""
 
     namespace: str = "/"
     remaps: tuple[tuple[str, str], ...] = ()
@@ -97,16 +97,16 @@ def load_sources(
         try:
             reader.read(_read(file) if text is None else text, _Scope())
         except LaunchError as error:
-            reader.tell(error)
+            reader.report(error)
     for name in used:
-        # What is asked for is known, though no <arg> declares it.
+        # An arg that is used is known, though no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
     _check_names(spec, problems)
     return spec
 
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
-    """The launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
+    """Return the launch files that a command line names: PACKAGE FILE, or files. Raises MinirospyError."""
     for word in what:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not Path(word).exists():
@@ -130,7 +130,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
 
 
 def describe_args(file: str) -> list[ArgDoc]:
-    """The arguments that a file declares, without loading what it includes. Raises LaunchError."""
+    """Return the arguments that a file declares, without loading what it includes. Raises LaunchError."""
     root = parse_document(_read(file), file)
     return [
         ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
@@ -140,8 +140,10 @@ def describe_args(file: str) -> list[ArgDoc]:
 
 
 def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
-    """As describe_args(), with the values that the defaults have where ``args`` are given, and without what does not
-    apply. What cannot be resolved stays as it is written. Raises LaunchError."""
+    """Return the same as describe_args(), with the defaults' values where ``args`` are given, and without what does not apply.
+
+    What cannot be resolved stays as it is written. Raises LaunchError.
+    """
     substitution = Substitution(packages, os.environ, file, dict(args))
     found: dict[str, ArgDoc] = {}
     for tag in Tag(parse_document(_read(file), file), file, substitution).children():
@@ -181,7 +183,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 def _near_files(file: str) -> str:
-    """What is said behind a launch file that is not there: those of nearly its name in its folder, else its package."""
+    """Return the hint for a missing launch file: those of a similar name in its folder, else in its package."""
     wanted = Path(file)
     with suppress(OSError, ValueError):
         if wanted.exists():
@@ -202,7 +204,7 @@ def _near_files(file: str) -> str:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """What is said of a package that stands alone: the launch files that it has."""
+    """Return the hint for a package without a file: the launch files that it has."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:
@@ -211,7 +213,7 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _package_with(file: str, packages: Packages) -> str:
-    """What is said of a launch file whose package was not named, or is another one."""
+    """Return the hint for a launch file whose package was not named, or is another one."""
     for package, folder in sorted(packages.folders().items()):
         if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
             return f"; did you mean `roslaunch {package} {file}`?"
@@ -269,7 +271,7 @@ class _File:
         for tag in root.children():
             scope = self._read(tag, scope)
 
-    def tell(self, error: LaunchError) -> None:
+    def report(self, error: LaunchError) -> None:
         """Raise a fault, or collect it where all are wanted."""
         if self._problems is None:
             raise error
@@ -291,7 +293,7 @@ class _File:
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except LaunchError as error:
-            self.tell(error)
+            self.report(error)
             return scope
 
     # --- args, and what structures a file
@@ -373,7 +375,7 @@ class _File:
         for key, name in zip(("from", "to"), pair, strict=True):
             if not names.is_legal_name(names.canonicalize(name)):
                 raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
-        # The last word on a name counts, and stands last.
+        # The last value of a name counts, and comes last.
         others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
         return replace(scope, remaps=(*others, pair))
 
@@ -427,7 +429,7 @@ class _File:
         return scope
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """All names in a node are its own, whatever they begin with."""
+        """All names in a node are its own, whatever they start with."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -493,7 +495,7 @@ class _File:
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
-        """What a ``<node>`` and a ``<test>`` have in common."""
+        """Return the attributes that ``<node>`` and ``<test>`` have in common."""
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
             raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
@@ -535,7 +537,7 @@ class _File:
             if tag.applies():
                 self._param_of_node(tag, full_name)
         except LaunchError as error:
-            self.tell(error)
+            self.report(error)
 
     # --- helpers
 

@@ -1,4 +1,4 @@
-"""What roslaunch itself says: on the terminal with ROS's colours, and into its log file."""
+"""The lines of roslaunch itself: on the terminal with ROS's colours, and in its log file."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ INFO, ERROR = 2, 8
 class Output:
     """Says things on standard output and error; colours and titles where that is a terminal.
 
-    ``listener`` hears (level, text) of each line, too: a roslaunch on another machine passes them to the one that
+    ``listener`` gets (level, text) of each line, too: a roslaunch on another machine passes them to the one that
     started it. ``title``: whether the terminal's title may be set. ``has_color`` is decided when something is said.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """What programs want to hear of all that is said: (level, text) of each line."""
+    """Functions of programs that get (level, text) of each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -39,11 +39,11 @@ class Output:
         self._unlogged: list[str] = []
 
     def say(self, text: str = "", *, bold: bool = False) -> None:
-        """A line on standard output."""
+        """Print a line on standard output."""
         self._write(text, _BOLD if bold else "", INFO)
 
     def warn(self, text: str) -> None:
-        """A line on standard error, in red."""
+        """Print a line on standard error, in red."""
         self._write(text, _RED, ERROR)
 
     def title(self, text: str) -> None:
@@ -67,7 +67,7 @@ class Output:
         stream = sys.stderr if level == ERROR else sys.stdout
         # One write: nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # Who read it (`| head`) may have gone; the nodes are to be ended in order even so.
+        # The reader (`| head`) may have exited; the nodes are ended in order all the same.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()

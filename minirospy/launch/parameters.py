@@ -24,7 +24,7 @@ _WAYS = ("value", "textfile", "binfile", "command")
 
 
 def param_value(tag: Tag) -> Any:
-    """The value of a ``<param>``. Raises LaunchError."""
+    """Return the value of a ``<param>``. Raises LaunchError."""
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
         raise tag.error(f"<param> tag must have one and only one of {'/'.join(_WAYS)}")
@@ -49,7 +49,7 @@ def param_value(tag: Tag) -> Any:
 
 
 def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, Any]]:
-    """Each single parameter that a ``<rosparam>`` loads, and its value. Raises LaunchError."""
+    """Return each single parameter that a ``<rosparam>`` loads, and its value. Raises LaunchError."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
     if tag.flag("subst_value"):
@@ -87,7 +87,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 
 
 def _output_of(tag: Tag, command: str) -> str:
-    """What a command prints; it is no shell that runs it."""
+    """Return the output of a command, which is run without a shell."""
     try:
         done = subprocess.run(shlex.split(command), stdout=subprocess.PIPE, check=False)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Processes that roslaunch starts: begun in groups of their own, ended step by step, and never left behind."""
+"""Processes that roslaunch starts: in process groups of their own, ended step by step, and never left behind."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A process that was started, for ``node`` where it is one. ``starts``: how often it was begun."""
+    """A process that was started, for ``node`` where it is one. ``starts``: how often it was started."""
 
     name: str
     command: Sequence[str]
@@ -43,9 +43,9 @@ class Process:
     log_files: str = ""
     stdout_file: Path | None = None
     starts: int = 1
-    begun: float = field(default_factory=time.monotonic)
+    started: float = field(default_factory=time.monotonic)
     is_ending: bool = False
-    """Somebody asked it to end: its end is no news."""
+    """It was ended on request: its exit is not reported."""
 
     is_restarting: bool = False
     """It is to be started again when it has ended, because its file changed."""
@@ -57,12 +57,12 @@ class Process:
 
     @property
     def exit_code(self) -> int | None:
-        """The exit status, as subprocess tells it; None while it runs."""
+        """The exit status, as in subprocess; None while it runs."""
         return self.popen.poll()
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether it has not exited."""
         return self.popen.poll() is None
 
 
@@ -81,22 +81,22 @@ class Guardian:
         )
 
     def add(self, process: Process) -> None:
-        """A process has begun."""
-        self._tell(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
+        """Note that a process has started."""
+        self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
-        """A process has ended."""
-        self._tell(f"-{process.pid}\n")
+        """Note that a process has exited."""
+        self._write(f"-{process.pid}\n")
 
     def close(self) -> None:
-        """No process is left. Idempotent."""
+        """End the guardian: no process is left. Idempotent."""
         with self._guard, contextlib.suppress(OSError):
             if self._popen.stdin:
                 self._popen.stdin.close()
         self._popen.wait()
 
-    def _tell(self, line: str) -> None:
-        # Without a guardian (somebody killed it) all goes on as it would.
+    def _write(self, line: str) -> None:
+        # Without a guardian (it was killed) all goes on.
         with self._guard, contextlib.suppress(OSError, ValueError):
             assert self._popen.stdin
             self._popen.stdin.write(line.encode())
@@ -114,7 +114,7 @@ def start_process(
     stdin: int | None = subprocess.DEVNULL,
     stdout: int | None = None,
 ) -> Process:
-    """Start a process. What it prints goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
+    """Start a process. Its output goes to ``stdout_file`` (with ``log_errors``: its errors, too), else to ours.
 
     Raises MinirospyError.
     """
@@ -135,7 +135,7 @@ def start_process(
 
 
 def end_processes(
-    processes: Sequence[Process], timeouts: Timeouts, tell: Callable[[str], None]
+    processes: Sequence[Process], timeouts: Timeouts, warn: Callable[[str], None]
 ) -> list[Process]:
     """SIGINT, then SIGTERM, then SIGKILL, each pause over as soon as all have ended; those that SIGKILL ended."""
     steps = (
@@ -151,7 +151,7 @@ def end_processes(
         for process in running:
             process.is_ending = True
             if words:
-                tell(f"[{process.name}] {words}")
+                warn(f"[{process.name}] {words}")
             with contextlib.suppress(OSError):
                 step(process.popen)
         end = time.monotonic() + seconds
@@ -160,14 +160,14 @@ def end_processes(
                 process.popen.wait(max(0.0, end - time.monotonic()))
     if not _WINDOWS:
         for process in processes:
-            # What a node started and left behind, in its group.
+            # Processes that a node started and left behind, in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed
 
 
 def _own_group() -> dict[str, Any]:
-    """Ctrl-C in the terminal reaches roslaunch alone, which ends the nodes in order."""
+    """Return the options of a process that a Ctrl-C in the terminal does not reach: roslaunch ends its nodes in order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}
@@ -202,7 +202,7 @@ def _terminate(popen: subprocess.Popen[bytes]) -> None:
 
 
 def _kill(popen: subprocess.Popen[bytes]) -> None:
-    """The process and all that it started."""
+    """Kill the process and all that it started."""
     import psutil
 
     with contextlib.suppress(psutil.Error):

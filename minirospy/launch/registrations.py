@@ -1,4 +1,4 @@
-"""What nodes leave registered with the master when they die without unregistering: removed by the roslaunch that ran them.
+"""Registrations that dead nodes leave with the master: removed by the roslaunch that ran them.
 
 A program, too: ``python -m minirospy.launch.registrations MASTER_URI NODE ...``, for the guardian of a killed roslaunch.
 """
@@ -20,7 +20,7 @@ from minirospy.runtime.master_proxy import MasterProxy, SystemState
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
 _ANSWER_SECONDS = 1.0
-"""A process of this machine that has exited refuses at once: only one that hangs takes this long."""
+"""A process of this machine that has exited refuses immediately: only one that hangs takes this long."""
 
 _AT_ONCE = 16
 
@@ -78,7 +78,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """``argv``: the master's URI, and the names of the nodes."""
+    """Unregister; ``argv``: the master's URI, and the names of the nodes."""
     unregister_dead(argv[0], argv[1:])
     return 0
 

@@ -1,4 +1,4 @@
-"""Nodes on other machines: a roslaunch there for each, started by ssh, that runs its part and tells how it goes.
+"""Nodes on other machines: a roslaunch there for each, started by ssh, that runs its part and reports what happens.
 
 The calls between the two are those of ROS 1, so that either end may be a real roslaunch: the child calls
 ``register``, ``log`` and ``process_died`` of the parent, the parent ``launch`` and ``shutdown`` of the child.
@@ -36,13 +36,13 @@ _SHUTDOWN_SECONDS = 5.0
 
 
 class Monitor(Protocol):
-    """What the remote part asks of the one that runs it all."""
+    """The services that the remote part needs of the launcher."""
 
     def guard(self, process: Process) -> None:
-        """Have a process ended where we are killed."""
+        """Have a process ended where this one is killed."""
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """A process on another machine has ended."""
+        """Note that a process on another machine has exited."""
 
 
 Method = Callable[..., Any]
@@ -64,7 +64,7 @@ class Api:
         self.uri = f"http://{environment.uri_host}:{self._server.port}/"
 
     def close(self) -> None:
-        """Answer no more. Idempotent."""
+        """Stop answering. Idempotent."""
         with contextlib.suppress(TimeoutError, RuntimeError):
             self._loop.run(self._server.close(), 2.0)
         self._loop.close()
@@ -252,8 +252,8 @@ class RemoteMachines:
         return 1
 
     def _log(self, name: str, level: int, text: str) -> int:
-        tell = self._output.warn if level >= 8 else self._output.say
-        tell(f"[{name}]: {text}")
+        write = self._output.warn if level >= 8 else self._output.say
+        write(f"[{name}]: {text}")
         return 1
 
     def _process_died(self, name: str, code: int) -> int:
@@ -266,5 +266,5 @@ class RemoteMachines:
 
 
 def launch_text(nodes: Sequence[NodeSpec]) -> str:
-    """A launch file with these nodes, for the roslaunch that runs them."""
+    """Return a launch file with these nodes, for the roslaunch that runs them."""
     return "\n".join(["<launch>", *(node.to_xml() for node in nodes), "</launch>", ""])

@@ -325,7 +325,7 @@ class Launcher:
 
     @contextlib.contextmanager
     def signals(self) -> Iterator[None]:
-        """SIGINT, SIGTERM and SIGHUP ask all to stop, meanwhile (in the main thread)."""
+        """Let SIGINT, SIGTERM and SIGHUP stop the run, meanwhile (in the main thread)."""
 
         def on_signal(number: int, _: FrameType | None) -> None:
             self.stop(signal.Signals(number).name)
@@ -340,7 +340,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Whether a machine is the one that this runs on, and its user this one."""
+    """Return whether a machine is this one, and its user the present one."""
     if machine.user:
         import getpass
 

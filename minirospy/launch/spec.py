@@ -1,4 +1,4 @@
-"""What launch files say, when all substitutions are done."""
+"""The contents of launch files, with all substitutions made."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class NodeSpec:
         return self.name.rpartition("/")[0] + "/"
 
     def to_xml(self) -> str:
-        """The ``<node>`` of a launch file that says the same; its machine is left out."""
+        """Return the equivalent ``<node>`` of a launch file; its machine is left out."""
         # Not above: it costs more than all else that this room imports.
         from xml.sax.saxutils import quoteattr
 
@@ -130,12 +130,12 @@ class LaunchSpec:
     warnings: list[LaunchError] = field(default_factory=list)
 
     def runnables(self) -> Iterator[NodeSpec]:
-        """The nodes, and those that are tests."""
+        """Return the nodes, and those that are tests."""
         yield from self.nodes
         yield from (test.node for test in self.tests)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """The machine that a node is to run on; None is this one. Raises LaunchError."""
+        """Return the machine that a node is to run on; None is this one. Raises LaunchError."""
         name = node.machine or self.default_machine
         if name in ("", "localhost"):
             return None

@@ -36,9 +36,9 @@ class SubstitutionError(ValueError):
 
 @dataclass
 class Substitution:
-    """What the substitutions of one file stand for.
+    """The values of the substitutions of one file.
 
-    ``used``: every arg that was asked for, in any file. ``unset``: args that are declared without a value, and why
+    ``used``: every arg that was used, in any file. ``unset``: args that are declared without a value, and why
     that is an error where they are used.
     """
 
@@ -105,7 +105,7 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """The text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
+        """Return the text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
         if "__" in expression:
             raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
         functions: dict[str, Any] = {
@@ -142,7 +142,7 @@ class _Names(dict[str, Any]):
 
 
 def convert(text: str, type_: str) -> Any:
-    """A parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
+    """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
     kind = type_.lower()
     if kind in ("", "auto"):
         return _guess(text)

@@ -1,4 +1,4 @@
-"""What roslaunch shows before it starts anything."""
+"""The summary that roslaunch shows before it starts anything."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _LONGEST = 20
 
 
 def summary(nodes: Iterable[NodeSpec], params: Mapping[str, Any], clear: Iterable[str]) -> str:
-    """The text between SUMMARY and the first process."""
+    """Return the text between SUMMARY and the first process."""
     lines = ["", "SUMMARY", "========", ""]
     cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
     if cleared:

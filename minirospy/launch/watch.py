@@ -20,14 +20,14 @@ class FileWatch:
         self._seen: dict[str, dict[Path, int]] = {}
 
     def add(self, node: NodeSpec) -> None:
-        """From now on a change counts."""
+        """Watch the files of a node from now on."""
         self._seen[node.name] = self._times(node)
 
     def changed(self, node: NodeSpec) -> Path | None:
-        """A file that has changed since the node was added, or since this was last asked."""
+        """Return a file that has changed since the node was added, or since the last call."""
         before, now = self._seen.get(node.name, {}), self._times(node)
         self._seen[node.name] = now
-        # A file that is gone is most often being written anew.
+        # A file that is missing is most often being rewritten.
         return next((path for path, when in now.items() if before.get(path) != when), None)
 
     def _times(self, node: NodeSpec) -> dict[Path, int]:

@@ -237,7 +237,7 @@ class OutLink:
         self._post(self._start_writing)
 
     def _may_stay(self) -> bool:
-        """Whether this thread may wait a moment: it is not the loop's, and the peer answers in microseconds."""
+        """Return whether this thread may wait a moment: it is not the loop's, and the peer answers in microseconds."""
         return self._is_near and threading.get_ident() != self._loop_thread
 
     def _gather(self, buffers: list[bytes | memoryview]) -> int:
@@ -458,7 +458,7 @@ class _Source:
         return SplitFrame(head, tail)
 
     def _take(self, count: int) -> bytes:
-        """Exactly ``count`` bytes. Raises _Ended, OSError."""
+        """Return exactly ``count`` bytes. Raises _Ended, OSError."""
         if not self._rest:
             data = self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
             if len(data) == count:

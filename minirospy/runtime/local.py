@@ -34,7 +34,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """What is the same for two processes if, and only if, abstract sockets join them; "" where there are none."""
+    """Return what is the same for two processes if, and only if, abstract sockets join them; "" where there are none."""
     if sys.platform != "linux":
         return ""
     try:
@@ -45,13 +45,13 @@ def this_host() -> str:
 
 
 def name_of(host: str, port: int) -> str:
-    """The name of the socket beside ``port`` of a server that is known as ``host``."""
+    """Return the name of the socket beside ``port`` of a server that is known as ``host``."""
     host = host.strip("[]").lower()
     return f"{_PREFIX}{'127.0.0.1' if host == 'localhost' else host}:{port}"
 
 
 def bind(host: str, port: int) -> socket.socket | None:
-    """The socket beside ``port`` of a server that is known as ``host``; None where there can be none."""
+    """Return the socket beside ``port`` of a server that is known as ``host``; None where there can be none."""
     if sys.platform != "linux":
         return None
     try:
@@ -61,12 +61,12 @@ def bind(host: str, port: int) -> socket.socket | None:
 
 
 def connect(name: str) -> socket.socket:
-    """A connected, non-blocking socket; a Unix socket needs no waiting. Raises OSError."""
+    """Return a connected, non-blocking socket; a Unix socket needs no waiting. Raises OSError."""
     return _open(name, lambda sock, address: sock.connect(address))
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """A connected, non-blocking socket to what ``host`` serves at ``port``; None where only TCP leads there.
+    """Return a connected, non-blocking socket to what ``host`` serves at ``port``; None where only TCP leads there.
 
     Others of this machine could take a name before its server does: so the server is this user's or root's.
     """
@@ -84,7 +84,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: Any) -> UnixAddress | None:
-    """The address out of a publisher's answer to requestTopic; None where it is of another protocol."""
+    """Return the address out of a publisher's answer to requestTopic; None where it is of another protocol."""
     match answer:
         # Any other socket of this machine is not for a peer to choose: it is a display's, a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
@@ -94,7 +94,7 @@ def parse_answer(answer: Any) -> UnixAddress | None:
 
 
 def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.socket:
-    """A non-blocking socket, bound or connected to ``name``. Raises OSError."""
+    """Return a non-blocking socket, bound or connected to ``name``. Raises OSError."""
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)

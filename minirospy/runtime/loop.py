@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
-    """A loop that can watch plain sockets, on every OS (Windows' default loop cannot)."""
+    """Return a loop that can watch plain sockets, on every OS (Windows' default loop cannot)."""
     return asyncio.SelectorEventLoop()
 
 
@@ -51,7 +51,7 @@ class LoopThread:
         return self.begin(coroutine)(timeout)
 
     def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[float | None], _T]:
-        """The first half of :meth:`run`: coroutines begin in the order of these calls. What is returned waits."""
+        """Return the first half of :meth:`run`: coroutines begin in the order of these calls. What is returned waits."""
         if threading.current_thread() is self._thread:
             coroutine.close()
             raise RuntimeError("a blocking call on the event loop's thread would wait for itself")

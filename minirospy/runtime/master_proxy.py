@@ -36,7 +36,7 @@ class BusConnection(NamedTuple):
 
 
 def unwrap(method: str, answer: Any) -> Any:
-    """The value of a ROS API answer. Raises RpcRefused where its status is not 1."""
+    """Return the value of a ROS API answer. Raises RpcRefused where its status is not 1."""
     match answer:
         case [1, _, value]:
             return value
@@ -77,7 +77,7 @@ class MasterProxy:
         self._client.close()
 
     def is_online(self) -> bool:
-        """Whether it answers."""
+        """Return whether it answers."""
         try:
             self.get_pid()
         except MasterUnreachableError:
@@ -85,15 +85,15 @@ class MasterProxy:
         return True
 
     def get_pid(self) -> int:
-        """The master's process id."""
+        """Return the master's process id."""
         return int(self.call("getPid"))
 
     def get_uri(self) -> str:
-        """The URI that the master tells of itself."""
+        """Return the URI that the master tells of itself."""
         return str(self.call("getUri"))
 
     def lookup_node(self, name: str) -> str:
-        """The URI of a node's Slave API."""
+        """Return the URI of a node's Slave API."""
         return str(self.call("lookupNode", name))
 
     def get_published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
@@ -101,7 +101,7 @@ class MasterProxy:
         return [(topic, type_) for topic, type_ in self.call("getPublishedTopics", subgraph)]
 
     def get_topic_types(self) -> dict[str, str]:
-        """The type of each topic that the master knows."""
+        """Return the type of each topic that the master knows."""
         return dict(self.call("getTopicTypes"))
 
     def get_system_state(self) -> SystemState:
@@ -109,7 +109,7 @@ class MasterProxy:
         return SystemState(*(dict(table) for table in self.call("getSystemState")))
 
     def lookup_service(self, name: str) -> str:
-        """The URI (rosrpc://host:port) of a service."""
+        """Return the URI (rosrpc://host:port) of a service."""
         return str(self.call("lookupService", name))
 
     def register_publisher(self, topic: str, type_: str, caller_api: str) -> list[str]:
@@ -137,7 +137,7 @@ class MasterProxy:
         return int(self.call("unregisterService", name, service_api))
 
     def get_param(self, key: str) -> Any:
-        """A parameter, or a dictionary of those below ``key``."""
+        """Return a parameter, or a dictionary of those below ``key``."""
         return self.call("getParam", key)
 
     def set_param(self, key: str, value: Any) -> None:
@@ -145,7 +145,7 @@ class MasterProxy:
         self.call("setParam", key, value)
 
     def has_param(self, key: str) -> bool:
-        """Whether a parameter or namespace is set."""
+        """Return whether a parameter or namespace is set."""
         return bool(self.call("hasParam", key))
 
     def delete_param(self, key: str) -> None:
@@ -153,14 +153,14 @@ class MasterProxy:
         self.call("deleteParam", key)
 
     def search_param(self, key: str) -> str | None:
-        """The nearest parameter of this name, upwards from the caller's namespace; None where there is none."""
+        """Return the nearest parameter of this name, upwards from the caller's namespace; None where there is none."""
         try:
             return str(self.call("searchParam", key))
         except RpcRefused:
             return None
 
     def get_param_names(self) -> list[str]:
-        """The names of all parameters."""
+        """Return the names of all parameters."""
         return list(self.call("getParamNames"))
 
     def subscribe_param(self, caller_api: str, key: str) -> Any:
@@ -189,11 +189,11 @@ class SlaveProxy:
         self._client.close()
 
     def get_pid(self) -> int:
-        """The node's process id."""
+        """Return the node's process id."""
         return int(self.call("getPid"))
 
     def get_bus_info(self) -> list[BusConnection]:
-        """The node's connections."""
+        """Return the node's connections."""
         return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
 
     def get_bus_stats(self) -> list[Any]:
@@ -201,7 +201,7 @@ class SlaveProxy:
         return list(self.call("getBusStats"))
 
     def get_master_uri(self) -> str:
-        """The master that the node registered with."""
+        """Return the master that the node registered with."""
         return str(self.call("getMasterUri"))
 
     def shutdown(self, reason: str = "") -> None:
@@ -217,5 +217,5 @@ class SlaveProxy:
         return [(topic, type_) for topic, type_ in self.call("getPublications")]
 
     def request_topic(self, topic: str, protocols: list[list[Any]]) -> list[Any]:
-        """Where the topic is found, as [protocol, host, port]."""
+        """Return where the topic is found, as [protocol, host, port]."""
         return list(self.call("requestTopic", topic, protocols))

@@ -266,7 +266,7 @@ class Node:
         tcp_nodelay: bool = False,
         on_loop: bool = False,
     ) -> Subscription:
-        """A :class:`Subscription` for this node, for :meth:`subscribe`."""
+        """Return a :class:`Subscription` for this node, for :meth:`subscribe`."""
         return Subscription(
             topic,
             type_,
@@ -303,7 +303,7 @@ class Node:
     def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
     ) -> ServiceServer:
-        """A :class:`ServiceServer` for this node, for :meth:`serve`."""
+        """Return a :class:`ServiceServer` for this node, for :meth:`serve`."""
         return ServiceServer(
             name,
             type_,
@@ -448,7 +448,7 @@ class Node:
                 self._known.pop(key, None)
 
     def _wanted(self, key: _Key) -> _Part | None:
-        """What the master is to have of one name."""
+        """Return what the master is to have of one name."""
         kind, name = key
         return None if self._closed else self._tables[kind].get(name)
 

@@ -100,7 +100,7 @@ class ServiceClient:
             raise
 
     def call(self, request: bytes) -> bytes:
-        """The response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
         if self._is_asked:
             self._is_asked = False
         else:
@@ -114,7 +114,7 @@ class ServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Whether the server has hung up: a request that is sent now would not be read."""
+        """Return whether the server has hung up: a request that is sent now would not be read."""
         # Nothing comes unasked: what can be read is the end. A poll object of its own, since each call looks.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
@@ -155,7 +155,7 @@ def parse_service_uri(uri: str) -> tuple[str, int]:
 
 
 def checked(length: int) -> int:
-    """The length of a request or response, where it is allowed. Raises WireError."""
+    """Return the length of a request or response, where it is allowed. Raises WireError."""
     if length > MAX_FRAME:
         raise WireError(f"a body of {length} bytes is over the limit of {MAX_FRAME}")
     return length
@@ -199,7 +199,7 @@ class Reader:
         return data[:count]
 
     def _some(self, count: int, flags: int = 0) -> bytes:
-        """Up to so many bytes; none where the peer has ended."""
+        """Return up to so many bytes; none where the peer has ended."""
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
@@ -221,7 +221,7 @@ class Reader:
 
 
 def _connected(address: tuple[str, int], timeout: float, *, nearby: bool) -> socket.socket:
-    """A tuned blocking socket. Raises OSError."""
+    """Return a tuned blocking socket. Raises OSError."""
     near = local.reach(*address) if nearby else None
     if near:
         near.settimeout(timeout)

@@ -255,7 +255,7 @@ class AsyncServiceClient:
         return cls(sock, header)
 
     async def call(self, request: bytes) -> bytes:
-        """The response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
+        """Return the response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
         await asyncio.get_running_loop().sock_sendall(self._sock, LENGTH.pack(len(request)) + request)
         ok, length = ANSWER.unpack(await _receive(self._sock, ANSWER.size))
         body = await _receive(self._sock, checked(length))
@@ -264,7 +264,7 @@ class AsyncServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Whether the server has hung up: a request that is sent now would not be read."""
+        """Return whether the server has hung up: a request that is sent now would not be read."""
         return sockets.is_readable(self._sock)
 
     def close(self) -> None:
@@ -292,7 +292,7 @@ async def _receive_length(sock: socket.socket) -> int:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Exactly ``count`` bytes, on the loop. Raises WireError where the peer ends before."""
+    """Return exactly ``count`` bytes, on the loop. Raises WireError where the peer ends before."""
     loop = asyncio.get_running_loop()
     buffer = bytearray(count)
     at = 0

@@ -67,7 +67,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """A host's name as a resolver takes it. Raises OSError where it can be nobody's.
+    """Return a host's name as a resolver takes it. Raises OSError where it can be nobody's.
 
     A str would have the resolver import the IDNA codec, which takes a command a tenth of its time.
     """
@@ -89,14 +89,14 @@ def hang_up(sock: socket.socket) -> None:
 
 
 def is_readable(sock: socket.socket) -> bool:
-    """Whether a read would not wait. poll, since select fails on descriptors above 1023."""
+    """Return whether a read would not wait. poll, since select fails on descriptors above 1023."""
     if hasattr(select, "poll"):
         return bool(_poll(sock, select.POLLIN).poll(0))
     return bool(select.select([sock], [], [], 0)[0])
 
 
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Whether the socket takes something within so long; first it is looked at awake, as in expect_answer."""
+    """Return whether the socket takes something within so long; first it is looked at awake, as in expect_answer."""
     if hasattr(select, "poll"):
         return (may_expect(sock) and _expect(sock, select.POLLOUT)) or bool(
             _poll(sock, select.POLLOUT).poll(milliseconds)
@@ -115,7 +115,7 @@ def expect_answer(sock: socket.socket) -> None:
 
 
 def may_expect(sock: socket.socket) -> bool:
-    """Whether the peer is another process of this machine, at a Unix socket; one of this process needs the interpreter."""
+    """Return whether the peer is another process of this machine, at a Unix socket; one of this process needs the interpreter."""
     return sys.platform == "linux" and sock.family == socket.AF_UNIX and peer(sock).process != os.getpid()
 
 

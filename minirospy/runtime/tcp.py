@@ -40,7 +40,7 @@ _log = logging.getLogger(__name__)
 
 
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
-    """A socket that is bound to an address of this machine; port 0 takes a free one, out of ``ports`` if given.
+    """Return a socket that is bound to an address of this machine; port 0 takes a free one, out of ``ports`` if given.
 
     Raises OSError.
     """
@@ -56,7 +56,7 @@ def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
 
 
 async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECONDS) -> socket.socket:
-    """A connected, non-blocking socket. Raises OSError, also where the time is up."""
+    """Return a connected, non-blocking socket. Raises OSError, also where the time is up."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
     with _time_limit(f"looking for the address of {host}"):
@@ -79,7 +79,7 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
 
 
 async def receive_header(sock: socket.socket, timeout: float = sockets.HANDSHAKE_SECONDS) -> Header:
-    """The peer's connection header. Raises WireError or OSError."""
+    """Return the peer's connection header. Raises WireError or OSError."""
     at_hand = _header_at_hand(sock)
     if at_hand is not None:
         return at_hand
@@ -252,7 +252,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, Any]]:
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """A header that has come as a whole, as that of one who has just connected mostly has: no task, no timer."""
+    """Return a header that has come as a whole, as that of one who has just connected mostly has: no task, no timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):

@@ -378,7 +378,7 @@ class Subscription:
         return InLink(uri, address, sock, header)
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
-        """A socket that is connected to the publisher which gave this answer, and its address."""
+        """Return a socket that is connected to the publisher which gave this answer, and its address."""
         nearby = local.parse_answer(answer) if self._this_host else None
         if nearby:
             with contextlib.suppress(OSError):

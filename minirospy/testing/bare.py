@@ -27,7 +27,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Ctrl-C sets the event meanwhile. An exception could come just when a process has begun, and leave it behind."""
+    """Let Ctrl-C set the event meanwhile. An exception could come just when a process has started, and leave it behind."""
     noted = SignalSafeEvent()
     before = signal.signal(signal.SIGINT, lambda *_: noted.set())
     try:
@@ -55,13 +55,13 @@ def run_bare(
     results_file.unlink(missing_ok=True)
     command = [sys.executable, str(file)] if file.suffix == ".py" else [str(file.absolute())]
     command += [*arguments, f"{XML_OUTPUT_FLAG}{results_file}", *(["--text"] if text else [])]
-    begun = time.perf_counter()
+    started = time.perf_counter()
     try:
         status = _run(command, seconds)
     except OSError as error:
         case.add_failure(_failure(f"test [{name}] cannot be run: {error}"))
         return Result(""), case
-    case.time = time.perf_counter() - begun
+    case.time = time.perf_counter() - started
     if status is None:
         case.add_error(TestError("TestTimeoutException", f"test max time allotted: {seconds:g} s"))
     elif text:
@@ -76,7 +76,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """The exit status; None where the time was over. Raises MinirospyError at Ctrl-C."""
+    """Return the exit status; None after the time limit. Raises MinirospyError at Ctrl-C."""
     with interrupt_noted() as interrupted, subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:

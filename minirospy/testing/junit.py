@@ -38,7 +38,7 @@ _RED, _GREEN = "1;31", "32"
 
 
 class TestInfo:
-    """What went wrong in a test case: the exception's name, and its text with the lines that led there."""
+    """The fault of a test case: the exception's name, and its text with the lines that led there."""
 
     kind: ClassVar[str] = ""
     word: ClassVar[str] = ""
@@ -48,13 +48,13 @@ class TestInfo:
         self.text = text
 
     def xml_element(self) -> ElementTree.Element:
-        """The element of a test case."""
+        """Return the element of a test case."""
         element = ElementTree.Element(self.kind, {"type": self.type})
         element.text = filter_nonprintable_text(self.text)
         return element
 
     def xml(self) -> bytes:
-        """The element as text."""
+        """Return the element as text."""
         return ElementTree.tostring(self.xml_element())
 
 
@@ -85,12 +85,12 @@ class TestCaseResult:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing went wrong."""
+        """Whether all cases passed."""
         return not self.errors and not self.failures
 
     @property
     def description(self) -> str:
-        """What the summary says of it."""
+        """The word for it in the summary."""
         if self.passed:
             return f"[{self.name}][passed]\n"
         return "".join(
@@ -100,7 +100,7 @@ class TestCaseResult:
 
     @property
     def line(self) -> str:
-        """What is printed when it has run."""
+        """The text that is printed when it has run."""
         lines = [f"[Testcase: {self.name}] ... ok"]
         for info in (*self.failures, *self.errors):
             lines[0] = f"[Testcase: {self.name}] ... {info.word}!"
@@ -116,7 +116,7 @@ class TestCaseResult:
         self.failures.append(failure)
 
     def xml_element(self) -> ElementTree.Element:
-        """The element of a test suite."""
+        """Return the element of a test suite."""
         attributes = {"classname": self.classname, "name": self.name, "time": f"{self.time:.4f}"}
         element = ElementTree.Element("testcase", attributes)
         if self.skipped is not None:
@@ -125,7 +125,7 @@ class TestCaseResult:
         return element
 
     def xml(self) -> bytes:
-        """The element as text."""
+        """Return the element as text."""
         return ElementTree.tostring(self.xml_element())
 
 
@@ -165,7 +165,7 @@ class Result:
         self.time += case.time
 
     def xml_element(self) -> ElementTree.Element:
-        """The root of a file."""
+        """Return the root of a file."""
         attributes = {
             "errors": str(self.num_errors),
             "failures": str(self.num_failures),
@@ -180,7 +180,7 @@ class Result:
         return suite
 
     def xml(self) -> bytes:
-        """The file's text."""
+        """Return the file's text."""
         text: bytes = ElementTree.tostring(self.xml_element(), encoding="utf-8", xml_declaration=True)
         return text
 
@@ -196,7 +196,7 @@ class Result:
 
 
 def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
-    """The results in a file, its cases named ``package.rosunit-name/case``; empty, and said so, where it does not read."""
+    """Return the results in a file, its cases named ``package.rosunit-name/case``; empty, with a warning, on a bad file."""
     path = Path(test_file)
     if not path.is_file():
         print(f"WARN: cannot read test result file [{test_file}]: test file does not exist")
@@ -216,7 +216,7 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
 
 
 def read_all(filter_: Sequence[str] = ()) -> Result:
-    """The results below the folder of results, of the packages in ``filter_`` or of all; not those of rostest itself."""
+    """Return the results below the folder of results, of the packages in ``filter_`` or of all; not those of rostest itself."""
     from minirospy.workspace.folders import results_dir
 
     root = Path(results_dir())
@@ -253,22 +253,22 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
 
 
 def headline(text: str) -> str:
-    """A text with a line behind it."""
+    """Return a text with a line appended."""
     return text.ljust(_WIDTH, "-")
 
 
 def coloured(text: str, colour: str) -> str:
-    """A text in the colour of a terminal's code."""
+    """Return a text in the colour of a terminal's code."""
     return f"\x1b[{colour}m{text}\x1b[0m"
 
 
 def names_of(infos: Iterable[tuple[object, str]]) -> list[str]:
-    """The names of the tests in unittest's list of errors or failures."""
+    """Return the names of the tests in unittest's list of errors or failures."""
     return [str(getattr(test, "_testMethodName", test)) for test, _ in infos]
 
 
 def report(results: Result, runner_name: str, errors: int = 0, failed: Sequence[str] = ()) -> str:
-    """What is said of each case, and the counts.
+    """Return a line for each case, and the counts.
 
     ``errors`` and ``failed`` are those of the runner itself: tests that could not say how they went.
     """
@@ -299,7 +299,7 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
 
 
 def filter_nonprintable_text(text: str) -> str:
-    """The text with what XML cannot hold written as ``&#x001B;``."""
+    """Return the text with what XML cannot hold written as ``&#x001B;``."""
     return _NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 
@@ -310,7 +310,7 @@ def failure_junit_xml(
     class_name: str = "Results",
     testcase_name: str = "test_ran",
 ) -> bytes:
-    """A file that says that a test failed, for one that could not say so itself."""
+    """Return a file that says that a test failed, for one that could not say so itself."""
     suite, case = _single(test_name, 1, class_name, testcase_name)
     ElementTree.SubElement(case, "failure", {"message": message, "type": ""})
     if stdout is not None:
@@ -320,7 +320,7 @@ def failure_junit_xml(
 
 
 def success_junit_xml(test_name: str, class_name: str = "Results", testcase_name: str = "test_ran") -> bytes:
-    """A file that says that a test passed."""
+    """Return a file that says that a test passed."""
     return ElementTree.tostring(_single(test_name, 0, class_name, testcase_name)[0])
 
 

@@ -1,4 +1,4 @@
-"""What a test asks of the graph, and runs itself with; ``import rostest`` re-exports this.
+"""The functions by which a test queries the graph and runs; ``import rostest`` re-exports this.
 
 Source: http://wiki.ros.org/rostest/Writing, http://wiki.ros.org/rospy/Overview.
 """
@@ -59,17 +59,17 @@ def unitrun(
 
 
 def get_master() -> MasterProxy:
-    """The master that the environment names."""
+    """Return the master that the environment names."""
     return MasterProxy(Environment.read(host="localhost").master_uri, _CALLER_ID)
 
 
 def is_publisher(topic: str, publisher_id: str) -> bool:
-    """Whether a node publishes a topic, both by their full names."""
+    """Return whether a node publishes a topic, both by their full names."""
     return publisher_id in _state().publishers.get(topic, ())
 
 
 def is_subscriber(topic: str, subscriber_id: str) -> bool:
-    """Whether a node subscribes to a topic, both by their full names."""
+    """Return whether a node subscribes to a topic, both by their full names."""
     return subscriber_id in _state().subscribers.get(topic, ())
 
 

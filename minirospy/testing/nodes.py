@@ -35,7 +35,7 @@ def main(name: str) -> None:
 
 
 class _NodeTest(unittest.TestCase):
-    """What the tests share: a node, and its private parameters."""
+    """The common part of the tests: a node, and its private parameters."""
 
     node: str
 
@@ -43,12 +43,12 @@ class _NodeTest(unittest.TestCase):
         rospy.init_node(self.node)
 
     def require(self, holds: bool, text: str) -> None:
-        """The test fails, with this text, where it does not hold."""
+        """Fail the test with this text where the condition does not hold."""
         if not holds:
             self.fail(text)
 
     def param(self, name: str, default: Any = _UNSET) -> Any:
-        """A private parameter; the test fails where it has neither value nor default."""
+        """Return a private parameter; the test fails where it has neither value nor default."""
         value = rospy.get_param(f"~{name}", None)
         if value is None and default is _UNSET:
             self.fail(
@@ -57,14 +57,14 @@ class _NodeTest(unittest.TestCase):
         return default if value is None else value
 
     def seconds(self, name: str, default: Any = _UNSET) -> float:
-        """A private parameter that is a time."""
+        """Return a private parameter that is a time."""
         value = self.param(name, default)
         if not isinstance(value, int | float) or isinstance(value, bool) or value < 0:
             self.fail(f"bad parameter ({name}): [{value}] is no number of seconds")
         return float(value)
 
     def listed(self, name: str) -> list[dict[str, Any]]:
-        """A private parameter that is a list of dictionaries, each with a name."""
+        """Return a private parameter that is a list of dictionaries, each with a name."""
         value = self.param(name, [])
         if not isinstance(value, list) or not all(
             isinstance(each, dict) and each.get("name") for each in value
@@ -140,16 +140,16 @@ class PublishTest(_NodeTest):
             event = threading.Event()
             rospy.Subscriber(topic, rospy.AnyMsg, lambda _, event=event: event.set())
             waiting.append((topic, timeout, negative, event))
-        begun = time.monotonic()
+        started = time.monotonic()
         for topic, timeout, negative, event in waiting:
-            is_published = event.wait(max(0.0, begun + timeout - time.monotonic()))
+            is_published = event.wait(max(0.0, started + timeout - time.monotonic()))
             self.require(
                 is_published != negative, f"Topic [{topic}] is {'' if is_published else 'not '}published"
             )
 
 
 class _GraphTest(_NodeTest):
-    """What the master is asked again and again."""
+    """Conditions for which the master is polled."""
 
     def setUp(self) -> None:
         super().setUp()
@@ -157,17 +157,17 @@ class _GraphTest(_NodeTest):
         self.addCleanup(self.master.close)
 
     def check(
-        self, parameter: str, known: Callable[[SystemState], Container[str]], told: str
+        self, parameter: str, known: Callable[[SystemState], Container[str]], text: str
     ) -> list[dict[str, Any]]:
         """Wait for each name of a list, the shortest timeout first; those that came."""
-        begun = time.monotonic()
+        started = time.monotonic()
         came = []
         for name, timeout, negative, each in self.limits(parameter):
             while not (is_there := name in known(self.master.get_system_state())):
-                if time.monotonic() - begun > timeout:
+                if time.monotonic() - started > timeout:
                     break
                 time.sleep(_POLL_SECONDS)
-            self.require(is_there != negative, told.format(name, "" if is_there else "not "))
+            self.require(is_there != negative, text.format(name, "" if is_there else "not "))
             if is_there:
                 came.append(each)
         return came
@@ -194,7 +194,7 @@ class AdvertiseTest(_GraphTest):
 
 
 class SubscribeTest(_GraphTest):
-    """Somebody subscribes: ~topics, a list of {name, timeout (s), negative}."""
+    """Check that topics are subscribed to: ~topics, a list of {name, timeout (s), negative}."""
 
     node = "subscribetest"
 

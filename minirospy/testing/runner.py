@@ -69,12 +69,12 @@ class RosTest:
         for name, tests in sorted(by_name.items()):
             case = TestCaseResult(f"test{name}")
             case.classname = _CLASS
-            begun = time.perf_counter()
+            started = time.perf_counter()
             if len(tests) > 1:
                 case.add_failure(_failure(f"Duplicate tests named [{name}] in rostest suite"))
             else:
                 self._run(tests[0], case)
-            case.time = time.perf_counter() - begun
+            case.time = time.perf_counter() - started
             self._finish(case)
             if self.is_interrupted:
                 return
@@ -110,7 +110,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once, and say in ``case`` what went wrong besides its own results."""
+        """Run a test once, and record in ``case`` the faults that are not in its own results."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
@@ -174,7 +174,7 @@ class RosTest:
 
     @contextlib.contextmanager
     def _master(self) -> Iterator[Environment]:
-        """The environment with the master that the test uses."""
+        """Provide the environment with the master that the test uses."""
         if self.reuse_master:
             master = MasterProxy(self.environment.master_uri, "/rostest")
             try:
@@ -212,7 +212,7 @@ class RosTest:
         return Path(xml_results_file(self.package, test.test_name, False, place))
 
     def _last_lines(self, test: TestSpec) -> str:
-        """The end of what a test printed."""
+        """Return the end of what a test printed."""
         stem = test.node.name.lstrip("/").replace("/", "-")
         folder = self.environment.log_dir / self.run_id
         files = sorted(folder.glob(f"{stem}-*-stdout.log"), key=os.path.getmtime)

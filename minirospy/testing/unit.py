@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# Whose lines tell nothing of what went wrong.
+# Modules whose lines say nothing about a fault.
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]
@@ -85,7 +85,7 @@ def unitrun(
 def create_xml_runner(
     test_pkg: str, test_name: str, results_file: str | None = None, is_rostest: bool = False
 ) -> XMLTestRunner:
-    """A runner that writes ``results_file``, or the file that rosunit's rules name."""
+    """Return a runner that writes ``results_file``, or the file that rosunit's rules name."""
     file = Path(results_file or xml_results_file(test_pkg, test_name, is_rostest))
     begin_results(file)
     return XMLTestRunner(file)
@@ -101,14 +101,14 @@ def begin_results(file: Path) -> None:
 def xml_results_file(
     test_pkg: str, test_name: str, is_rostest: bool = False, env: Mapping[str, str] | None = None
 ) -> str:
-    """The file for the results of a test: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
+    """Return the file for the results of a test: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
     return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")
 
 
 def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
-    """The name of a test file's results: ``test/hz.test`` in its package is ``test_hz``."""
+    """Return the name of a test file's results: ``test/hz.test`` in its package is ``test_hz``."""
     name = (
         test_file.removeprefix(pkg_dir).removeprefix(os.sep) if test_file.startswith(pkg_dir) else test_file
     )
@@ -147,10 +147,10 @@ class XMLTestRunner:
     def run(self, test: unittest.TestSuite | unittest.TestCase) -> unittest.TestResult:
         """Run; the result counts as unittest's own."""
         result = _Recorder(sys.stdout)
-        begun = time.perf_counter()
+        started = time.perf_counter()
         with _captured() as (out, err):
             test(result)
-        result.shown.time = time.perf_counter() - begun
+        result.shown.time = time.perf_counter() - started
         shown = result.shown
         shown.num_tests = result.testsRun
         shown.num_errors = len(result.errors)
@@ -240,7 +240,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """The name of an exception, and its text with the lines that led there, without those of unittest."""
+    """Return the name of an exception, and its text with the lines that led there, without those of unittest."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

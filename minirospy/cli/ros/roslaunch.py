@@ -318,14 +318,14 @@ def _print_args(args: list[ArgDoc]) -> None:
 
 def _check(sources: list[Source], packages: Packages) -> int:
     """Print every fault and warning of the files, in the order of their lines."""
-    from minirospy.launch.check import find_problems, told
+    from minirospy.launch.check import find_problems, problem_line
 
     spec, problems = find_problems(sources, packages)
     file, _, args = sources[0]
     problems += [LaunchError(file, 0, _unknown(name, spec)) for name in args if name not in spec.args]
     found = [(error, "error") for error in problems] + [(error, "warning") for error in spec.warnings]
     for error, kind in sorted(found, key=lambda each: (each[0].file, each[0].line)):
-        print(told(error, kind))
+        print(problem_line(error, kind))
     counts = f"{len(spec.files)} files, {len(spec.nodes)} nodes, {len(spec.params)} parameters"
     print(f"{counts}: {len(problems)} errors, {len(spec.warnings)} warnings")
     return 1 if problems else 0

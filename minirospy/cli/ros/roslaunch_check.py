@@ -13,7 +13,7 @@ from pathlib import Path
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
-from minirospy.launch.check import faults_of, told
+from minirospy.launch.check import faults_of, problem_line
 from minirospy.testing.junit import failure_junit_xml, success_junit_xml
 from minirospy.workspace.packages import Packages, package_name
 
@@ -77,7 +77,9 @@ def _check(path: Path, variables: Sequence[str], output_file: Path | None, ignor
 
 def _faults(file: Path, *, ignore_unset_args: bool) -> list[str]:
     print(f"checking {file}")
-    return [told(each) for each in faults_of(str(file), Packages(), ignore_unset_args=ignore_unset_args)]
+    return [
+        problem_line(each) for each in faults_of(str(file), Packages(), ignore_unset_args=ignore_unset_args)
+    ]
 
 
 def _test_name(path: Path) -> str:
