@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from minirospy.gpio import rpigpio
 from minirospy.gpio.raspberry import warn_of_missing_library
 
 __all__: list[str] = []
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     return getattr(rpigpio, name)
 
 

@@ -12,17 +12,20 @@ import os
 import sys
 import traceback
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 from minirospy.errors import BuildError
 from minirospy.workspace.manifest import read_manifest
 
 __all__ = ["PythonSetup", "read_python_setup"]
+
+
+_Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
@@ -52,7 +55,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
     return PythonSetup(packages, modules, scripts)
 
 
-def _given(file: Path, given: Mapping[str, Any], name: str, kind: type, form: str) -> Any:
+def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
     """Return an argument of ``setup()``; of None and of nothing, an empty one. Raises BuildError."""
     value = given.get(name) or kind()
     if not isinstance(value, kind):
@@ -60,16 +63,16 @@ def _given(file: Path, given: Mapping[str, Any], name: str, kind: type, form: st
     return value
 
 
-def _names(file: Path, given: Mapping[str, Any], name: str) -> list[str]:
+def _names(file: Path, given: Mapping[str, object], name: str) -> list[str]:
     value = given.get(name)
     if isinstance(value, (tuple, set)):
         value = sorted(value)
     return [str(each) for each in _given(file, {name: value}, name, list, "['a', 'b']")]
 
 
-def _run(file: Path) -> Mapping[str, Any]:
-    """Run a setup.py; the arguments of its ``setup()``. Raises BuildError."""
-    given: dict[str, Any] = {}
+def _run(file: Path) -> Mapping[str, object]:
+    """Run a setup.py and return the arguments of its ``setup()``. Raises BuildError."""
+    given: dict[str, object] = {}
     why = ""
     with _stand_ins(given, file.parent):
         try:
@@ -96,7 +99,7 @@ def _run(file: Path) -> Mapping[str, Any]:
 class _StandIn(types.ModuleType):
     """A module that has every name: empty classes, except for those that are set."""
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
             raise AttributeError(name)
         return type(name, (), {})
@@ -105,7 +108,7 @@ class _StandIn(types.ModuleType):
 class _Finder(MetaPathFinder, Loader):
     """Finds stand-ins for what a setup.py imports to be set up with."""
 
-    def __init__(self, contents: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(self, contents: Mapping[str, Mapping[str, object]]) -> None:
         self._contents = contents
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
@@ -119,7 +122,7 @@ class _Finder(MetaPathFinder, Loader):
         for name in self._contents:
             parent, _, child = name.rpartition(".")
             if parent == module.__name__:
-                # `from catkin_pkg import python_setup`: else that were an empty class.
+                # `from catkin_pkg import python_setup` would be an empty class otherwise.
                 setattr(module, child, importlib.import_module(name))
 
 
@@ -127,19 +130,21 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 
 @contextmanager
-def _stand_ins(given: dict[str, Any], folder: Path) -> Iterator[None]:
-    """Replace modules that a setup.py imports, with a ``setup`` that notes its arguments; the folder is the current one.
+def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
+    """Replace modules that a setup.py imports, with a ``setup`` that records its arguments; the folder is the current one.
 
     As with a script, modules in its folder can be imported; they are forgotten afterwards.
     """
 
-    def setup(**arguments: Any) -> None:
+    def setup(**arguments: object) -> None:
         given.update({"name": None, **arguments})
 
-    def generate_distutils_setup(package_xml_path: str = "", **arguments: Any) -> dict[str, Any]:
+    def generate_distutils_setup(package_xml_path: str = "", **arguments: object) -> dict[str, object]:
         return {**_metadata(folder), **arguments}
 
-    def find_packages(where: str = ".", exclude: Any = (), include: Any = ("*",)) -> list[str]:
+    def find_packages(
+        where: str = ".", exclude: Iterable[str] = (), include: Iterable[str] = ("*",)
+    ) -> list[str]:
         found = []
         for path in sorted((folder / where).rglob("__init__.py")):
             name = ".".join(path.parent.relative_to(folder / where).parts)
@@ -179,7 +184,7 @@ def _stand_ins(given: dict[str, Any], folder: Path) -> Iterator[None]:
         sys.modules.update(modules_before)
 
 
-def _metadata(folder: Path) -> dict[str, Any]:
+def _metadata(folder: Path) -> dict[str, str]:
     """Return what package.xml says of a package, under the names of ``setup()``'s arguments."""
     manifest = read_manifest(folder)
     return {

@@ -130,7 +130,7 @@ def test_classes_by_name() -> None:
 
 def test_small_things() -> None:
     assert genpy.message.isstring("a")
-    assert genpy.message.isstring(b"a")
+    assert not genpy.message.isstring(b"a")
     assert not genpy.message.isstring(1)
     assert genpy.base.is_simple("int32")
     assert not genpy.base.is_simple("string")

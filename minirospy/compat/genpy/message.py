@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import codecs
 import struct
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message, ServiceClass
 
 __all__ = [
     "RosMsgUnicodeErrors",
@@ -50,14 +53,14 @@ def register_unicode_errors() -> None:
         codecs.register_error("rosmsg", RosMsgUnicodeErrors())
 
 
-def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:
+def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Message] | None:
     """Return the class of ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
     from minirospy.idl import load
 
     return load.get_message_class(_checked(message_type))
 
 
-def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
+def get_service_class(service_type: str, reload_on_error: bool = False) -> ServiceClass | None:
     """Return the class of the service ``pkg/Name``, or None. Raises ValueError on an invalid type name."""
     from minirospy.idl import load
 
@@ -67,6 +70,15 @@ def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
 def isstring(s: object) -> bool:
     """Return whether a value is a str."""
     return isinstance(s, str)
+
+
+def _get_message_or_service_class(
+    type_str: str, message_type: str, reload_on_error: bool = False
+) -> type[Message] | ServiceClass | None:
+    """Return the class of a ``message`` or ``service``, or None. Raises ValueError on an invalid type name."""
+    if type_str == "service":
+        return get_service_class(message_type, reload_on_error)
+    return get_message_class(message_type, reload_on_error)
 
 
 def _checked(type_: str) -> str:

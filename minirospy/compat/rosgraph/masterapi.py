@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import weakref
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from minirospy.compat.rosgraph.names import make_caller_id
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rosgraph.rosenv import get_master_uri
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.runtime.master_proxy import MasterProxy
+
+if TYPE_CHECKING:
+    from xmlrpc.client import ServerProxy
 
 __all__ = [
     "Error",
@@ -58,7 +62,7 @@ class Master:
         # ROS's Master has no close(): its connections are closed with the object.
         weakref.finalize(self, self._proxy.close)
 
-    def _call(self, method: str, *args: Any) -> Any:
+    def _call(self, method: str, *args: object) -> Any:
         try:
             return self._proxy.call(method, *args)
         except RpcRefused as error:
@@ -69,12 +73,15 @@ class Master:
         except RpcError as error:
             raise MasterException(str(error)) from error
 
-    @property
-    def handle(self) -> Any:
+    @cached_property
+    def handle(self) -> ServerProxy:
         """The master as Python's own `xmlrpc.client.ServerProxy`; answers are (code, text, value)."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.master_uri)
+
+    def _list(self, method: str, *args: object) -> list[str]:
+        return list(self._call(method, *args))
 
     def is_online(self) -> bool:
         """Return whether the master answers."""
@@ -96,13 +103,13 @@ class Master:
         """Return [publishers, subscribers, services], each a list of [name, [nodes]]."""
         return self._call("getSystemState")
 
-    def getPublishedTopics(self, subgraph: str) -> Any:
+    def getPublishedTopics(self, subgraph: str) -> list[list[str]]:
         """Return [[topic, type]] of the published topics."""
-        return self._call("getPublishedTopics", subgraph)
+        return [list(pair) for pair in self._call("getPublishedTopics", subgraph)]
 
-    def getTopicTypes(self) -> Any:
+    def getTopicTypes(self) -> list[list[str]]:
         """Return [[topic, type]] of all topics that the master knows."""
-        return self._call("getTopicTypes")
+        return [list(pair) for pair in self._call("getTopicTypes")]
 
     def lookupNode(self, node_name: str) -> str:
         """Return the URI of a node."""
@@ -116,57 +123,57 @@ class Master:
         """Return a parameter's value."""
         return self._call("getParam", key)
 
-    def setParam(self, key: str, value: Any) -> Any:
+    def setParam(self, key: str, value: object) -> int:
         """Set a parameter."""
-        return self._call("setParam", key, value)
+        return int(self._call("setParam", key, value))
 
     def hasParam(self, key: str) -> bool:
         """Return whether a parameter is set."""
         return bool(self._call("hasParam", key))
 
-    def deleteParam(self, key: str) -> Any:
+    def deleteParam(self, key: str) -> int:
         """Delete a parameter."""
-        return self._call("deleteParam", key)
+        return int(self._call("deleteParam", key))
 
-    def searchParam(self, key: str) -> Any:
+    def searchParam(self, key: str) -> str:
         """Return the nearest parameter of this name."""
-        return self._call("searchParam", key)
+        return str(self._call("searchParam", key))
 
-    def getParamNames(self) -> Any:
+    def getParamNames(self) -> list[str]:
         """Return the names of all parameters."""
-        return self._call("getParamNames")
+        return self._list("getParamNames")
 
     def subscribeParam(self, caller_api: str, key: str) -> Any:
         """Subscribe to a parameter's changes; return its value."""
         return self._call("subscribeParam", caller_api, key)
 
-    def unsubscribeParam(self, caller_api: str, key: str) -> Any:
+    def unsubscribeParam(self, caller_api: str, key: str) -> int:
         """Unsubscribe from a parameter's changes."""
-        return self._call("unsubscribeParam", caller_api, key)
+        return int(self._call("unsubscribeParam", caller_api, key))
 
-    def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> Any:
+    def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> list[str]:
         """Register a publisher; return the subscribers' URIs."""
-        return self._call("registerPublisher", topic, topic_type, caller_api)
+        return self._list("registerPublisher", topic, topic_type, caller_api)
 
-    def unregisterPublisher(self, topic: str, caller_api: str) -> Any:
+    def unregisterPublisher(self, topic: str, caller_api: str) -> int:
         """Unregister a publisher."""
-        return self._call("unregisterPublisher", topic, caller_api)
+        return int(self._call("unregisterPublisher", topic, caller_api))
 
-    def registerSubscriber(self, topic: str, topic_type: str, caller_api: str) -> Any:
+    def registerSubscriber(self, topic: str, topic_type: str, caller_api: str) -> list[str]:
         """Register a subscriber; return the publishers' URIs."""
-        return self._call("registerSubscriber", topic, topic_type, caller_api)
+        return self._list("registerSubscriber", topic, topic_type, caller_api)
 
-    def unregisterSubscriber(self, topic: str, caller_api: str) -> Any:
+    def unregisterSubscriber(self, topic: str, caller_api: str) -> int:
         """Unregister a subscriber."""
-        return self._call("unregisterSubscriber", topic, caller_api)
+        return int(self._call("unregisterSubscriber", topic, caller_api))
 
-    def registerService(self, service: str, service_api: str, caller_api: str) -> Any:
+    def registerService(self, service: str, service_api: str, caller_api: str) -> int:
         """Register a service."""
-        return self._call("registerService", service, service_api, caller_api)
+        return int(self._call("registerService", service, service_api, caller_api))
 
-    def unregisterService(self, service: str, service_api: str) -> Any:
+    def unregisterService(self, service: str, service_api: str) -> int:
         """Unregister a service."""
-        return self._call("unregisterService", service, service_api)
+        return int(self._call("unregisterService", service, service_api))
 
 
 def is_online(master_uri: str | None = None) -> bool:

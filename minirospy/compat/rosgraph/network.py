@@ -8,12 +8,15 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
 from minirospy.environment import Environment, is_local
 from minirospy.errors import WireError
 from minirospy.wire.header import parse_header, serialize_header
+
+if TYPE_CHECKING:
+    from io import BytesIO
 
 __all__ = [
     "ROSHandshakeException",
@@ -108,7 +111,7 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
     return parts.hostname, parts.port or 80
 
 
-def encode_ros_handshake_header(header: Mapping[str, Any]) -> bytes:
+def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
     """Return a connection header's bytes, its length in front."""
     return serialize_header({key: str(value) for key, value in header.items()})
 
@@ -127,7 +130,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
         raise ROSHandshakeException(str(error)) from error
 
 
-def read_ros_handshake_header(sock: socket.socket, b: Any, buff_size: int) -> dict[str, str]:
+def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
     """Return the connection header that a peer sends; what is read beyond it stays in the buffer ``b`` (a BytesIO).
 
     Raises ROSHandshakeException where the peer ends before.
@@ -151,7 +154,7 @@ def read_ros_handshake_header(sock: socket.socket, b: Any, buff_size: int) -> di
     return decode_ros_handshake_header(data[:end])
 
 
-def write_ros_handshake_header(sock: socket.socket, header: Mapping[str, Any]) -> int:
+def write_ros_handshake_header(sock: socket.socket, header: Mapping[str, object]) -> int:
     """Send a connection header; return the number of its bytes."""
     data = encode_ros_handshake_header(header)
     sock.sendall(data)

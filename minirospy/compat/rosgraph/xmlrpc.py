@@ -9,7 +9,6 @@ import logging
 import threading
 from collections.abc import Callable
 from socketserver import ThreadingMixIn
-from typing import Any
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from minirospy.compat.rosgraph.network import create_local_xmlrpc_uri, get_bind_address
@@ -40,7 +39,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
     def __init__(self, addr: tuple[str, int], log_requests: int = 1) -> None:
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(self, request: object, client_address: object) -> None:
         """Ignore peers that disconnect; log everything else."""
         _log.debug("connection from %s", client_address, exc_info=True)
 
@@ -64,7 +63,7 @@ class XmlRpcNode:
     def __init__(
         self,
         port: int = 0,
-        rpc_handler: Any = None,
+        rpc_handler: XmlRpcHandler | None = None,
         on_run_error: Callable[[Exception], object] | None = None,
     ) -> None:
         self.handler = rpc_handler

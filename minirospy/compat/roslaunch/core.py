@@ -122,7 +122,7 @@ class Machine:
         user: str | None = None,
         password: str | None = None,
         assignable: bool = True,
-        env_args: Sequence[Any] = (),
+        env_args: Sequence[object] = (),
         timeout: float | None = None,
     ) -> None:
         self.name = name

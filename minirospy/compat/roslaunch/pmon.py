@@ -15,7 +15,7 @@ import traceback
 import weakref
 from collections.abc import Sequence
 from types import FrameType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from minirospy.compat.roslaunch.core import Node, RLException
 from minirospy.compat.roslaunch.node_args import NodeParamsException
@@ -168,7 +168,7 @@ class Process:
         if self.process:
             self._launcher.supervisor.end_process(self.process)
 
-    def get_info(self) -> dict[str, Any]:
+    def get_info(self) -> dict[str, object]:
         """Return pid, exit code and other facts about it."""
         keys = [
             "package",

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
-from typing import Any
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, TextIO
 
 from minirospy.errors import DefinitionError, NotFoundError
 from minirospy.introspect.interfaces import Interfaces, Kind, describe
 from minirospy.times import TVal
 from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    from minirospy.compat.genmsg.msg_loader import MsgContext
+    from minirospy.compat.genmsg.msgs import MsgSpec
+    from minirospy.compat.rospkg.rospack import RosPack
+    from minirospy.idl.protocols import Message
 
 __all__ = [
     "MODE_MSG",
@@ -89,7 +97,7 @@ def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
         yield name, str(packages.find(name) / mode.removeprefix("."))
 
 
-def spec_to_str(msg_context: Any, spec: Any, buff: Any = None, indent: str = "") -> str:
+def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
     """Return a message of genmsg's as `rosmsg show` prints it, from ``indent`` on; also written to the stream ``buff``.
 
     Raises KeyError where it needs a message that is not in the context.
@@ -103,7 +111,7 @@ def spec_to_str(msg_context: Any, spec: Any, buff: Any = None, indent: str = "")
     return text
 
 
-def get_yaml_for_msg(msg: Any, prefix: str = "", *, flow_style_: bool | None = None) -> str:
+def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None = None) -> str:
     """Return a message as YAML, its fields sorted, ``prefix`` before each line; ``flow_style_``: all of it in braces.
 
     Else flat values are in braces if a message or array has more than four entries, so that it fits the screen.
@@ -123,7 +131,45 @@ def rosmsgmain(mode: str = MODE_MSG) -> int:
     return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
 
 
-def _plain(value: Any) -> Any:
+def rosmsg_cmd_list(mode: str, full: object, argv: Sequence[str] | None = None) -> int:
+    """Run ``rosmsg list`` or ``rossrv list``."""
+    return _run(mode, ["list", *(argv or sys.argv[1:])[1:]])
+
+
+def rosmsg_cmd_packages(mode: str, full: object, argv: Sequence[str] | None = None) -> int:
+    """Run ``rosmsg packages`` or ``rossrv packages``."""
+    return _run(mode, ["packages", *(argv or sys.argv[1:])[1:]])
+
+
+def rosmsg_cmd_md5(mode: str, full: object) -> int:
+    """Run ``rosmsg md5`` or ``rossrv md5`` with the arguments of this process's command line."""
+    return _run(mode, ["md5", *sys.argv[2:]])
+
+
+def rosmsg_cmd_package(mode: str, full: object) -> int:
+    """Run ``rosmsg package`` or ``rossrv package`` with the arguments of this process's command line."""
+    return _run(mode, ["package", *sys.argv[2:]])
+
+
+def rosmsg_cmd_show(mode: str, full: object, alias: str = "show") -> int:
+    """Run ``rosmsg show`` or ``rossrv show`` with the arguments of this process's command line."""
+    return _run(mode, ["show", *sys.argv[2:]])
+
+
+def _run(mode: str, words: Sequence[str]) -> int:
+    from minirospy.cli.ros import rosmsg
+
+    return rosmsg.main_srv(words) if mode == MODE_SRV else rosmsg.main(words)
+
+
+def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
+    """Return the names in a folder for whose path ``rfilter`` is true; none where there is no such folder."""
+    if not os.path.isdir(path):
+        return []
+    return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
+
+
+def _plain(value: object) -> object:
     """Return a value as dictionaries, lists and scalars of YAML."""
     if isinstance(value, TVal):
         return {"secs": value.secs, "nsecs": value.nsecs}
@@ -132,13 +178,13 @@ def _plain(value: Any) -> Any:
     return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
-def _width(plain: Any) -> int:
+def _width(plain: object) -> int:
     """Return the number of entries of the widest dictionary or list."""
     inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
     return max(len(inner), *map(_width, inner), 0)
 
 
-def _get_package_paths(pkgname: str, rospack: Any) -> list[str]:
+def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
     """Return the folders of a package's definitions, for programs that load them by genmsg."""
     return [rospack.get_path(pkgname)]
 

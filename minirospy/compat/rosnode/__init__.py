@@ -231,6 +231,25 @@ def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
 # Of ROS's private functions those that programs call.
 
 
+def _command(argv: Sequence[str]) -> None:
+    from minirospy.cli.ros.rosnode import main
+
+    if status := main(list(argv)[1:]):
+        sys.exit(status)
+
+
+_rosnode_cmd_cleanup = _rosnode_cmd_info = _rosnode_cmd_kill = _command
+_rosnode_cmd_list = _rosnode_cmd_machine = _rosnode_cmd_ping = _command
+
+
+def _fullusage(return_error: bool = True) -> NoReturn:
+    """Print the commands, and exit: with the status of a usage error, or 0."""
+    from minirospy.cli.ros.rosnode import main
+
+    status = main([])
+    sys.exit(status if return_error else 0)
+
+
 def _sub_rosnode_listnodes(
     namespace: str | None = None, list_uri: bool = False, list_all: bool = False
 ) -> str:
@@ -242,7 +261,7 @@ def _sub_rosnode_listnodes(
     return "\n".join((node.uri or "unknown address") if list_uri else node.name for node in found)
 
 
-def _succeed(args: Sequence[Any]) -> Any:
+def _succeed(args: Sequence[Any]) -> object:
     """Return the value of an answer (code, text, value). Raises ROSNodeException where it is an error."""
     code, text, value = args
     if code != 1:

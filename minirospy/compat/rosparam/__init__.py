@@ -75,7 +75,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
     set_param_raw(param, parsed, verbose)
 
 
-def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
+def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
     """Set a parameter to a value; a dictionary leaves other parameters of its namespace."""
     with _graph() as graph:
         for name, single in parameters.set_parameter(graph, graph.resolve(param), value):
@@ -83,7 +83,7 @@ def set_param_raw(param: str, value: Any, verbose: bool = False) -> None:
                 print(f"set parameter [{name}] to [{single}]")
 
 
-def upload_params(ns: str, values: Any, verbose: bool = False) -> None:
+def upload_params(ns: str, values: object, verbose: bool = False) -> None:
     """Set all values below a namespace. Raises RosParamException where they have no names at the root."""
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -104,7 +104,7 @@ def delete_param(param: str, verbose: bool = False) -> None:
         print(f"deleted parameter [{param}]")
 
 
-def print_params(params: Any, ns: str) -> None:
+def print_params(params: object, ns: str) -> None:
     """Print parameters, ``name=value`` a line; a single value by itself."""
     if isinstance(params, dict):
         for name, value in parameters.flatten(ns, params):
@@ -174,6 +174,24 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
+
+
+# Of ROS's private functions those that programs call.
+
+_rosparam_cmd_delete = _rosparam_cmd_list = yamlmain
+
+
+def _rosparam_cmd_get_dump(cmd: str, argv: Sequence[str]) -> None:
+    """Run ``rosparam get`` or ``dump``."""
+    yamlmain(argv)
+
+
+_rosparam_cmd_set_load = _rosparam_cmd_get_dump
+
+
+def _fullusage() -> None:
+    """Print the commands, and exit with the status of a usage error."""
+    yamlmain([NAME])
 
 
 def _resolve(graph: Graph, param: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import ManifestError
 
@@ -90,7 +90,7 @@ def _people(read: manifest.Manifest) -> str:
     return ", ".join([*said, *map(shown, read.authors)])
 
 
-def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: Any = None) -> Manifest:
+def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: object = None) -> Manifest:
     """Return the package.xml in a folder; every dependency counts as a package. Raises InvalidManifest."""
     from minirospy.workspace.manifest import read_manifest
 

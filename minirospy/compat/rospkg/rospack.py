@@ -7,7 +7,7 @@ for names that are packages, ours takes the packages that it finds: the other na
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -42,7 +42,7 @@ class ManifestManager:
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
         self._tree = Dependencies(Packages.below(*map(Path, self._ros_paths)), os.environ)
-        self._custom: dict[Any, Any] = {}
+        self._custom: dict[Hashable, Any] = {}
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
@@ -100,13 +100,17 @@ class ManifestManager:
                 continue
         return found
 
-    def get_custom_cache(self, key: Any, default: Any = None) -> Any:
+    def get_custom_cache(self, key: Hashable, default: Any = None) -> Any:
         """Return a value of the user's cache."""
         return self._custom.get(key, default)
 
-    def set_custom_cache(self, key: Any, value: Any) -> None:
+    def set_custom_cache(self, key: Hashable, value: object) -> None:
         """Store a value in the user's cache."""
         self._custom[key] = value
+
+    def _load_manifest(self, name: str) -> Manifest:
+        # Programs call it, though it is private in rospkg, too.
+        return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
         raise NotImplementedError

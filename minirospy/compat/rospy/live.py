@@ -25,16 +25,16 @@ from minirospy.compat.rospy.rostime import (
 __all__: list[str] = []
 
 
-def _install(module: ModuleType, **names: tuple[Callable[[], Any], Callable[[Any], object]]) -> None:
+def _install(module: ModuleType, **names: tuple[Callable[[], object], Callable[[Any], object]]) -> None:
     """Give ``module`` attributes: each a function that returns the value, and one that takes a new one.
 
     To delete one brings back the value before, which is how unittest.mock ends a patch.
     """
 
-    def attribute(get: Callable[[], Any], put: Callable[[Any], object]) -> property:
-        before: list[Any] = []
+    def attribute(get: Callable[[], object], put: Callable[[Any], object]) -> property:
+        before: list[object] = []
 
-        def replace(_: ModuleType, value: Any) -> None:
+        def replace(_: ModuleType, value: object) -> None:
             before[:] = [get()]
             put(value)
 

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import struct
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 from minirospy.errors import DeserializationError
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message, Stamped
 
 __all__ = ["deserialize_messages", "serialize_message"]
 
 _LENGTH = struct.Struct("<I")
 
 
-def serialize_message(b: BytesIO, seq: int, msg: Any) -> None:
+def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
     """Write ``msg`` with its length to ``b``; a header gets ``seq``, and with frame_id "0" none."""
     if getattr(msg.__class__, "_has_header", False):
-        msg.header.seq = seq
-        if msg.header.frame_id is None:
-            msg.header.frame_id = "0"
+        header = cast("Stamped", msg).header
+        header.seq = seq
+        if header.frame_id is None:
+            header.frame_id = "0"
     start = b.tell()
     b.write(b"\0\0\0\0")
     msg.serialize(b)
@@ -30,8 +34,8 @@ def serialize_message(b: BytesIO, seq: int, msg: Any) -> None:
 
 def deserialize_messages(
     b: BytesIO,
-    msg_queue: list[Any],
-    data_class: type[Any],
+    msg_queue: list[Message],
+    data_class: type[Message],
     queue_size: int | None = None,
     max_msgs: int | None = None,
     start: int = 0,

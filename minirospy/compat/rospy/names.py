@@ -6,7 +6,6 @@ Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from minirospy import names
 from minirospy.client.session import current_session
@@ -37,7 +36,7 @@ def _set_caller_id(name: str) -> None:
 
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
-Validator = Callable[[Any, str], str]
+Validator = Callable[[object, str], str]
 """Checks an argument of a call by the node ``caller_id``, and returns the value to use."""
 
 
@@ -93,7 +92,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 def global_name(param_name: str) -> Validator:
     """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid."""
 
-    def validator(param_value: Any, caller_id: str) -> str:
+    def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)
         if not is_global(text):
             raise ParameterInvalid(f"ERROR: parameter [{param_name}] must be a globally referenced name")
@@ -108,12 +107,12 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
     return lambda param_value, caller_id: check(param_name, param_value, caller_id)
 
 
-def valid_name_validator_resolved(param_name: str, param_value: Any, caller_id: str) -> str:
+def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
     """Return the global name of an argument, not remapped. Raises ParameterInvalid."""
     return names.resolve(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
-def valid_name_validator_unresolved(param_name: str, param_value: Any, caller_id: str) -> str:
+def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
     """Return an argument that is a name. Raises ParameterInvalid."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
@@ -121,7 +120,7 @@ def valid_name_validator_unresolved(param_name: str, param_value: Any, caller_id
     return text
 
 
-def _text(param_name: str, param_value: Any) -> str:
+def _text(param_name: str, param_value: object) -> str:
     if not param_value or not isinstance(param_value, str):
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] must be a non-empty string")
     return param_value

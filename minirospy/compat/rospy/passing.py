@@ -8,15 +8,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
 
 __all__ = ["core_dir", "core_getattr", "service_dir", "service_getattr", "topics_dir", "topics_getattr"]
 
 
-def _passing_on(name: str, source: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def _passing_on(name: str, source: str) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also has the public names of ``source``."""
 
-    def get(attribute: str) -> Any:
+    def get(attribute: str) -> object:
         if not attribute.startswith("_"):
             module = import_module(source)
             if hasattr(module, attribute):

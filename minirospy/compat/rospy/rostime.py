@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any
 
 from minirospy.client.session import current_session
 from minirospy.client.time import is_wallclock
@@ -42,7 +41,7 @@ def set_rostime_initialized(val: bool) -> None:
     current_session().has_time = bool(val)
 
 
-def set_rostime(t: Any) -> None:
+def set_rostime(t: object) -> None:
     """Set the node's time, which is simulated from now on. Raises ValueError where ``t`` is not a Time."""
     if not isinstance(t, Time):
         raise ValueError(f"must be Time instance: {t.__class__}")

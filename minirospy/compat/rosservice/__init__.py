@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from minirospy.errors import (
     MasterUnreachableError,
@@ -17,6 +17,9 @@ from minirospy.errors import (
 )
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import ServiceClass
 
 __all__ = [
     "NAME",
@@ -88,7 +91,7 @@ def get_service_args(service_name: str) -> str:
         return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
 
 
-def get_service_class_by_name(service_name: str) -> Any:
+def get_service_class_by_name(service_name: str) -> ServiceClass:
     """Return the class of a running service. Raises ROSServiceException where it does not exist or is not installed."""
     from minirospy.idl.load import service_class
 
@@ -103,7 +106,7 @@ def rosservice_find(service_type: str) -> list[str]:
 
 
 def call_service(
-    service_name: str, service_args: Sequence[Any], service_class: Any = None
+    service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
 ) -> tuple[Any, Any]:
     """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
     with _graph() as graph:
@@ -119,7 +122,7 @@ def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
         return services.service_header(graph, graph.resolve(service_name), service_uri)
 
 
-def has_service_args(service_name: str, service_class: Any = None) -> bool:
+def has_service_args(service_name: str, service_class: ServiceClass | None = None) -> bool:
     """Return whether a service's request has fields."""
     return bool((service_class or get_service_class_by_name(service_name))._request_class.__slots__)
 
@@ -130,6 +133,17 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
+
+
+# Of ROS's private functions those that programs call.
+
+_rosservice_cmd_args = _rosservice_cmd_call = _rosservice_cmd_find = _rosservice_cmd_info = rosservicemain
+_rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice_cmd_uri = rosservicemain
+
+
+def _fullusage() -> None:
+    """Print the commands, and exit with the status of a usage error."""
+    rosservicemain([NAME])
 
 
 @contextmanager

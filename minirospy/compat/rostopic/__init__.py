@@ -6,15 +6,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.compat.rosgraph import masterapi
 from minirospy.compat.rosgraph.names import script_resolve_name
+from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rostopic.echo import CallbackEcho
 from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.introspect import topics
 from minirospy.introspect.fields import field_value, parse_path
 from minirospy.introspect.graph import Graph
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
 
 __all__ = [
     "NAME",
@@ -34,6 +38,7 @@ __all__ = [
 
 NAME = "rostopic"
 _LATCH_SECONDS = 3.0
+_Topic = tuple[str, str, list[str]]
 
 
 class ROSTopicException(Exception):
@@ -72,20 +77,20 @@ def get_topic_type(
 
 def get_topic_class(
     topic: str, blocking: bool = False
-) -> tuple[type[Any] | None, str | None, Callable[[Any], Any] | None]:
+) -> tuple[type[Message] | None, str | None, Callable[[Any], Any] | None]:
     """Return the same as :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
     from minirospy.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
     if type_ is None:
         return None, None, None
-    cls: type[Any] | None = get_message_class(type_)
+    cls = get_message_class(type_)
     if cls is None:
         raise ROSTopicException(f"Cannot load message class for [{type_}]. Are your messages built?")
     return cls, real_topic, function
 
 
-def get_topic_list(master: Any = None) -> tuple[list[Any], list[Any]]:
+def get_topic_list(master: masterapi.Master | None = None) -> tuple[list[Any], list[Any]]:
     """Return (published, subscribed), each a list of (topic, type, nodes)."""
     with _graph(_NoMaster) as graph:
         found = topics.list_topics(graph)
@@ -135,7 +140,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
-) -> tuple[Any, type[Any]]:
+) -> tuple[Any, type[Message]]:
     """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
 
     Raises ROSTopicException where the type is not installed.
@@ -145,7 +150,7 @@ def create_publisher(
     from minirospy.compat.genpy.message import get_message_class
 
     try:
-        cls: type[Any] | None = get_message_class(topic_type)
+        cls = get_message_class(topic_type)
     except ValueError as error:
         raise ROSTopicException(f"invalid topic type: {topic_type}") from error
     if cls is None:
@@ -158,8 +163,8 @@ def create_publisher(
 
 def publish_message(
     pub: Any,
-    msg_class: type[Any],
-    pub_args: Sequence[Any],
+    msg_class: type[Message],
+    pub_args: Sequence[object],
     rate: float | None = None,
     once: bool = False,
     verbose: bool = False,
@@ -175,7 +180,7 @@ def publish_message(
     from minirospy.errors import MessageException
     from minirospy.introspect.echo import fill_message
 
-    def message() -> Any:
+    def message() -> Message:
         try:
             return fill_message(msg_class, pub_args, rospy.Time.now().to_nsec())
         except MessageException as error:
@@ -212,6 +217,35 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 # Of ROS's private functions those that programs call.
 
+_rostopic_cmd_bw = _rostopic_cmd_delay = _rostopic_cmd_echo = _rostopic_cmd_find = _rostopic_cmd_hz = (
+    rostopicmain
+)
+_rostopic_cmd_info = _rostopic_cmd_list = _rostopic_cmd_pub = _rostopic_cmd_type = rostopicmain
+
+
+def _fullusage() -> NoReturn:
+    """Print the commands, and exit with the status of a usage error."""
+    _command([])
+    raise AssertionError("a command without arguments is a usage error")
+
+
+def _rostopic_list_group_by_host(
+    master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
+) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
+    """Return host -> rows, for the publishers and the subscribers of rows (topic, type, nodes)."""
+    hosts: dict[str, str] = {}
+
+    def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
+        found: dict[str, dict[tuple[str, str], list[str]]] = {}
+        for topic, type_, nodes in rows:
+            for node in nodes:
+                if node not in hosts:
+                    hosts[node] = parse_http_host_and_port(master.lookupNode(node))[0]
+                found.setdefault(hosts[node], {}).setdefault((topic, type_), []).append(node)
+        return {host: [(*key, nodes) for key, nodes in topics.items()] for host, topics in found.items()}
+
+    return grouped(pubs), grouped(subs)
+
 
 def _check_master() -> None:
     """Raise ROSTopicIOException where no master answers."""
@@ -219,7 +253,7 @@ def _check_master() -> None:
         graph.master.get_pid()
 
 
-def _master_get_topic_types(master: masterapi.Master) -> Any:
+def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
     """Return [[topic, type]] of all topics that the master knows."""
     return master.getTopicTypes()
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from minirospy.idl.message import strify_message
 from minirospy.introspect.echo import elided
 from minirospy.introspect.plot import plot_header, plot_row
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
+    from minirospy.times import Time
 
 __all__ = ["CallbackEcho", "create_field_filter", "create_value_transform"]
 
@@ -54,7 +58,7 @@ class CallbackEcho:
         self.done = False
         self.first = True
 
-    def callback(self, data: Any, callback_args: Mapping[str, Any], current_time: Any = None) -> None:
+    def callback(self, data: Any, callback_args: Mapping[str, Any], current_time: Time | None = None) -> None:
         """Print a message. ``callback_args``: its ``topic`` and, where known, ``type_information``."""
         if self.done or not self._wanted(data, str(callback_args["topic"])):
             return
@@ -68,11 +72,11 @@ class CallbackEcho:
         if self.max_count is not None and self.count >= self.max_count:
             self.done = True
 
-    def _wanted(self, message: Any, topic: str) -> bool:
+    def _wanted(self, message: object, topic: str) -> bool:
         mine = self.echo_all_topics or topic == self.topic or self.topic.startswith(topic + "/")
         return mine and (self.filter_fn is None or bool(self.filter_fn(message)))
 
-    def _text(self, value: Any, type_: Any, current_time: Any) -> str:
+    def _text(self, value: Any, type_: object, current_time: Time | None) -> str:
         from minirospy.client import Time
 
         if self.plot:
@@ -91,7 +95,7 @@ class CallbackEcho:
         )
         return f"{text}\n---"
 
-    def _row(self, value: Any, now: Any) -> str:
+    def _row(self, value: Any, now: Time) -> str:
         header = plot_header(value) + "\n" if self.first else ""
         self.first = False
         stamp = value.header.stamp if getattr(value, "_has_header", False) else now
@@ -102,7 +106,7 @@ class CallbackEcho:
 def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
     """Return a function for `strify_message` that leaves out fields that are texts, or arrays."""
 
-    def fields(message: Any) -> list[str]:
+    def fields(message: Message) -> list[str]:
         return [
             name
             for name, type_ in zip(message.__slots__, message._slot_types, strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from minirospy.introspect.rates import (
     BandwidthWindow,
@@ -16,6 +16,10 @@ from minirospy.introspect.rates import (
     delay_text,
     rate_text,
 )
+
+if TYPE_CHECKING:
+    from minirospy.client.topics import AnyMsg
+    from minirospy.idl.protocols import Stamped
 
 __all__ = ["ROSTopicBandwidth", "ROSTopicDelay", "ROSTopicHz"]
 
@@ -40,7 +44,7 @@ class ROSTopicHz:
         self.use_wtime = use_wtime
         self._windows: dict[str | None, RateWindow] = {}
 
-    def callback_hz(self, m: Any, topic: str | None = None) -> None:
+    def callback_hz(self, m: object, topic: str | None = None) -> None:
         """Count a message."""
         if self.filter_expr is None or self.filter_expr(m):
             now = time.time() if self.use_wtime else _now()
@@ -76,7 +80,7 @@ class ROSTopicBandwidth:
         self.times: list[float] = []
         self.sizes: list[int] = []
 
-    def callback(self, data: Any) -> None:
+    def callback(self, data: AnyMsg) -> None:
         """Count a message."""
         with self.lock:
             self.times.append(time.time())
@@ -103,7 +107,7 @@ class ROSTopicDelay:
         self.window_size = int(max(window_size, 0))
         self._window = DelayWindow(self.window_size)
 
-    def callback_delay(self, msg: Any) -> None:
+    def callback_delay(self, msg: Stamped) -> None:
         """Measure the delay of a message; log an error where it has no header."""
         if not msg._has_header:
             import rospy

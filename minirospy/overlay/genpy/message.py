@@ -39,3 +39,4 @@ __all__ = [
     "strify_message",
     "struct_I",
 ]
+from minirospy.compat.genpy.message import _get_message_or_service_class as _get_message_or_service_class

@@ -22,3 +22,9 @@ __all__ = [
     "MODE_MSG", "MODE_SRV", "ROSMsgException", "get_msg_text", "get_srv_text", "get_yaml_for_msg", "iterate_packages",
     "list_msgs", "list_srvs", "list_types", "rosmsg_md5", "rosmsg_search", "rosmsgmain", "spec_to_str",
 ]  # fmt: skip
+from minirospy.compat.rosmsg import _list_resources as _list_resources
+from minirospy.compat.rosmsg import rosmsg_cmd_list as rosmsg_cmd_list
+from minirospy.compat.rosmsg import rosmsg_cmd_md5 as rosmsg_cmd_md5
+from minirospy.compat.rosmsg import rosmsg_cmd_package as rosmsg_cmd_package
+from minirospy.compat.rosmsg import rosmsg_cmd_packages as rosmsg_cmd_packages
+from minirospy.compat.rosmsg import rosmsg_cmd_show as rosmsg_cmd_show

@@ -32,3 +32,10 @@ __all__ = [
     "get_node_names", "get_nodes_by_machine", "kill_nodes", "rosnode_cleanup", "rosnode_info", "rosnode_listnodes",
     "rosnode_ping", "rosnode_ping_all", "rosnodemain",
 ]  # fmt: skip
+from minirospy.compat.rosnode import _fullusage as _fullusage
+from minirospy.compat.rosnode import _rosnode_cmd_cleanup as _rosnode_cmd_cleanup
+from minirospy.compat.rosnode import _rosnode_cmd_info as _rosnode_cmd_info
+from minirospy.compat.rosnode import _rosnode_cmd_kill as _rosnode_cmd_kill
+from minirospy.compat.rosnode import _rosnode_cmd_list as _rosnode_cmd_list
+from minirospy.compat.rosnode import _rosnode_cmd_machine as _rosnode_cmd_machine
+from minirospy.compat.rosnode import _rosnode_cmd_ping as _rosnode_cmd_ping

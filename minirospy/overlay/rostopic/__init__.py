@@ -33,3 +33,14 @@ __all__ = [
     "get_api", "get_info_text", "get_topic_class", "get_topic_list", "get_topic_type", "msgevalgen", "publish_message",
     "rostopicmain",
 ]  # fmt: skip
+from minirospy.compat.rostopic import _fullusage as _fullusage
+from minirospy.compat.rostopic import _rostopic_cmd_bw as _rostopic_cmd_bw
+from minirospy.compat.rostopic import _rostopic_cmd_delay as _rostopic_cmd_delay
+from minirospy.compat.rostopic import _rostopic_cmd_echo as _rostopic_cmd_echo
+from minirospy.compat.rostopic import _rostopic_cmd_find as _rostopic_cmd_find
+from minirospy.compat.rostopic import _rostopic_cmd_hz as _rostopic_cmd_hz
+from minirospy.compat.rostopic import _rostopic_cmd_info as _rostopic_cmd_info
+from minirospy.compat.rostopic import _rostopic_cmd_list as _rostopic_cmd_list
+from minirospy.compat.rostopic import _rostopic_cmd_pub as _rostopic_cmd_pub
+from minirospy.compat.rostopic import _rostopic_cmd_type as _rostopic_cmd_type
+from minirospy.compat.rostopic import _rostopic_list_group_by_host as _rostopic_list_group_by_host

@@ -41,11 +41,11 @@ class TopicManager:
         """Return whether this node subscribes to a topic."""
         return any(topic == resolved_name for topic, _ in self.get_subscriptions())
 
-    def get_pub_sub_info(self) -> list[tuple[Any, ...]]:
+    def get_pub_sub_info(self) -> list[tuple[object, ...]]:
         """Return a row for each connection: (id, other end, direction, transport, topic, connected, what)."""
         return [tuple(row) for row in self._query("get_bus_info")]
 
-    def get_pub_sub_stats(self) -> tuple[list[Any], list[Any]]:
+    def get_pub_sub_stats(self) -> tuple[list[object], list[object]]:
         """Return the statistics of publications and of subscriptions, as getBusStats does."""
         stats = self._query("get_bus_stats")
         return (stats[0], stats[1]) if stats else ([], [])
@@ -62,7 +62,7 @@ class TopicManager:
 class ServiceManager:
     """Lists the services of this node."""
 
-    def get_services(self) -> list[tuple[str, Any]]:
+    def get_services(self) -> list[tuple[str, str | None]]:
         """Return the name and URI of each service."""
         return [(name, service.uri) for name, service in list(current_session().offered.items())]
 

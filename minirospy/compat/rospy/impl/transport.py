@@ -1,7 +1,5 @@
 """rospy.impl.transport and tcpros_base: the directions of a connection in getBusInfo, and constants of TCPROS."""
 
-from typing import Any
-
 __all__ = ["BIDIRECTIONAL", "DEFAULT_BUFF_SIZE", "INBOUND", "OUTBOUND", "TCPROS"]
 
 INBOUND, OUTBOUND, BIDIRECTIONAL = "i", "o", "b"
@@ -10,7 +8,7 @@ DEFAULT_BUFF_SIZE = 65536
 """The default of Subscriber's ``buff_size``."""
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     # Programs name them in annotations. Imported on use, as asyncio comes with them.
     if name in ("Transport", "DeadTransport"):
         from minirospy.runtime.links import OutLink

@@ -1,0 +1,87 @@
+"""Private names of ROS's modules that programs use all the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import genpy.message
+import pytest
+import rosmsg
+import rosnode
+import rosparam
+import rospkg
+import rosservice
+import rostopic
+from rosgraph import Master
+from rospy.impl.tcpros import DEFAULT_BUFF_SIZE
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty
+
+
+@pytest.mark.parametrize("module", [rostopic, rosnode, rosservice, rosparam])
+def test_fullusage_prints_the_commands_and_exits(
+    module: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as raised:
+        module._fullusage()
+    out, err = capsys.readouterr()
+    assert raised.value.code not in (0, None)
+    assert "Commands:" in out + err
+
+
+def test_a_command_function_runs_its_command(master: str, capsys: pytest.CaptureFixture[str]) -> None:
+    rosparam._rosparam_cmd_set_load("set", ["rosparam", "set", "/a", "5"])
+    rosparam._rosparam_cmd_get_dump("get", ["rosparam", "get", "/a"])
+    assert capsys.readouterr().out == "5\n"
+    rosparam._rosparam_cmd_list(["rosparam", "list"])
+    assert "/a\n" in capsys.readouterr().out
+    Master("/node").registerPublisher("/topic", "std_msgs/Bool", "http://localhost:1/")
+    rostopic._rostopic_cmd_list(["rostopic", "list"])
+    assert capsys.readouterr().out == "/topic\n"
+    rosnode._rosnode_cmd_list(["rosnode", "list"])
+    assert capsys.readouterr().out == "/node\n"
+    rosservice._rosservice_cmd_list(["rosservice", "list"])
+    assert capsys.readouterr().out == ""
+    with pytest.raises(SystemExit):
+        rostopic._rostopic_cmd_type(["rostopic", "type", "/nope"])
+
+
+def test_rosmsg_commands_run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["rosmsg", "show", "std_msgs/Bool"])
+    assert rosmsg.rosmsg_cmd_show(rosmsg.MODE_MSG, None) == 0
+    assert rosmsg.rosmsg_cmd_list(rosmsg.MODE_SRV, None, ["list"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("bool data\n")
+    assert "std_srvs/Empty\n" in out
+
+
+def test_topics_are_grouped_by_host(master: str) -> None:
+    api = Master("/me")
+    for name, host in (("/a", "one"), ("/b", "one"), ("/c", "two")):
+        Master(name).registerPublisher("/t", "std_msgs/Bool", f"http://{host}:1/")
+    pubs, subs = rostopic._rostopic_list_group_by_host(api, [("/t", "std_msgs/Bool", ["/a", "/b", "/c"])], [])
+    assert pubs == {
+        "one": [("/t", "std_msgs/Bool", ["/a", "/b"])],
+        "two": [("/t", "std_msgs/Bool", ["/c"])],
+    }
+    assert subs == {}
+
+
+def test_master_handle_can_be_replaced() -> None:
+    api = Master("/me", "http://localhost:1/")
+    assert api.handle is api.handle
+    replacement: object = "mine"
+    vars(api)["handle"] = replacement
+    assert api.handle is replacement
+
+
+def test_names_without_a_command(tmp_path: Path) -> None:
+    (tmp_path / "A.msg").touch()
+    (tmp_path / "folder").mkdir()
+    assert rosmsg._list_resources(str(tmp_path)) == ["A.msg"]
+    assert rosmsg._list_resources(str(tmp_path / "nope")) == []
+    assert genpy.message._get_message_or_service_class("message", "std_msgs/Bool") is Bool
+    assert genpy.message._get_message_or_service_class("service", "std_srvs/Empty") is Empty
+    assert rospkg.RosPack()._load_manifest("std_msgs").name == "std_msgs"
+    assert DEFAULT_BUFF_SIZE == 65536
