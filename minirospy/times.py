@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
 from __future__ import annotations
 
 import operator
-from typing import Any, TypeVar
+from typing import TypeVar, overload
 
 __all__ = ["Duration", "TVal", "Time"]
 
@@ -105,14 +105,20 @@ class Time(TVal):
         """Return the same as ``to_sec``, as ``time.time()`` counts."""
         return self.to_sec()
 
-    def __add__(self, other: Any) -> Time:
+    def __add__(self, other: Duration) -> Time:
         if not isinstance(other, Duration):
             return NotImplemented
         return self._of(self.to_nsec() + other.to_nsec())
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> Any:
+    @overload
+    def __sub__(self, other: Time) -> Duration: ...
+
+    @overload
+    def __sub__(self, other: Duration) -> Time: ...
+
+    def __sub__(self, other: Time | Duration) -> Time | Duration:
         if isinstance(other, Time):
             return Duration(*divmod(self.to_nsec() - other.to_nsec(), _BILLION))
         if isinstance(other, Duration):
@@ -122,16 +128,16 @@ class Time(TVal):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Time) and self.to_nsec() == other.to_nsec()
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: Time) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: Time) -> bool:
         return self.to_nsec() <= other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: Time) -> bool:
         return self.to_nsec() > other.to_nsec() if isinstance(other, Time) else NotImplemented
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: Time) -> bool:
         return self.to_nsec() >= other.to_nsec() if isinstance(other, Time) else NotImplemented
 
     __hash__ = TVal.__hash__
@@ -144,12 +150,12 @@ class Duration(TVal):
 
     __slots__: list[str] = []
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: Duration) -> Duration:
         if isinstance(other, Duration):
             return self._of(self.to_nsec() + other.to_nsec())
         return NotImplemented
 
-    def __sub__(self, other: Any) -> Duration:
+    def __sub__(self, other: Duration) -> Duration:
         if isinstance(other, Duration):
             return self._of(self.to_nsec() - other.to_nsec())
         return NotImplemented
@@ -160,7 +166,7 @@ class Duration(TVal):
     def __abs__(self) -> Duration:
         return self._of(abs(self.to_nsec()))
 
-    def __mul__(self, factor: Any) -> Duration:
+    def __mul__(self, factor: float) -> Duration:
         if isinstance(factor, int):
             return self._of(self.to_nsec() * factor)
         if isinstance(factor, float):
@@ -169,26 +175,38 @@ class Duration(TVal):
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Any:
+    @overload
+    def __truediv__(self, other: float) -> Duration: ...
+
+    @overload
+    def __truediv__(self, other: Duration) -> float: ...
+
+    def __truediv__(self, other: float | Duration) -> float | Duration:
         if isinstance(other, int | float):
             return type(self).from_sec(self.to_sec() / float(other))
         if isinstance(other, Duration):
             return self.to_sec() / other.to_sec()
         return NotImplemented
 
-    def __floordiv__(self, other: Any) -> Any:
+    @overload
+    def __floordiv__(self, other: float) -> Duration: ...
+
+    @overload
+    def __floordiv__(self, other: Duration) -> int: ...
+
+    def __floordiv__(self, other: float | Duration) -> int | Duration:
         if isinstance(other, int | float):
             return type(self).from_sec(self.to_sec() // other)
         if isinstance(other, Duration):
             return int(self.to_sec() // other.to_sec())
         return NotImplemented
 
-    def __mod__(self, other: Any) -> Duration:
+    def __mod__(self, other: Duration) -> Duration:
         if isinstance(other, Duration):
             return self._of(self.to_nsec() % other.to_nsec())
         return NotImplemented
 
-    def __divmod__(self, other: Any) -> tuple[int, Duration]:
+    def __divmod__(self, other: Duration) -> tuple[int, Duration]:
         if isinstance(other, Duration):
             whole, rest = divmod(self.to_nsec(), other.to_nsec())
             return whole, self._of(rest)
@@ -197,16 +215,16 @@ class Duration(TVal):
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Duration) and self.to_nsec() == other.to_nsec()
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: Duration) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: Duration) -> bool:
         return self.to_nsec() <= other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: Duration) -> bool:
         return self.to_nsec() > other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: Duration) -> bool:
         return self.to_nsec() >= other.to_nsec() if isinstance(other, Duration) else NotImplemented
 
     __hash__ = TVal.__hash__
