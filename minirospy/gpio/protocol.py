@@ -189,7 +189,7 @@ def _pin(function: Any, pull: Any, world: Any, latch: Any) -> Pin:
     return Pin(Function(function), Pull(pull), None if world is None else int(bool(world)), int(bool(latch)))
 
 
-def _natural(item: Any) -> int:
+def _natural(item: object) -> int:
     if not isinstance(item, int) or item < 0:
         raise ProtocolError(f"{item!r} is not a number from 0")
     return item

@@ -5,7 +5,7 @@ Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/ROS/Parameter%20Server
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import NotFoundError, RpcRefused, ValueTextError
 from minirospy.introspect.graph import Graph
@@ -35,7 +35,7 @@ class ParameterFile(NamedTuple):
     """
 
     namespace: str
-    values: Any
+    values: object
     own_namespace: bool
 
 
@@ -45,7 +45,7 @@ def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
     return sorted(name for name in graph.master.get_param_names() if name.startswith(prefix))
 
 
-def get_parameter(graph: Graph, name: str) -> Any:
+def get_parameter(graph: Graph, name: str) -> object:
     """Return the value of a parameter (global name); a namespace is a dictionary. Raise NotFoundError."""
     try:
         return graph.master.get_param(name)
@@ -53,7 +53,7 @@ def get_parameter(graph: Graph, name: str) -> Any:
         raise _not_set(graph, name) from None
 
 
-def set_parameter(graph: Graph, name: str, value: Any) -> list[tuple[str, Any]]:
+def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
     """Set a parameter; a dictionary sets each of its own and leaves those beside them, as rosparam does.
 
     The single parameters that were set come back. Raise ValueTextError on what none can hold.
@@ -99,13 +99,13 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
     return files
 
 
-def dump_parameters(values: Any) -> str:
+def dump_parameters(values: object) -> str:
     """Values as the text of a parameter file."""
     text = format_value(values)
     return text if text.endswith("\n") else text + "\n"
 
 
-def flatten(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+def flatten(name: str, value: object) -> Iterator[tuple[str, object]]:
     """Yield each single parameter at or below ``name``, in the order that the values have."""
     if isinstance(value, dict):
         for key, inner in value.items():

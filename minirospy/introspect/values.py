@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -38,7 +38,7 @@ _MOST_YAML_VALUES = 1_000_000
 _LONGEST_ANGLE = 200
 
 
-def parse_value(text: str) -> Any:
+def parse_value(text: str) -> object:
     """Return the value of a YAML text. Raise ValueTextError."""
     word = text.strip()
     whole, dot, fraction = word.removeprefix("-").partition(".")
@@ -62,7 +62,7 @@ def parse_value(text: str) -> Any:
         raise ValueTextError(text, _complaint(error)) from error
 
 
-def parse_documents(text: str, where: str) -> Iterator[Any]:
+def parse_documents(text: str, where: str) -> Iterator[object]:
     """Yield the values of the documents of a YAML text, ``---`` between them. Raise ValueTextError."""
     import yaml
 
@@ -119,7 +119,7 @@ def check_yaml(text: str) -> None:
             raise ValueError(f"its aliases unfold to more than {_MOST_YAML_VALUES} values")
 
 
-def parse_lines(lines: Iterable[str], where: str) -> Iterator[Any]:
+def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
     """Like :func:`parse_documents`, each as soon as its last line has come: `rostopic echo /a | rostopic pub /b TYPE`."""
     text: list[str] = []
     for line in lines:
@@ -131,19 +131,19 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[Any]:
     yield from parse_documents("".join(text), where)
 
 
-def parse_arguments(words: Sequence[str]) -> list[Any]:
+def parse_arguments(words: Sequence[str]) -> list[object]:
     """Return the values that a command line gives a message. An empty word is the empty text; to YAML it would be null."""
     return [parse_value(word) if word else "" for word in words]
 
 
-def message_values(documents: Iterable[Any]) -> Iterator[list[Any]]:
+def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
     """Yield the values that each document gives a message: a list has one for each field."""
     for document in documents:
         if document is not None:
             yield document if isinstance(document, list) else [document]
 
 
-def format_value(value: Any) -> str:
+def format_value(value: object) -> str:
     """Return a value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -156,14 +156,14 @@ def format_value(value: Any) -> str:
     return yaml.safe_dump(value).removesuffix(_DOCUMENT_END)
 
 
-def format_pretty(value: Any) -> str:
+def format_pretty(value: object) -> str:
     """Return a value for people's eyes, as `rosparam get -p` prints it: texts bare, not to be parsed again."""
     if isinstance(value, dict):
         return "\n".join(_pretty_lines(value, ""))
     return value if isinstance(value, str) else format_value(value)
 
 
-def check_parameter(value: Any, name: str) -> None:
+def check_parameter(value: object, name: str) -> None:
     """Raise ValueTextError where a value, or one inside it, is nothing that a parameter can hold."""
     if isinstance(value, dict):
         for key, inner in value.items():
@@ -199,7 +199,7 @@ def _is_plain_text(word: str) -> bool:
     )
 
 
-def _pretty_lines(table: dict[str, Any], indent: str) -> Iterator[str]:
+def _pretty_lines(table: dict[str, object], indent: str) -> Iterator[str]:
     for key in sorted(table):
         value = table[key]
         if isinstance(value, dict) and value:
@@ -238,7 +238,7 @@ def add_angles(loader_class: Any) -> None:
 
     in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
 
-    def construct(unit: float) -> Any:
+    def construct(unit: float) -> Callable[[Any, Any], float]:
         def angle(loader: Any, node: Any) -> float:
             text = loader.construct_scalar(node)
             match = in_brackets.match(text)

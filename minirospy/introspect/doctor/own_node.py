@@ -9,7 +9,6 @@ import logging
 import threading
 from collections.abc import Collection, Iterator
 from types import TracebackType
-from typing import Any
 
 from minirospy import names
 from minirospy.environment import Environment
@@ -25,6 +24,7 @@ from minirospy.introspect.doctor.reach import (
     own_address_towards,
     trouble_of,
 )
+from minirospy.runtime.links import OutLink
 from minirospy.runtime.loop import LoopThread
 from minirospy.runtime.master_proxy import SlaveProxy
 from minirospy.runtime.node import Node
@@ -124,7 +124,7 @@ class DoctorNode:
         finally:
             await self.node.close()
 
-    def _link_changed(self, link: Any, is_up: bool) -> None:
+    def _link_changed(self, link: OutLink, is_up: bool) -> None:
         if is_up:
             with self._log_links:
                 self._listeners.add(link.peer)
