@@ -15,6 +15,7 @@ import os
 import struct
 import sys
 import types
+import weakref
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -275,6 +276,8 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
         # Python's own limits, as for loops inside loops: arrays of arrays of arrays.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
+    # Its source goes with it: a publisher may send any number of definitions.
+    weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MessageClasses", "check", "fill", "serialize"]
 
+_MOST_CLASSES = 256
 _M = TypeVar("_M", bound="Message")
 
 
@@ -43,6 +44,9 @@ class MessageClasses:
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
+            if len(self._classes) >= _MOST_CLASSES:
+                # Nobody means so many types: a publisher makes them up.
+                self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
 

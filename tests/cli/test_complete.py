@@ -558,3 +558,13 @@ def test_the_command(workspace: Path) -> None:
     done = subprocess.run([*words[:-1], ""], capture_output=True, check=True, timeout=30)
     assert done.stdout == b"talker.py"
     assert done.stderr == b""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such file names")
+def test_names_with_control_characters_are_not_offered(workspace: Path) -> None:
+    folder = workspace / "src" / "my_robot" / "config"
+    (folder / "evil\x1b]0;t\x07.yaml").touch()
+    (folder / "good.yaml").touch()
+    found = candidates(2, ["roscat", "my_robot", ""])
+    assert "good.yaml" in " ".join(found)
+    assert "evil" not in " ".join(found)

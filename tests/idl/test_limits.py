@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import linecache
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +14,7 @@ from minirospy.errors import DefinitionError, DeserializationError
 from minirospy.idl.digest import message_md5
 from minirospy.idl.load import Catalogue, class_from_text, compile_package, specs_of_text
 from minirospy.idl.parse import parse_message
+from minirospy.introspect.messages import MessageClasses
 
 SEPARATOR = "=" * 80
 
@@ -146,3 +149,14 @@ def test_error_of_a_definition_is_escaped() -> None:
     with pytest.raises(DefinitionError) as raised:
         parse_message("int8 a\x1b[2J\n", "p", "M")
     assert "\x1b" not in str(raised.value)
+
+
+def test_definitions_without_end_do_not_fill_the_memory() -> None:
+    classes = MessageClasses()
+    for number in range(600):
+        header = {"type": f"p/M{number}", "md5sum": "*", "message_definition": "int8 a\n"}
+        assert classes.for_header(header)().a == 0
+    gc.collect()
+    sources = [name for name in linecache.cache if name.startswith("<generated p/M")]
+    # So many as the classes that are kept: for this reader, and for others who meet the same definitions.
+    assert len(sources) < 600

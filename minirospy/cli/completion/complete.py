@@ -25,6 +25,7 @@ from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
 from minirospy.cli.verbs import Family
 from minirospy.errors import MinirospyError
+from minirospy.escape import has_controls
 
 if TYPE_CHECKING:
     import argparse
@@ -38,6 +39,7 @@ __all__ = ["candidates", "main"]
 _NUMBER = re.compile(r"-\.?\d")
 _VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 _LINE_FEED = "\v"
+_SPACES = dict.fromkeys(map(ord, "\n\t"))
 _ONE_LINE = "--one-line"
 _OPTIONS = ["-h", "--help", "-V", "--version"]
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
@@ -75,6 +77,8 @@ def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> l
     try:
         found = _of_command(command, before, word.text)
         fitting = (completers.on_one_line(text) if one_line else text for text in found)
+        # What has control characters is not a name to choose; the shell would send them to the terminal.
+        fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [_quoted(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
         # An unknown package or type: the command itself will say so.
