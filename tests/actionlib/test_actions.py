@@ -1,4 +1,4 @@
-"""Where minirospy's actions are meant to do better than actionlib's; what is the same stands in tests/referee."""
+"""Where minirospy's actions are meant to do better than actionlib's; what is the same is in tests/referee."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ print(len(ended), all(ended))
 """)
         assert said == "300 True\n"
 
-    def test_wrong_parameters_are_told(self) -> None:
+    def test_wrong_parameters_are_reported(self) -> None:
         said = run("""
 for value in (0, -1, "often"):
     rospy.set_param("/actionlib_status_frequency", value)

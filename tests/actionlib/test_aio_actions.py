@@ -82,7 +82,7 @@ def test_feedback_and_result() -> None:
     run(main)
 
 
-def test_what_execute_raises_aborts_the_goal(caplog: pytest.LogCaptureFixture) -> None:
+def test_exception_in_execute_aborts_the_goal(caplog: pytest.LogCaptureFixture) -> None:
     async def main(client: Client, _: Server) -> None:
         with pytest.raises(GoalError, match=r"the goal was aborted: .*goal 2 is too hard") as caught:
             await client.send(msg.TestGoal(2))
@@ -135,7 +135,7 @@ def test_cancel() -> None:
     run(main)
 
 
-def test_execute_may_clean_up_and_return_what_it_has() -> None:
+def test_execute_may_clean_up_and_return_a_result() -> None:
     async def careful(goal: Goal) -> Any:
         try:
             await asyncio.sleep(SECONDS)
@@ -167,7 +167,7 @@ def test_a_newer_goal_takes_the_place_of_the_one_that_runs() -> None:
     run(main)
 
 
-def test_goals_that_come_at_once_each_have_an_end() -> None:
+def test_concurrent_goals_each_end() -> None:
     """One that makes way before its work has begun, too."""
 
     async def main(client: Client, server: Server) -> None:
@@ -264,7 +264,7 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A goal of a client that is no minirospy's waits a moment before it is taken."""
+    """A goal of a client that is not minirospy's waits a moment before it is taken."""
     monkeypatch.setattr("minirospy.actionlib.aio.server.SEND_SECONDS", 0.1)
     monkeypatch.setattr("minirospy.actionlib.aio.server.CANCEL_SECONDS", 0.3)
 

@@ -155,7 +155,7 @@ def test_a_person_serves(master: str) -> None:
     process.stderr.close()
 
 
-def test_a_form_asks_for_every_field_and_again_where_the_answer_does_not_fit() -> None:
+def test_form_prompts_for_each_field_until_the_answer_fits() -> None:
     from geometry_msgs.msg import PoseStamped
 
     message = PoseStamped()

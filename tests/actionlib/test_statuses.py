@@ -49,7 +49,7 @@ def test_the_same_bytes_and_the_same_statuses(wanted: list[GoalStatus]) -> None:
         assert read.find(id) == first == find_status(plain, id) == find_status(read, id)
 
 
-def test_an_id_in_a_text_is_no_goal() -> None:
+def test_id_in_a_text_is_not_a_goal() -> None:
     plain = GoalStatusArray(
         status_list=[GoalStatus(GoalID(id="a"), 1, "the goal"), GoalStatus(GoalID(id="b"), 1, "")]
     )

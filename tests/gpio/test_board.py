@@ -75,7 +75,7 @@ def test_closed(board: Board) -> None:
         board.press(11)
 
 
-def test_watch_hears_the_chosen_pins_until_the_time_is_up(board: Board) -> None:
+def test_watch_prints_the_chosen_pins_until_the_timeout(board: Board) -> None:
     edges = board.watch([12], timeout=30)
     board.press(11)
     board.press(12)

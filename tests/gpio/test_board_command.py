@@ -114,7 +114,7 @@ def test_picture(encoding: str, lit: str, dark: str) -> None:
     paper.close()
 
 
-def test_a_real_raspberry_pi_is_told_of_the_real_library(
+def test_real_raspberry_pi_is_warned_of_the_missing_library(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "model"

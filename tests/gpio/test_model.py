@@ -80,7 +80,7 @@ def test_the_latch_outlives_the_direction() -> None:
     assert board.pins[7].level == 1
 
 
-def test_several_pins_are_written_at_once() -> None:
+def test_several_pins_are_written_together() -> None:
     board = BoardModel()
     for pin in (2, 3):
         board.apply(Setup(pin, Function.OUT))
@@ -98,7 +98,7 @@ def test_force_drives_an_input_and_sets_an_output() -> None:
     assert (board.pins[18].level, board.pins[18].world) == (1, None)
 
 
-def test_a_change_without_an_edge_is_told_as_such() -> None:
+def test_change_without_an_edge_is_reported_as_such() -> None:
     (change,) = BoardModel().apply(Setup(5, Function.OUT))
     assert isinstance(change, Change)
     assert not change.edge

@@ -181,7 +181,7 @@ def test_invalid_mode(gpio: Gpio) -> None:
     assert gpio.getmode() is None
 
 
-def test_output_is_read_back_at_once_and_arrives_in_order(bcm: Gpio, board: Board) -> None:
+def test_output_is_read_back_immediately_and_arrives_in_order(bcm: Gpio, board: Board) -> None:
     bcm.setup(7, GPIO.OUT)
     edges = board.watch([7], timeout=30)
     levels = [number % 2 for number in range(1, 200)]
@@ -326,7 +326,7 @@ def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, boar
         bcm.output(7, 1)
 
 
-def test_cleanup_leaves_what_others_set_up(bcm: Gpio, board: Board) -> None:
+def test_cleanup_leaves_pins_of_other_processes(bcm: Gpio, board: Board) -> None:
     other = Gpio()
     other.setmode(GPIO.BCM)
     other.setup(5, GPIO.OUT, initial=1)
@@ -456,7 +456,7 @@ def test_pwm_object_ends_with_its_last_reference() -> None:
 
 
 def heard(board: Board, pin: int) -> int:
-    """The level once ``board`` has heard of all that the server did until now."""
+    """Return the level once ``board`` has received all that the server did until now."""
     board._link.call(None)
     return board.get(pin)
 

@@ -40,6 +40,6 @@ def test_an_image_of_any_shape() -> None:
 
 
 @pytest.mark.parametrize("data", [np.zeros(3), "abc", 5, [300]])
-def test_what_is_no_bytes_is_refused(data: Any) -> None:
+def test_value_that_is_not_bytes_is_refused(data: Any) -> None:
     with pytest.raises(SerializationError):
         written(Image(data=data))

@@ -28,7 +28,7 @@ SCALARS = [*NUMBERS, "bool", "string", "time", "duration"]
 
 @st.composite
 def full_texts(draw: st.DrawFn) -> str:
-    """The full text of a type ``p/M0``, which may contain p/M1, p/M2; those may contain each later one."""
+    """Return the full text of a type ``p/M0``, which may contain p/M1, p/M2; those may contain each later one."""
     count = draw(st.integers(1, 3))
     texts = []
     for number in range(count):
@@ -81,7 +81,7 @@ def fill(draw: Any, message: Any, make: Any) -> Any:
 
 @st.composite
 def messages(draw: st.DrawFn) -> Any:
-    """A message of a random type, with random values."""
+    """Return a message of a random type, with random values."""
     text = draw(full_texts())
     top = class_from_text("p/M0", text)
     parts = text.split(f"\n{SEPARATOR}\n")
@@ -99,7 +99,7 @@ def messages(draw: st.DrawFn) -> Any:
 
 
 def wire(message: Any) -> bytes:
-    """The bytes of a message, field by field as http://wiki.ros.org/msg says."""
+    """Return the bytes of a message, field by field as http://wiki.ros.org/msg says."""
     return b"".join(
         wire_field(getattr(message, name), type_)
         for name, type_ in zip(message.__slots__, message._slot_types, strict=True)

@@ -133,7 +133,7 @@ ASKING = {
 
 
 @pytest.mark.parametrize(("text", "body"), ASKING.values(), ids=list(ASKING))
-def test_message_that_asks_for_more_than_it_has_is_refused(text: str, body: Callable[[], bytes]) -> None:
+def test_message_with_counts_beyond_its_bytes_is_refused(text: str, body: Callable[[], bytes]) -> None:
     with pytest.raises(DeserializationError):
         class_from_text("p/M", text)().deserialize(body())
 

@@ -77,7 +77,7 @@ NAMES_OF_GENERATED_CODE = {
 
 @pytest.fixture(autouse=True)
 def canary() -> Iterator[None]:
-    """What an attack of these tests would call."""
+    """Provide what an attack of these tests would call."""
     builtins.canary = EXECUTED.append  # type: ignore[attr-defined]
     yield
     del builtins.canary  # type: ignore[attr-defined]
@@ -87,7 +87,7 @@ def canary() -> Iterator[None]:
 
 
 def assert_harmless(source: str, names: set[str]) -> None:
-    """Generated source has the names of generated code, those of the definition, and no call of anything else."""
+    """Assert that generated source has the names of generated code, those of the definition, and nothing else."""
     tree = ast.parse(source)
     stored = {
         node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)

@@ -36,7 +36,7 @@ AFAR = MasterPlace("robot", 11311, ["192.0.2.7"])
 # --- addresses
 
 
-def test_what_takes_too_long_is_not_waited_for() -> None:
+def test_query_that_takes_too_long_times_out() -> None:
     end = threading.Event()
     start = time.monotonic()
     found = in_parallel(end.wait, [0.0, 60.0], 0.5)
@@ -46,7 +46,7 @@ def test_what_takes_too_long_is_not_waited_for() -> None:
     assert isinstance(found[1], TimeoutError)
 
 
-def test_many_are_asked_side_by_side() -> None:
+def test_queries_run_in_parallel() -> None:
     def ask(number: int) -> int:
         if number == 3:
             raise OSError("no")
@@ -102,7 +102,7 @@ def test_why_an_address_does_not_answer(listener: socket.socket) -> None:
     assert trouble_of(RpcUnreachable("http://x:1", "odd")).fault is Fault.OTHER
 
 
-def test_somebody_who_speaks_no_ros(listener: socket.socket) -> None:
+def test_server_without_ros_is_reported(listener: socket.socket) -> None:
     def hang_up() -> None:
         peer, _ = listener.accept()
         with peer:
@@ -195,7 +195,7 @@ def test_variables(environ: dict[str, str], place: MasterPlace, status: str, tex
 
 
 def test_a_folder_of_somebody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What `sudo roscore` leaves behind; nobody is told to take over a folder above the one that was named."""
+    """What `sudo roscore` leaves behind; nobody is advised to take over a folder above the one that was named."""
     monkeypatch.setattr(os, "access", lambda path, _: Path(path) != tmp_path)
     environ = {"ROS_HOSTNAME": "localhost", "ROS_HOME": str(tmp_path)}
     (finding,) = said(environ, HERE)
@@ -216,7 +216,7 @@ def test_a_variable_that_cannot_be_read_ends_the_examination() -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "status", "text"),
+    ("theirs", "status", "text"),
     [
         (100.0, "ok", "is the same"),
         (100.05, "ok", "is the same"),
@@ -225,8 +225,8 @@ def test_a_variable_that_cannot_be_read_ends_the_examination() -> None:
         (3700.0, "problem", "3599.9 s ahead of this one"),
     ],
 )
-def test_clocks(told: float, status: str, text: str) -> None:
-    finding = clock_finding("robot", told, before=100.0, after=100.1)
+def test_clocks(theirs: float, status: str, text: str) -> None:
+    finding = clock_finding("robot", theirs, before=100.0, after=100.1)
     assert (finding.status.value, text in finding.text) == (status, True), finding
 
 
@@ -256,7 +256,7 @@ def test_packages(tmp_path: Path) -> None:
     assert [each.status.value for each in found] == ["warning", "warning", "problem"]
 
 
-def test_a_package_of_the_workshop_made_anew_is_in_order(tmp_path: Path) -> None:
+def test_new_package_of_the_workshop_has_no_findings(tmp_path: Path) -> None:
     """The course has students make `rpi_msgs`, which minirospy brings along; a workspace names both."""
     package(tmp_path / "rpi_msgs", "rpi_msgs", "rospy")
     paths = os.pathsep.join(map(str, (tmp_path, *built_in_roots())))

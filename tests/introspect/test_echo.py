@@ -69,7 +69,7 @@ def test_plotting_takes_the_time_of_the_header() -> None:
     assert echo(pose, plot=True).splitlines()[1].startswith("3000000000,")
 
 
-def test_a_wrong_field_is_said_at_once() -> None:
+def test_unknown_field_is_reported_before_the_first_message() -> None:
     with pytest.raises(NotFoundError, match="did you mean pose"):
         echo(PoseStamped(), "poes")
 

@@ -24,7 +24,7 @@ def test_paths_are_parsed() -> None:
 @pytest.mark.parametrize(
     "path", ["a[", "a[]", "a[x]", "a[1.5]", "a//b", "[0]", "a/", "a[1][2]", "a b", "a[::0]", "a[1:2:3:4]"]
 )
-def test_what_is_no_path_is_refused(path: str) -> None:
+def test_malformed_path_is_refused(path: str) -> None:
     with pytest.raises(UsageError, match=r"field path \["):
         parse_path(path)
 
@@ -46,7 +46,7 @@ def test_values_are_found() -> None:
     assert value("header/stamp/secs") == 0
 
 
-def test_what_is_not_there_is_said() -> None:
+def test_missing_field_is_reported() -> None:
     scan = LaserScan(ranges=[1.0])
     with pytest.raises(NotFoundError, match=r"field \[range\] not found; did you mean ranges"):
         field_value(scan, parse_path("range"))

@@ -26,7 +26,7 @@ from minirospy.introspect.streams import ToolNode
 
 @pytest.fixture
 def node(master: str) -> Iterator[ToolNode]:
-    """A node that publishes /flag and serves /set_flag."""
+    """Run a node that publishes /flag and serves /set_flag."""
     from io import BytesIO
 
     from minirospy.wire.tcpros import InterfaceType
@@ -182,7 +182,7 @@ def test_the_commands_as_functions(master: str, capsys: pytest.CaptureFixture[st
     assert (ended.value.code, capsys.readouterr().out) == (0, "/tester\n")
 
 
-def test_what_ros_leaks_has_a_name_here(master: str) -> None:
+def test_names_that_ros_leaks_exist_here(master: str) -> None:
     """ROS raises whatever its YAML or XML-RPC library raises."""
     for name, value in (("/a", "{a: "), ("/a", "")):
         with pytest.raises(rosparam.RosParamException):

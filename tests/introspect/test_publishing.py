@@ -24,7 +24,7 @@ class Hand:
         return self.time
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        assert nanoseconds <= SECOND, "no pause is longer than the rate asks for"
+        assert nanoseconds <= SECOND, "no pause is longer than the rate requires"
         self._left -= 1
         if not self._left:
             self.time = self._to
@@ -34,7 +34,7 @@ class Hand:
 
 
 def sent_by(clock: Any, published: Any = None) -> list[int]:
-    """The seconds at which five messages go out at 1 Hz."""
+    """Return the seconds at which five messages go out at 1 Hz."""
     times: list[int] = []
 
     def publish(_: Any) -> None:

@@ -38,7 +38,7 @@ def test_a_rate_is_that_of_the_window() -> None:
     assert math.isclose(report.std_dev, statistics.pstdev([1.0, 1.5]))
 
 
-def test_time_that_is_set_back_starts_anew() -> None:
+def test_time_that_is_set_back_restarts_the_window() -> None:
     window = RateWindow()
     for time in (100.0, 101.0, 5.0, 5.25):
         window.add(time)

@@ -18,7 +18,7 @@ from minirospy.wire.header import Header
 
 @pytest.fixture
 def simulated_time(master: str) -> Iterator[ToolNode]:
-    """A node that latches /clock at 100 s, where /use_sim_time is set."""
+    """Run a node that latches /clock at 100 s, where /use_sim_time is set."""
     proxy = MasterProxy(master, "/test")
     proxy.set_param("/use_sim_time", True)
     proxy.close()

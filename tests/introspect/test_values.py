@@ -32,14 +32,14 @@ WORDS = [
 
 
 @pytest.mark.parametrize("text", WORDS)
-def test_words_mean_what_yaml_says(text: str) -> None:
+def test_words_have_the_values_of_yaml(text: str) -> None:
     ours, theirs = parse_value(text), yaml.safe_load(text)
     assert type(ours) is type(theirs)
     assert ours == theirs or (isinstance(ours, float) and math.isnan(ours) and math.isnan(theirs))
 
 
 @given(st.text(alphabet="0123456789.-+eE_truefalsnoy/:ax ", max_size=8))
-def test_any_word_means_what_yaml_says(text: str) -> None:
+def test_any_word_has_the_value_of_yaml(text: str) -> None:
     try:
         theirs = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError):
@@ -93,7 +93,7 @@ def test_pretty() -> None:
     assert format_pretty([1]) == "- 1\n"
 
 
-def test_what_a_parameter_cannot_hold() -> None:
+def test_values_that_a_parameter_cannot_hold_are_refused() -> None:
     check_parameter({"a": [1, "x", 2.5, True, b"\0"]}, "/p")
     for value, why in (
         (None, "null"),

@@ -147,10 +147,10 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
         types = _types(topic, answers)
         if len(types) > 1:
             differing += 1
-            told = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
+            found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
             yield problem(
                 "topics",
-                f"{topic} has nodes of different types, which never connect: {told}",
+                f"{topic} has nodes of different types, which never connect: {found}",
                 "use one type, or two names",
             )
 

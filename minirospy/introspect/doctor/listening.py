@@ -114,7 +114,7 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
         host = host_port(uri)[0]
         try:
             answer = json.loads(text)
-            told, fault = float(answer["time"]), str(answer["fault"])
+            theirs, fault = float(answer["time"]), str(answer["fault"])
             name = host if answer["host"] == host else f"{answer['host']} ({host})"
             trouble = Trouble(Fault(fault), str(answer["text"])) if fault else None
         except (ValueError, KeyError, TypeError):
@@ -126,7 +126,7 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
             yield unreached_finding(own, name, host, trouble)
         else:
             yield ok("both ways", f"this machine reaches {name}, and {name} this one")
-            yield clock_finding(name, told, before, after)
+            yield clock_finding(name, theirs, before, after)
 
 
 def _call(uri: str, service: str, caller_id: str) -> str:

@@ -53,10 +53,10 @@ def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
     if place.is_local:
         return
     before = time.time()
-    told = _status(master).get("time")
+    theirs = _status(master).get("time")
     after = time.time()
-    if isinstance(told, float):
-        yield clock_finding(f"the master's machine ({place.host})", told, before, after)
+    if isinstance(theirs, float):
+        yield clock_finding(f"the master's machine ({place.host})", theirs, before, after)
         return
     seconds = _http_date(place)
     if seconds is None:
@@ -66,9 +66,9 @@ def check_clock(master: MasterProxy, place: MasterPlace) -> Iterator[Finding]:
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
 
 
-def clock_finding(who: str, told: float, before: float, after: float) -> Finding:
-    """Return what ``told``, a time that came between ``before`` and ``after``, says of another clock."""
-    difference = told - after if told > after else min(0.0, told - before)
+def clock_finding(who: str, theirs: float, before: float, after: float) -> Finding:
+    """Return what ``theirs``, a time that came between ``before`` and ``after``, says of another clock."""
+    difference = theirs - after if theirs > after else min(0.0, theirs - before)
     if abs(difference) < _FEEL_SECONDS:
         return ok("clock", f"that of {who} is the same")
     text = f"that of {who} is {abs(difference):.1f} s {'ahead of' if difference > 0 else 'behind'} this one"
