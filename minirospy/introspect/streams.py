@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
+_CLOCK = struct.Struct("<II")
 _POLL_SECONDS = 0.1
 _WAITING = 64
 """Messages that may wait for the reader."""
@@ -183,12 +184,13 @@ class ToolNode:
         if self.simulated:
             clock = self.clock = SimulatedClock()
 
-            def tell(body: Frame, _: Header) -> None:
-                # rosgraph_msgs/Clock is one time: seconds and nanoseconds.
-                secs, nsecs = struct.unpack("<II", body)
-                clock.set(secs * 10**9 + nsecs)
+            def set_clock(body: Frame, _: Header) -> None:
+                # rosgraph_msgs/Clock is one time: seconds and nanoseconds. Any node may publish something else.
+                if len(body) == _CLOCK.size:
+                    secs, nsecs = _CLOCK.unpack(body)
+                    clock.set(secs * 10**9 + nsecs)
 
-            self.listen("/clock", tell)
+            self.listen("/clock", set_clock)
 
     def _asked_to_stop(self, _reason: str) -> None:
         self._end()

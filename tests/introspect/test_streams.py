@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import genpy
 import pytest
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 from minirospy.environment import Environment
 from minirospy.introspect.streams import ToolNode
@@ -42,3 +43,17 @@ def test_late_listener_gets_the_latched_message_once() -> None:
         node.listen("/clock", deliver)
         assert arrived.wait(30)
     assert bodies == [(100).to_bytes(4, "little") + bytes(4)]
+
+
+def test_clock_of_another_type_is_ignored(master: str) -> None:
+    proxy = MasterProxy(master, "/test")
+    proxy.set_param("/use_sim_time", True)
+    proxy.close()
+    arrived = threading.Event()
+
+    with ToolNode(Environment.read(), "clock") as other:
+        other.publisher("/clock", String, latch=True).publish(String("not a time"))
+        with ToolNode(Environment.read(), "tool", ros_time=True) as node:
+            node.listen("/clock", lambda *_: arrived.set())
+            assert arrived.wait(30)
+            assert node.clock.now() == 0
