@@ -96,6 +96,9 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.BitAnd: ast.BitOr,
 }
 
+_IMPOSSIBLE = 42
+"""The exit status of a fork that could not install its mutant."""
+
 Mutate = Callable[[ast.AST], ast.AST | None]
 """Return what replaces a node; None if the node itself was changed."""
 
@@ -224,8 +227,11 @@ def _is_none(node: ast.AST) -> bool:
 
 def install(
     mutant: Mutant, tree: ast.Module, path: str, functions: dict[tuple[int, str], list[FunctionType]]
-) -> None:
-    """Change the code of the running module. ``functions``: those of the module, by line and name."""
+) -> bool:
+    """Change the code of the running module; return whether that was possible. ``functions``: by line and name.
+
+    It is not where the fault takes away a function's only use of an outer variable, such as super().
+    """
     mutated = copy.deepcopy(tree)
     node = next(each for number, each in enumerate(ast.walk(mutated)) if number == mutant.number)
     new = mutant.apply(node)
@@ -234,16 +240,20 @@ def install(
     ast.fix_missing_locations(mutated)
 
     module = compile(mutated, path, "exec")
+    is_installed = True
     for code in _codes(module):
         for function in functions.get((code.co_firstlineno, code.co_name), ()):
             if function.__code__.co_freevars == code.co_freevars:
                 function.__code__ = code
+            else:
+                is_installed = False
     for each in vars(sys.modules[f"minirospy.{mutant.module}"]).values():
         if hasattr(each, "cache_clear"):
             each.cache_clear()
     statement = next((each for each in mutated.body if _holds(each, mutant.line)), None)
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         _assign(sys.modules[f"minirospy.{mutant.module}"], statement, path)
+    return is_installed
 
 
 class _Replace(ast.NodeTransformer):
@@ -274,7 +284,10 @@ def _assign(module: ModuleType, statement: ast.stmt, path: str) -> None:
         if vars(module)[name] is old:
             continue
         for other in list(sys.modules.values()):
-            if getattr(other, "__name__", "").startswith("minirospy.") and vars(other).get(name) is old:
+            if (
+                getattr(other, "__name__", "").startswith(("minirospy.", "tests."))
+                and vars(other).get(name) is old
+            ):
                 setattr(other, name, vars(module)[name])
 
 
@@ -373,7 +386,8 @@ class Mutants:
             ended, status = os.waitpid(pid, os.WNOHANG)
             if ended:
                 del running[pid]
-                self._count(mutant, "killed" if status else "survived")
+                if os.waitstatus_to_exitcode(status) != _IMPOSSIBLE:
+                    self._count(mutant, "killed" if status else "survived")
             elif time.monotonic() > end:
                 os.kill(pid, signal.SIGKILL)
                 os.waitpid(pid, 0)
@@ -456,7 +470,9 @@ class Mutants:
             path, tree = self._trees[mutant.module]
             # Its stream is a copy of standard output.
             session.config.pluginmanager.unregister(name="terminalreporter")
-            install(mutant, tree, path, functions[mutant.module])
+            if not install(mutant, tree, path, functions[mutant.module]):
+                status = _IMPOSSIBLE
+                return
             for index in tests:
                 item = session.items[index]
                 item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)

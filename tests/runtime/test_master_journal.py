@@ -21,6 +21,7 @@ from xmlrpc.client import Fault, ServerProxy
 
 import pytest
 
+from minirospy.errors import RpcFault, RpcUnreachable
 from minirospy.runtime import journal as journal_module
 from minirospy.runtime import master as master_module
 from minirospy.runtime.journal import Journal
@@ -213,6 +214,117 @@ def test_old_session_is_recovered_only_if_a_node_answers(
         assert ("recovered" if lives else "left behind: none of these nodes answers") in second.news[0]
         await second.close()
         await nodes.close()
+
+    run(test())
+
+
+class Answers:
+    """In place of the master's calls to nodes: what each try gets, and a record of the tries."""
+
+    def __init__(self, patch: pytest.MonkeyPatch, *answers: Any) -> None:
+        self.calls: list[tuple[str, str, float]] = []
+        self._answers = list(answers)
+        patch.setattr(master_module, "AsyncRpcClient", lambda **_: self)
+
+    async def call(self, uri: str, method: str, *args: Any, timeout: float) -> Any:
+        self.calls.append((uri, method, timeout))
+        answer = self._answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    async def close(self) -> None:
+        pass
+
+
+def unreachable(cause: Exception) -> RpcUnreachable:
+    error = RpcUnreachable("http://127.0.0.1:1/", "why")
+    error.__cause__ = cause
+    return error
+
+
+SILENCE = unreachable(TimeoutError())
+
+
+@pytest.mark.parametrize(
+    ("answers", "tries", "is_kept"),
+    [
+        ([SILENCE] * 4, 3, False),
+        ([SILENCE, SILENCE, [1, "", "/a"]], 3, True),
+        ([[1, "", 0]], 1, True),
+        ([[1, "", ""]], 1, True),
+        ([[1, "", "/another"]], 1, False),
+        ([[0, "", "/another"]], 1, True),
+        (["anything"], 1, True),
+        ([RpcFault(1, "no such method")], 1, True),
+        ([SILENCE, unreachable(ConnectionRefusedError())], 2, False),
+        ([unreachable(EOFError())], 1, False),
+    ],
+)
+def test_recovered_node_is_forgotten_after_three_tries_of_three_seconds(
+    path: Path, answers: list[Any], tries: int, is_kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uri = "http://127.0.0.1:1/"
+
+    async def test() -> None:
+        first = await start(path)
+        call(first, "registerPublisher", "/a", "/t", "a/B", uri)
+        await first.close(keep_journal=True)
+        nodes = Answers(monkeypatch, *answers)
+        second = await start(path)
+        assert second._checking
+        await second._checking
+        assert nodes.calls == [(uri, "getName", 3.0)] * tries
+        assert set(second.registry.nodes()) == ({"/a"} if is_kept else set())
+        await second.close()
+
+    run(test())
+
+
+@pytest.mark.parametrize(("age", "is_asked"), [(590.0, False), (610.0, True)])
+def test_nodes_of_a_session_of_ten_minutes_ago_are_tried_once_for_a_second(
+    path: Path, age: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uri = "http://127.0.0.1:1/"
+
+    async def test() -> None:
+        first = await start(path)
+        call(first, "registerPublisher", "/a", "/t", "a/B", uri)
+        await first.close(keep_journal=True)
+        os.utime(path, (time.time() - age,) * 2)
+        nodes = Answers(monkeypatch, *[SILENCE] * 10)
+        second = await start(path)
+        if is_asked:
+            assert nodes.calls == [(uri, "getName", 1.0)]
+            assert not second.registry.nodes()
+            assert second.news == [
+                "journal: 1 node and 0 parameters of the master that stopped 10 minutes ago are left behind: "
+                "none of these nodes answers"
+            ]
+        else:
+            assert second.news == [
+                "journal: recovered 1 node and 0 parameters of the master that stopped 10 minutes ago"
+            ]
+        await second.close()
+
+    run(test())
+
+
+def test_master_gives_a_sign_of_life_every_thirty_seconds(path: Path) -> None:
+    async def test() -> None:
+        loop = asyncio.get_running_loop()
+        before = loop.time()
+        master = await start(path)
+        os.utime(path, (1, 1))
+        assert master._touching
+        assert before + 30 <= master._touching.when() <= loop.time() + 30
+        # As the timer does it.
+        first = master._touching
+        master._touch()
+        assert path.stat().st_mtime > 1
+        assert master._touching is not first
+        first.cancel()
+        await master.close()
 
     run(test())
 
