@@ -6,7 +6,7 @@
         async for scan in node.subscribe("/scan", LaserScan):
             await node.publish("/nearest", Float32(min(scan.ranges)))
 
-A program may hold any number of nodes. Underneath are the objects that the rospy API stands on
+A program may hold any number of nodes. Underneath are the objects that the rospy API is built on
 (``minirospy.runtime``). Examples: docs/asyncio.md.
 """
 

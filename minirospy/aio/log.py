@@ -32,7 +32,7 @@ class TerminalHandler(logging.Handler):
         """Write one line."""
         name = self._NAMES.get(record.levelno, record.levelname)
         stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
-        # The terminal may be gone; the program has better things to do.
+        # There may be no terminal any more, which is no fault of the program.
         with contextlib.suppress(OSError, ValueError):
             stream.write(f"[{name}] [{record.created:f}]: {self.format(record)}\n")
             stream.flush()

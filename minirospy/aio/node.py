@@ -75,7 +75,7 @@ class Node:
         host: str = "",
         rosout: bool = True,
     ) -> None:
-        """Raises ValueError on a name that is empty or has a namespace."""
+        """Create the node. Raises ValueError on a name that is empty or has a namespace."""
         if not name:
             raise ValueError("name must not be empty")
         if "/" in name:
@@ -151,7 +151,7 @@ class Node:
             raise
 
     async def close(self) -> None:
-        """Leave the graph: topics and services end, the master is told. Idempotent."""
+        """Leave the graph: topics and services end, the node unregisters. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -183,7 +183,7 @@ class Node:
         return self._stopping.is_set()
 
     async def spin(self) -> None:
-        """Wait until the node is asked to end."""
+        """Wait until the node is requested to shut down."""
         await self._stopping.wait()
 
     @property
@@ -192,17 +192,17 @@ class Node:
         return self._node.uri
 
     def resolve(self, name: str) -> str:
-        """The global name of ``name`` as this node sees it."""
+        """Return the global name of ``name`` as this node sees it."""
         return names.resolve(name, self.name, self._remappings)
 
     # --- topics
 
     def subscribe(self, topic: str, message_class: type[_M], *, queue_size: int = 10) -> Subscription[_M]:
-        """The messages of ``topic``, for ``async for``.
+        """Subscribe to ``topic`` and return its messages, for ``async for``.
 
         While the program is busy, the newest ``queue_size`` messages wait; older ones are dropped and counted
         (``dropped``). Listening begins at once, in the background; ``await node.subscribe(...)`` waits until
-        the master knows. It ends by :meth:`Subscription.close`, or when nobody holds the subscription any more.
+        the master knows. It ends by :meth:`Subscription.close`, or when the subscription is garbage-collected.
         Raises ValueError on a ``queue_size`` below 1.
         """
         if queue_size < 1:
@@ -214,7 +214,7 @@ class Node:
         return Subscription(self, state, message_class, queue_size)
 
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
-        """The next message of ``topic``.
+        """Return the next message of ``topic``.
 
         Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the node ends meanwhile.
         """
@@ -231,10 +231,10 @@ class Node:
         headers: Mapping[str, str] | None = None,
         tcp_nodelay: bool = False,
     ) -> Publisher[_M]:
-        """A publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
+        """Return a publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
 
         ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
-        number; None: ``publish`` itself waits until all are written). ``latch``: whoever joins later gets the
+        number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets the
         last message. ``headers``: fields for the connection header. Raises ValueError where this node
         publishes the topic with another type.
         """
@@ -291,7 +291,7 @@ class Node:
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> ServiceProxy[_Response]:
-        """A function for many calls: ``await proxy(...)``; ``persistent`` keeps one connection for all."""
+        """Return a function for many calls: ``await proxy(...)``; ``persistent`` keeps one connection for all."""
         return ServiceProxy(self, self.resolve(service), service_class, persistent, headers)
 
     def serve(
@@ -326,7 +326,7 @@ class Node:
     # --- parameters
 
     async def get_param(self, name: str, default: Any = _UNSPECIFIED) -> Any:
-        """A parameter's value, or ``default``.
+        """Return a parameter's value, or ``default``.
 
         Raises KeyError where it is not set and there is no default, MasterUnreachableError.
         """
@@ -353,20 +353,20 @@ class Node:
             raise KeyError(name) from error
 
     async def search_param(self, name: str) -> str | None:
-        """The full name of the parameter nearest to this node's namespace; None where there is none."""
+        """Return the full name of the parameter nearest to this node's namespace; None where there is none."""
         try:
             return str(await self._node.master("searchParam", name))
         except RpcRefused:
             return None
 
     async def get_param_names(self) -> list[str]:
-        """The names of all parameters."""
+        """Return the names of all parameters."""
         return list(await self._node.master("getParamNames"))
 
     # --- time
 
     def now(self) -> Time:
-        """The time: simulated with /use_sim_time (zero until /clock tells it), else the machine's."""
+        """Return the time: simulated with /use_sim_time (zero until the first /clock), else the machine's."""
         now = self._simulated.now if self._simulated else time.time_ns()
         return Time(*divmod(now, _BILLION))
 
@@ -405,7 +405,7 @@ class Node:
             published.links_changed()
 
     def _spawn(self, work: Coroutine[Any, Any, _T]) -> asyncio.Task[_T]:
-        """A task of this node's own, cancelled when it closes."""
+        """Start a task that is cancelled when the node closes."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -418,14 +418,14 @@ class Node:
                 self._loop.call_soon_threadsafe(lambda: None if self._is_closed else self._spawn(work()))
 
     async def _wait_for_master(self) -> None:
-        told = False
+        is_reported = False
         while True:
             try:
                 await self._node.master("getPid")
             except MasterUnreachableError as error:
-                if not told:
+                if not is_reported:
                     self.log.warning("%s. Will keep trying.", error)
-                    told = True
+                    is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
                 return  # a master, though one that lacks this call, as that of @foxglove/ros1
@@ -465,7 +465,7 @@ class Node:
         self.log.addHandler(handler)
 
     async def _wait_for_service(self, name: str) -> None:
-        told = False
+        is_reported = False
         while not self.is_shutdown:
             try:
                 uri = await self._node.master("lookupService", name)
@@ -481,9 +481,9 @@ class Node:
             except (RpcError, MasterUnreachableError):
                 pass
             except (OSError, WireError):
-                if not told:
+                if not is_reported:
                     self.log.warning("wait_for_service(%s): failed to contact, will keep trying", name)
-                    told = True
+                    is_reported = True
             else:
                 client.close()
                 return

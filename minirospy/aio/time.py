@@ -25,7 +25,7 @@ class Rate:
     """Keeps a loop at ``hz`` turns a second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
 
     def __init__(self, node: Node, hz: float) -> None:
-        """Raises ValueError where ``hz`` is not above 0."""
+        """Start the first period. Raises ValueError where ``hz`` is not above 0."""
         if hz <= 0:
             raise ValueError(f"a rate of {hz} Hz: it has to be above 0")
         self._node = node
@@ -56,7 +56,7 @@ class Rate:
 
 
 class SimulatedTime:
-    """The time that /clock tells, in nanoseconds; 0 until it does."""
+    """The time of the last /clock, in nanoseconds; 0 before the first."""
 
     def __init__(self, stopping: asyncio.Event) -> None:
         self.now = 0

@@ -70,7 +70,7 @@ class Subscription(Handle, Generic[_M]):
                 return message
 
     async def next(self, timeout: float | None = None) -> _M:
-        """The next message.
+        """Return the next message.
 
         Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
         """
@@ -93,15 +93,15 @@ class Subscription(Handle, Generic[_M]):
         Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
         """
         connected = asyncio.Event()
-        told = self._state.subscription.on_connected
-        told.append(connected.set)
+        callbacks = self._state.subscription.on_connected
+        callbacks.append(connected.set)
         try:
             await asyncio.wait_for(self._wait_for(count, connected), timeout)
         except asyncio.TimeoutError:
             text = f"timeout exceeded while waiting for {count} publishers of topic {self.topic}"
             raise TimeoutError(text) from None
         finally:
-            told.remove(connected.set)
+            callbacks.remove(connected.set)
 
     async def close(self) -> None:
         """Stop listening. What has come can still be read. Idempotent."""
@@ -125,8 +125,8 @@ class Subscription(Handle, Generic[_M]):
         self._ended = True
         self._arrived.set()
         # Who waits for publishers looks again.
-        for tell in self._state.subscription.on_connected:
-            tell()
+        for callback in self._state.subscription.on_connected:
+            callback()
 
     def _deserialized(self, frame: bytes | memoryview, header: Header) -> _M | None:
         message: Any = self._message_class()
@@ -224,7 +224,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Any]) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` leaves a subscription behind that nobody holds.
+        # `async for ... break` leaves a subscription behind without a reference.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
@@ -250,7 +250,7 @@ class SubscribedTopic:
             await self._node._node.unsubscribe(self.subscription)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
-        # A small frame lies in a buffer that the next receive reuses.
+        # A small frame is in a buffer that the next receive reuses.
         kept = frame if len(frame) > CHUNK else bytes(frame)
         for handle in list(self._handles):
             handle._put(kept, header)
@@ -308,5 +308,5 @@ class PublishedTopic:
         self._changed = asyncio.Event()
 
     async def next_change(self) -> None:
-        """Return when a subscriber has come or gone."""
+        """Return when a subscriber has connected or disconnected."""
         await self._changed.wait()

@@ -161,7 +161,7 @@ def spin() -> None:
 
 
 def is_shutdown() -> bool:
-    """Whether the node has shut down."""
+    """Return whether the node has shut down."""
     return current_session().poll_shutdown()
 
 
@@ -178,7 +178,7 @@ def signal_shutdown(reason: object) -> None:
 
 
 def get_name() -> str:
-    """This node's global name; ``/unnamed`` before init_node."""
+    """Return this node's global name; ``/unnamed`` before init_node."""
     return current_session().name
 
 
@@ -186,12 +186,12 @@ get_caller_id = get_name
 
 
 def get_namespace() -> str:
-    """The namespace of this node, with a slash at its end."""
+    """Return the namespace of this node, with a trailing slash."""
     return names.namespace_of(current_session().name)
 
 
 def get_node_uri() -> str | None:
-    """The URI of this node's Slave API; None before init_node."""
+    """Return the URI of this node's Slave API; None before init_node."""
     node = current_session().node
     return node.uri if node else None
 
@@ -212,20 +212,20 @@ def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """The global name of ``name`` as this node, or the node ``caller_id``, sees it, remapped."""
+    """Return the global, remapped name of ``name`` as this node, or the node ``caller_id``, sees it."""
     return current_session().resolve(name, caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """What the command line has in place of ``name``, as a global name; ``name`` itself where it has nothing."""
+    """Return the remapping of ``name`` on the command line, as a global name; ``name`` itself where there is none."""
     return current_session().identity.remap(name, caller_id)
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """The command line without remappings, private parameters and ROS's own arguments."""
+    """Return the command line without remappings, private parameters and ROS's own arguments."""
     return names.parse_arguments(sys.argv if argv is None else argv).plain
 
 
 def load_command_line_node_params(argv: Sequence[str]) -> dict[str, Any]:
-    """The private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raises ROSInitException."""
+    """Return the private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raises ROSInitException."""
     return private_parameters(names.parse_arguments(argv))

@@ -56,11 +56,11 @@ class Identity:
         return self._name
 
     def be_called(self, name: str) -> None:
-        """Go by a global name until :meth:`take_name`."""
+        """Use a global name until :meth:`take_name`."""
         self._name = name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """The global name of ``name`` as this node, or the node ``caller_id``, sees it."""
+        """Return the global name of ``name`` as this node, or the node ``caller_id``, sees it."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
             # As rospy reads it: `~` keeps a slash behind it, and `~/x` is `/x`.
@@ -70,7 +70,7 @@ class Identity:
         return self.remappings.get(resolved, resolved)
 
     def resolve_topic(self, name: str) -> str:
-        """The same for a topic, which keeps the name that it was made with.
+        """Return the global name of a topic, which keeps the name that it was created with.
 
         Before init_node it has the remappings of the process's command line, but cannot be private:
         raises ValueError.
@@ -82,12 +82,12 @@ class Identity:
         return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """What the command line says in place of ``name``, as it is spelt there; else ``name`` itself."""
+        """Return the remapping of ``name`` as it is spelled on the command line; else ``name`` itself."""
         mapped = self.arguments.remappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 
     def reload_arguments(self, argv: Sequence[str]) -> None:
-        """Take ``argv`` for the command line."""
+        """Use ``argv`` as the command line."""
         self._arguments = names.parse_arguments(argv)
 
     def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
@@ -107,7 +107,7 @@ class Identity:
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, Any]:
-    """The values of ``_param:=value``, read as YAML. Raises ROSInitException on what is none."""
+    """Return the values of ``_param:=value``, read as YAML. Raises ROSInitException on what is not YAML."""
     if arguments.wrong:
         raise ROSInitException(
             f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="
@@ -128,7 +128,7 @@ def private_parameters(arguments: names.Arguments) -> dict[str, Any]:
 
 
 def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
-    """Warn, as rospy does, of a name that is not one of the graph; the master refuses it later, or does not."""
+    """Warn, as rospy does, of a name that is not legal in the graph; the master may refuse it later."""
     if not names.is_legal_name(name):
         warnings.warn(
             f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",
@@ -137,9 +137,9 @@ def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
 
 
 def _read_environment() -> Environment:
-    """The environment, and what the process's own command line says in place of it.
+    """Return the environment, overridden by the process's own command line.
 
-    As in rospy, the ``argv`` that a program hands to init_node has no say in this, but for ``__name``.
+    As in rospy, the ``argv`` that a program passes to init_node does not count here, but for ``__name``.
     """
     special: Mapping[str, str] = names.parse_arguments(sys.argv).special
     hosts = [value for key, value in special.items() if key in {"__ip", "__hostname"}]

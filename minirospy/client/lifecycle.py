@@ -31,7 +31,7 @@ class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
 
 
 class Deferral:
-    """A critical section of the main thread: ``with deferral:`` what a signal asks for is done when the block ends.
+    """A critical section of the main thread: ``with deferral:`` a signal is dispatched when the block ends.
 
     A hook may publish, log or register, and so must not run while the main thread is half way through such a thing. In
     other threads, where no signal arrives, without effect.
@@ -41,7 +41,7 @@ class Deferral:
         self.pending = False
         """Whether a signal waits for the main thread. Set by the signal's handler."""
         self.dispatch: Callable[[], object] = lambda: None
-        """Do what the pending signal asks for. In the main thread."""
+        """Dispatch the pending signal. In the main thread."""
         self._depth = 0
 
     @property
@@ -59,7 +59,7 @@ class Deferral:
             self.poll()
 
     def poll(self) -> None:
-        """Do what a pending signal asks for, where this is the main thread and outside of a critical section."""
+        """Dispatch a pending signal, where this is the main thread and outside of a critical section."""
         if self.pending and not self._depth and _is_main():
             self.dispatch()
 

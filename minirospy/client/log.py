@@ -120,11 +120,11 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
     A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
     ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
-    written or read is told of in one line. Raises ValueError on a log level that is none of rospy's.
+    written or read is reported in one line. Raises ValueError on a log level that is not one of rospy's.
     """
     if log_level is not None and log_level not in PYTHON_LEVELS:
         raise ValueError(
-            f"log_level [{log_level}] is none of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
+            f"log_level [{log_level}] is not one of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
         )
     path = (
         Path(log_file).absolute()
@@ -143,7 +143,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
         _log_to_file(session, path)
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
-    # Our own library speaks through the same lines, where something is wrong.
+    # Warnings of the library itself go to the same places.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
@@ -154,7 +154,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
 
 def start(session: Session, *, rosout: bool) -> None:
-    """The node is in the graph: offer its logger services, and publish to ``/rosout`` where that is wanted."""
+    """Offer the node's logger services, and publish to ``/rosout`` where ``rosout`` is set."""
     _offer_logger_services()
     if rosout:
         _start_rosout(session)
@@ -170,7 +170,7 @@ def _start_rosout(session: Session) -> None:
 
 
 def _add_handler(session: Session, logger: logging.Logger, handler: logging.Handler) -> None:
-    """Have ``logger`` write by ``handler``, until the process becomes another session."""
+    """Add ``handler`` to ``logger`` until the process becomes another node."""
     logger.addHandler(handler)
     session.on_replaced.append(lambda: logger.removeHandler(handler))
 
@@ -207,7 +207,7 @@ def _offer_logger_services() -> None:
 
 
 class _DeferringHandler(logging.Handler):
-    """Files and streams are not reentrant: what a signal asks for waits until a record is written."""
+    """Files and streams are not reentrant: a signal waits until a record is written."""
 
     def handle(self, record: logging.LogRecord) -> bool:
         """Write one record."""
@@ -251,7 +251,7 @@ class RosStreamHandler(_DeferringHandler):
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # The terminal is gone, or there never was one; the program has better things to do.
+            # There is no terminal, or not any more, which is no fault of the program.
             pass
 
 
@@ -371,7 +371,7 @@ def _warn(text: str) -> None:
 
 
 def _known_level(level: int) -> int:
-    """The nearest of the five levels at or below a level of Python's."""
+    """Return the nearest of the five levels at or below a level of Python's."""
     return max((known for known in _LEVEL_NAME if known <= level), default=logging.DEBUG)
 
 
@@ -478,7 +478,7 @@ class _Places:
         self._texts: dict[tuple[str, int, int], object] = {}
 
     def is_first(self, frame: FrameType) -> bool:
-        """Whether the call at ``frame`` has not logged before."""
+        """Return whether the call at ``frame`` has not logged before."""
         place = _place(frame)
         if place in self._once:
             return False
@@ -486,11 +486,11 @@ class _Places:
         return True
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
-        """Whether the call at ``frame`` was last due more than ``period`` seconds ago."""
+        """Return whether the call at ``frame`` was last due more than ``period`` seconds ago."""
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
-        # Simulated time that jumped back starts anew.
+        # Simulated time has jumped back: start again.
         due = before is None or now - before > pause or now < before
         if due:
             self._times[place] = now
@@ -549,7 +549,7 @@ def _named(function: _F, name: str, doc: str) -> _F:
 
 
 def _place(frame: FrameType) -> tuple[str, int, int]:
-    """The place of a call in the code: two calls on one line are two places."""
+    """Return the place of a call in the code: two calls on one line are two places."""
     return frame.f_code.co_filename, frame.f_lineno, frame.f_lasti
 
 

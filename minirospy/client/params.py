@@ -46,7 +46,7 @@ class MasterGoneError(ROSException, ConnectionRefusedError):
 
 
 def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
-    """A parameter's value, or ``default`` where it is not set.
+    """Return a parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
     Raises KeyError where it is not set and there is no default, ROSException where the master fails.
@@ -60,7 +60,7 @@ def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
 
 
 def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
-    """The same, without asking the master each time: it tells of changes. Before init_node, no different."""
+    """Return the same from a cache that the master keeps up to date; before init_node without the cache."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():
@@ -95,12 +95,12 @@ def set_param(param_name: str, param_value: Any) -> None:
     except ROSException:
         _check_sendable(param_value)
         raise
-    # The master does not tell who has set it.
+    # The master does not notify the node that has set it.
     current_session().parameter_changed(name)
 
 
 def has_param(param_name: str) -> bool:
-    """Whether a parameter, or a namespace of that name, is set. Raises ROSException."""
+    """Return whether a parameter, or a namespace of that name, is set. Raises ROSException."""
     name = current_session().resolve(param_name)
     return _ask("look for", name, lambda: current_session().master.has_param(name))
 
@@ -118,7 +118,7 @@ def delete_param(param_name: str) -> None:
 
 
 def search_param(param_name: str) -> str | None:
-    """The nearest parameter of this name, upwards from this node's namespace; None where there is none.
+    """Return the nearest parameter of this name, upwards from this node's namespace; None where there is none.
 
     Raises ROSException where the master fails, or the name is a private one.
     """
@@ -135,12 +135,12 @@ def search_param(param_name: str) -> str | None:
 
 
 def get_param_names() -> list[str]:
-    """The names of all parameters. Raises ROSException."""
+    """Return the names of all parameters. Raises ROSException."""
     return _ask("list", "/", current_session().master.get_param_names)
 
 
 class KeptParameters:
-    """What get_param_cached keeps, for a program that looks into it, or listens for what the master tells of it.
+    """What get_param_cached keeps, for a program that reads it, or is to be notified of its changes.
 
     Such a program may put a function of its own in the place of :meth:`update`.
     """
@@ -150,18 +150,18 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._told)
 
     def get(self, key: str) -> Any:
-        """A parameter that get_param_cached was asked for before. Raises KeyError."""
+        """Return a parameter that get_param_cached was called for before. Raises KeyError."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
         return get_param_cached(key)
 
     def set_notifier(self, notifier: Callable[[str, Any], object] | None) -> None:
-        """Call ``notifier(key, value)`` when the master tells of a change; a deleted one has the value {}."""
+        """Call ``notifier(key, value)`` when the master reports a change; a deleted one has the value {}."""
         self._notifier = notifier
 
     def update(self, key: str, value: Any) -> None:
-        """The master has told of a change."""
+        """Record that the master has reported a change."""
         if self._notifier:
             self._notifier(key, value)
 
@@ -171,7 +171,7 @@ class KeptParameters:
 
 @functools.cache
 def get_param_server_cache() -> KeptParameters:
-    """The one of this process."""
+    """Return the cache of this process."""
     return KeptParameters()
 
 
@@ -209,7 +209,7 @@ def _as_rospy(value: Any) -> Any:
 
 
 def _check_sendable(value: Any) -> None:
-    """Raise what rospy raises on a value that XML-RPC has no type for."""
+    """Raise what rospy raises on a value for which XML-RPC has no type."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
     if isinstance(value, int):

@@ -36,23 +36,23 @@ _M = TypeVar("_M", bound=Any)
 
 
 class SubscribeListener:
-    """Told when subscribers come and go; override what you need."""
+    """Is notified when subscribers connect and disconnect; override what you need."""
 
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """A subscriber has come: ``topic_publish`` reaches all, ``peer_publish`` only this one."""
+        """Handle a new subscriber: ``topic_publish`` reaches all, ``peer_publish`` only this one."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        """A subscriber has gone; ``num_peers`` are left."""
+        """Handle the end of a subscriber; ``num_peers`` are left."""
 
 
 class Publisher(Topic[_M]):
     """Publishes messages of ``data_class`` on a topic.
 
     ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
-    number; None: ``publish`` itself waits until all are written). ``latch``: whoever joins later gets
-    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is told of
+    number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets
+    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
     subscribers, in a thread of the library, one event after the other. Raises ValueError on a bad name, class
     or queue_size.
     """
@@ -103,7 +103,7 @@ class Publisher(Topic[_M]):
         else:
             state.check_initialized()
             if len(args) == 1 and isinstance(args[0], AnyMsg):
-                # As with rospy, bytes are taken for what their sender says that they are.
+                # As with rospy, the bytes are not checked against the type.
                 state.publish(args[0])
             else:
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
@@ -131,10 +131,10 @@ class Published(Shared):
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Any]] = set()
         self.subscriber_listeners: list[SubscribeListener] = []
-        """Who is told of subscribers; a program may add and remove."""
+        """Are notified of subscribers; a program may add and remove."""
         self._events: InOrder | None = None
         self._waiting: list[Callable[[], None]] = []
-        self._was_heard = False
+        self._had_subscriber = False
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(data_class, "_has_header", False))
         self._registered = False
@@ -166,7 +166,7 @@ class Published(Shared):
         publication.headers.update(headers or {})
 
     def register(self) -> None:
-        """Tell the master, once."""
+        """Register with the master, once."""
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
@@ -184,13 +184,13 @@ class Published(Shared):
             del self._session.published[self.resolved_name]
             if not self._session.node or self._session.is_shutdown():
                 return
-            # Begun before another thread can publish the topic anew.
+            # Started before another thread can publish the topic again.
             wait = self._session.begin(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
     @property
     def is_latch(self) -> bool:
-        """Whether who joins later gets the last message; may be changed."""
+        """Whether a subscriber that connects later gets the last message; may be changed."""
         return self.publication.latch
 
     @is_latch.setter
@@ -198,11 +198,11 @@ class Published(Shared):
         self.publication.latch = value
 
     def enable_latch(self) -> None:
-        """Give who joins later the last message."""
+        """Give subscribers that connect later the last message."""
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Have ``l`` told of subscribers that come and go from now on."""
+        """Notify ``l`` of subscribers that connect and disconnect from now on."""
         self.subscriber_listeners.append(l)
 
     def check_initialized(self) -> None:
@@ -219,14 +219,14 @@ class Published(Shared):
             publication.publish(self._frame(message))
             if self._deferral.pending:
                 self._deferral.poll()
-        elif not self._was_heard:
-            self._was_heard = True
-            self._tell_unheard()
+        elif not self._had_subscriber:
+            self._had_subscriber = True
+            self._log_unheard()
 
     def forget_subscribers(self) -> None:
-        """Publish to nobody from now on: this process is a fork, and the subscribers are its parent's."""
+        """Publish to no subscriber from now on: this process is a fork, and the subscribers are its parent's."""
         self.publication.links = ()
-        self._was_heard = True
+        self._had_subscriber = True
 
     def wait_for_subscribers(self, count: int, timeout: float | None) -> bool:
         """See :meth:`Publisher.wait_for_subscribers`."""
@@ -254,13 +254,13 @@ class Published(Shared):
         return self.publication.links
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Whether the node of this name is connected."""
+        """Return whether the node of this name is connected."""
         return any(link.peer == endpoint_id for link in self.connections)
 
-    def _tell_unheard(self) -> None:
-        """The first message went to nobody: worth a warning only where somebody wants it, and is on the way.
+    def _log_unheard(self) -> None:
+        """Log that the first message had no subscriber: a warning only where the master knows one that is connecting.
 
-        That most topics have no subscriber at first, or ever, is in order.
+        Most topics have no subscriber at first, or ever.
         """
         if self.publication.expected and not self._session.is_shutdown():
             _log.warning(
@@ -291,7 +291,7 @@ class Published(Shared):
         return pieces.frame()
 
     def _on_link(self, link: OutLink, is_up: bool) -> None:
-        self._was_heard = True
+        self._had_subscriber = True
         for look in list(self._waiting):
             look()
         if not self.subscriber_listeners or not self._session.node:
@@ -316,7 +316,7 @@ class Published(Shared):
 
 
 def _checked_size(queue_size: Any) -> int | None:
-    """A Publisher's queue_size as rospy reads it: less than nothing is no limit. Raises ValueError."""
+    """Return a Publisher's queue_size as rospy reads it: a negative one is no limit. Raises ValueError."""
     if queue_size is None:
         return None
     try:

@@ -52,7 +52,7 @@ class Service(Generic[_S]):
 
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
     values, or the value of its only field. What it raises goes to the client as the call's error;
-    ``error_handler(error, type, error, traceback)`` is told too, in place of a log line. Each connection has
+    ``error_handler(error, type, error, traceback)`` is called too, in place of a log line. Each connection has
     a thread of its own, so a handler may run several times at once. ``buff_size`` is accepted and not needed.
     Raises ValueError on an empty name, ServiceException where this node offers the service already.
     """
@@ -88,7 +88,7 @@ class Service(Generic[_S]):
 
     @property
     def uri(self) -> str | None:
-        """Where the service is called, ``rosrpc://host:port``; None before init_node."""
+        """The URI of the service, ``rosrpc://host:port``; None before init_node."""
         return self._session.node.service_uri if self._session.node else None
 
     @property
@@ -106,7 +106,7 @@ class Service(Generic[_S]):
             del self._session.offered[self.resolved_name]
             if not server or not self._session.node or self._session.is_shutdown():
                 return
-            # Begun before another thread can offer the service anew.
+            # Started before another thread can offer the service again.
             wait = self._session.begin(self._session.node.unserve(server))
         unregister_from_master(wait)
 
@@ -137,7 +137,7 @@ class Service(Generic[_S]):
             _log.critical("unable to register service [%s] with master: %s", self.resolved_name, error)
 
     def _handle(self, body: memoryview, header: Header) -> bytes:
-        """Bytes of a request in, bytes of the response out (in a worker)."""
+        """Handle the bytes of a request and return those of the response (in a worker)."""
         try:
             request = self.request_class()
             request.deserialize(body if self._takes_memoryview else bytes(body))
@@ -198,7 +198,7 @@ class ServiceProxy(Generic[_S]):
         return self.call(*args, **kwds)
 
     def call(self, *args: Any, **kwds: Any) -> Any:
-        """The same as calling the proxy itself."""
+        """Call the service, as calling the proxy itself does."""
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
@@ -225,7 +225,7 @@ class ServiceProxy(Generic[_S]):
             client.close()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """A connection for the call of ``request``, which may be on its way by then."""
+        """Return a connection for the call of ``request``, which may have been sent by then."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)
@@ -234,7 +234,7 @@ class ServiceProxy(Generic[_S]):
                 ahead.close()
 
     def _connect_ahead(self) -> ServiceClient | None:
-        """A connection to where the service was last, begun while the master is asked where it is now.
+        """Return a connection to where the service was last, opened while the master is queried for where it is now.
 
         Only within this machine: elsewhere to connect may take its time.
         """
@@ -270,7 +270,7 @@ class ServiceProxy(Generic[_S]):
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
             if ahead and ahead.uri == uri:
-                # It may have begun with a server that was about to end: then once more. One that is silent may have
+                # The server may have been about to end: then once more. One that is silent may have
                 # the request by now.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
@@ -328,7 +328,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
         raise ValueError("timeout must be non-zero")
     begin = time.monotonic()
     end = None if seconds is None else begin + seconds
-    told: set[str] = set()
+    reported: set[str] = set()
     while not session.is_shutdown():
         rest = _PROBE_SECONDS if end is None else end - time.monotonic()
         if rest <= 0:
@@ -336,20 +336,20 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
         why = _probe(name, min(rest, _PROBE_SECONDS))
         if why is None:
             return
-        if why is _NO_CONTACT and why not in told:
+        if why is _NO_CONTACT and why not in reported:
             _log.warning("wait_for_service(%s): %s", name, why)
-            told.add(why)
-        elif not told and time.monotonic() - begin > _SILENT_SECONDS:
-            # rospy says nothing here, ever: a misspelt name is looked for in vain.
+            reported.add(why)
+        elif not reported and time.monotonic() - begin > _SILENT_SECONDS:
+            # rospy never logs anything here, which hides a misspelled name.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
-            told.add(why)
+            reported.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
         wait_for_event(session.lifecycle.shutting_down, pause)
     raise session.lifecycle.interrupted("rospy shutdown")
 
 
 def _probe(name: str, timeout: float) -> str | None:
-    """Why the service cannot be called yet; None where it can."""
+    """Return why the service cannot be called yet; None where it can."""
     from minirospy.runtime.service_client import ServiceClient
 
     session = current_session()

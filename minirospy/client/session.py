@@ -54,7 +54,7 @@ class Session:
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
         """Notified of each simulated time."""
         self.has_time: bool = bool(previous and previous.has_time)
-        """Whether the time may be asked for: from init_node on, or once a program without a node has said so."""
+        """Whether the time is available: from init_node on, or once a program without a node has set it."""
         self.published: dict[str, Published] = {}
         self.subscribed: dict[str, Subscribed] = {}
         self.offered: dict[str, Service[Any]] = {}
@@ -227,7 +227,7 @@ class Session:
         # There may be no terminal any more.
         with contextlib.suppress(OSError, ValueError):
             print(
-                "shutdown request" + (f": {asked[1]}" if (asked := _REQUEST.match(reason)) else ""),
+                "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
                 flush=True,
             )
         self.lifecycle.signal_shutdown(reason)

@@ -54,7 +54,7 @@ class ThreadState:
 
 
 _BY_COUNT: Mapping[int, Action | None] = {1: None, 2: Action.KEYBOARD_INTERRUPT}
-"""What a signal asks for beyond the shutdown, by its number; each further one ends the process."""
+"""What the first and second signal cause beyond the shutdown; each further one ends the process."""
 
 _DELAYS: Mapping[Action, float] = {Action.RUN_HOOKS: 0.5, Action.INTERRUPT: 0.5, Action.REPORT: 2.0}
 """Seconds between the cause of an action and the action."""
@@ -80,7 +80,7 @@ class ShutdownMachine:
         self._taken: set[Action] = set()
 
     def signal(self, now: float) -> Action | None:
-        """Count a signal of the user's and return what it asks for beyond a shutdown."""
+        """Count a signal of the user's and return what it causes beyond the shutdown."""
         self.signals += 1
         if self._signalled is None:
             self._signalled = now

@@ -140,7 +140,9 @@ class SignalWatchdog:
     def _run(self, receiving: socket.socket) -> None:
         perform: dict[Action, Callable[[], object]] = {
             Action.RUN_HOOKS: self._run_hooks,
-            Action.INTERRUPT: lambda: self._interrupt(ROSInterruptException("the program was asked to end")),
+            Action.INTERRUPT: lambda: self._interrupt(
+                ROSInterruptException("the program was signalled to end")
+            ),
             Action.KEYBOARD_INTERRUPT: lambda: self._interrupt(KeyboardInterrupt()),
             Action.REPORT: self._report,
             Action.EXIT: lambda: os._exit(_EXIT_STATUS),
@@ -149,12 +151,12 @@ class SignalWatchdog:
         now = deferred_at = 0.0
         with receiving:
             while True:
-                begun = time.monotonic()
+                started = time.monotonic()
                 is_idle = machine.is_settled and not deferral.pending
                 receiving.settimeout(None if is_idle else _TICK_SECONDS)
                 if not self._receive(receiving):
                     return
-                now += min(time.monotonic() - begun, _MAX_STEP)
+                now += min(time.monotonic() - started, _MAX_STEP)
 
                 machine.main_has_ended = not threading.main_thread().is_alive()
                 actions = [machine.signal(now) for _ in range(self._new_signals())]

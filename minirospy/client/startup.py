@@ -82,7 +82,7 @@ def start_clock() -> None:
     try:
         is_simulated = session.master.has_param("/use_sim_time") and session.master.get_param("/use_sim_time")
     except RpcError as error:
-        raise ROSInitException(f"the master does not tell /use_sim_time: {error}") from error
+        raise ROSInitException(f"the master does not return /use_sim_time: {error}") from error
     if is_simulated:
         clock = session.clock = SimulatedClock(changed=session.time_changed)
         session.when_ready(lambda: _follow_clock_topic(clock))
@@ -165,7 +165,7 @@ def _wait_for_master(session: Session) -> None:
         except RpcFault:
             return  # a master that lacks this call, as that of @foxglove/ros1
         except RpcError as error:
-            raise ROSInitException(f"what answers at {uri} is no ROS master: {error}") from error
+            raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:
             return
     raise session.lifecycle.interrupted(f"shut down while waiting for the master at {uri}")

@@ -33,7 +33,7 @@ class WindowLimits(NamedTuple):
 
     @classmethod
     def read(cls, get: Callable[[str, Any], Any]) -> WindowLimits:
-        """The limits that the parameters /statistics_window_... set; ``get(key, default)`` reads one."""
+        """Return the limits that the parameters /statistics_window_... set; ``get(key, default)`` reads one."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
         )

@@ -37,7 +37,7 @@ class Subscriber(Topic[_M]):
     ``callback_args`` is handed to the callback as second argument. ``queue_size``: while the callback is
     busy, keep only so many messages, the newest (None: all, in order). ``buff_size`` is accepted and not
     needed: freshness does not depend on it. Subscribers of one topic in a process share the connections;
-    they keep as many messages as the one that asks for most. One that comes later to a latched topic gets
+    they keep as many messages as the largest queue_size. One that comes later to a latched topic gets
     its last message at once, before the constructor returns. Raises ValueError on a bad name or class,
     ROSException on a bad size.
     """
@@ -92,7 +92,7 @@ class Subscriber(Topic[_M]):
 
 
 def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
-    """The next message of ``topic``; ``timeout`` in seconds, or a Duration.
+    """Return the next message of ``topic``; ``timeout`` in seconds, or a Duration.
 
     Raises ROSException after ``timeout``, ROSInterruptException where the node shuts down.
     """
@@ -170,7 +170,7 @@ class Subscribed(Shared):
             del self._session.subscribed[self.resolved_name]
             if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
-            # Begun before another thread can subscribe to the topic anew.
+            # Started before another thread can subscribe to the topic again.
             wait = self._session.begin(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
@@ -200,10 +200,10 @@ class Subscribed(Shared):
             self._update()
 
     def set_buff_size(self, buff_size: int) -> None:
-        """Accepted and not needed, as a Subscriber's ``buff_size``."""
+        """Do nothing; accepted for compatibility, as a Subscriber's ``buff_size``."""
 
     def register(self) -> None:
-        """Tell the master, once."""
+        """Register with the master, once."""
         with self._session.lock:
             node = self._session.node
             if self._registered or not self._handles or not node or self._session.is_shutdown():
@@ -224,7 +224,7 @@ class Subscribed(Shared):
             register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
-        """How many messages to keep: as many as the Subscriber that asks for most."""
+        """Return how many messages to keep: as many as the Subscriber with the largest queue_size."""
         sizes = [handle._newest for handle in self._handles]
         return 0 if 0 in sizes else max(sizes, default=0)
 

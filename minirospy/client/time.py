@@ -33,7 +33,7 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back while somebody slept, by ``time`` seconds; a KeyboardInterrupt, too, as in rospy."""
+    """Simulated time jumped back during a sleep, by ``time`` seconds; a KeyboardInterrupt, too, as in rospy."""
 
 
 class Duration(times.Duration):
@@ -60,24 +60,24 @@ class Time(times.Time):
 
     @staticmethod
     def now() -> Time:
-        """The current time. Raises ROSInitException before init_node."""
+        """Return the current time. Raises ROSInitException before init_node."""
         return get_rostime()
 
     @classmethod
     def from_seconds(cls, float_secs: float) -> Time:
-        """The older name of ``from_sec``."""
+        """Return the time of ``float_secs`` seconds; the older name of ``from_sec``."""
         return cls.from_sec(float_secs)
 
 
 def get_rostime() -> Time:
-    """The current time. Raises ROSInitException before init_node."""
+    """Return the current time. Raises ROSInitException before init_node."""
     if not current_session().has_time:
         raise ROSInitException(_NOT_INITIALIZED)
     return _time(current_session().clock.now())
 
 
 def get_time() -> float:
-    """The current time in seconds. Raises ROSInitException before init_node."""
+    """Return the current time in seconds. Raises ROSInitException before init_node."""
     if not current_session().has_time:
         raise ROSInitException(_NOT_INITIALIZED)
     return current_session().clock.now() / 1e9
@@ -91,7 +91,7 @@ def is_wallclock() -> bool:
 def sleep(duration: float | times.Duration) -> None:
     """Sleep for ``duration`` seconds; not at all where that is negative.
 
-    Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that asks
+    Ends early where the node shuts down meanwhile: by ROSInterruptException, or, in a thread that polls
     is_shutdown(), by returning. Raises ROSTimeMovedBackwardsException where
     simulated time jumps back.
     """
@@ -106,7 +106,7 @@ class Rate:
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        """``reset``: begin anew where simulated time jumps back, instead of raising.
+        """``reset``: start again where simulated time jumps back, instead of raising.
 
         Raises ZeroDivisionError on a rate of 0, ROSInitException before init_node.
         """
@@ -115,7 +115,7 @@ class Rate:
         self._reset = reset
 
     def remaining(self) -> Duration:
-        """What is left of this turn."""
+        """Return what is left of this turn."""
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
@@ -123,7 +123,7 @@ class Rate:
         self._sleep(None)
 
     def _sleep(self, stop: threading.Event | None) -> None:
-        """The same, and ``stop`` ends it early."""
+        """Sleep until the turn is over, or ``stop`` is set."""
         now = current_session().clock.now()
         try:
             _sleep(self._left(now), stop)
@@ -139,7 +139,7 @@ class Rate:
         self.last_time = _time(now if now - began > 2 * period else began)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
-        """What is left of this turn at a time; a Rate of the program's own that sleeps in another way asks for it."""
+        """Return what is left of this turn at a time; called by a program's subclass that sleeps in another way."""
         return Duration(0, self._left(curr_time.to_nsec()))
 
     def _left(self, now: int) -> int:
@@ -150,7 +150,7 @@ class Rate:
 
 
 class TimerEvent:
-    """What a Timer's callback is told: expected and real times of this call and of the one before.
+    """The argument of a Timer's callback: expected and real times of this call and of the one before.
 
     ``last_duration`` is in seconds; everything of a call before is None the first time.
     """
@@ -173,7 +173,7 @@ class TimerEvent:
 class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
-    ``reset``: begin anew where simulated time jumps back; else that ends the timer with
+    ``reset``: start again where simulated time jumps back; else that ends the timer with
     ROSTimeMovedBackwardsException. An error of the callback ends it, too.
     """
 
@@ -204,11 +204,11 @@ class Timer(threading.Thread):
             self._ended.set()
 
     def shutdown(self) -> None:
-        """Call back no more."""
+        """Stop calling back."""
         self._ended.set()
 
     def run(self) -> None:
-        """The timer's thread."""
+        """Call the callback every period, in the timer's thread."""
         rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
         expected: times.Time = rate.last_time + self._period
         last_expected: times.Time | None = None

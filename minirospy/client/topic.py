@@ -22,7 +22,7 @@ _M = TypeVar("_M", bound=Any)
 
 
 class AnyMsg(Message):
-    """A message of any type: its bytes, and in ``_connection_header`` what the publisher told of them."""
+    """A message of any type: its bytes, and in ``_connection_header`` the publisher's description."""
 
     _md5sum = ANY
     _type = ANY
@@ -133,7 +133,7 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
 
 
 def unregister_from_master(wait: Callable[[], object]) -> None:
-    """Wait for the end of a registration; a master that is not there is told later, or has forgotten it."""
+    """Wait for an unregistration; a master that does not answer is notified later, or has forgotten it."""
     try:
         wait()
     except (MasterUnreachableError, RpcError) as error:

@@ -101,7 +101,7 @@ try:
 except ValueError as error:
     print(error)
 """
-    text = "log_level [20] is none of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)\n"
+    text = "log_level [20] is not one of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)\n"
     assert run(program) == (text, "")
     program = """
 import rospy
