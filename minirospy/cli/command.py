@@ -19,13 +19,17 @@ import contextlib
 import io
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 from minirospy.cli.parser import CommandLineError
 from minirospy.errors import (
+    MasterUnreachableError,
     MessageException,
     MinirospyError,
+    NodeUnreachableError,
+    NotFoundError,
     ROSException,
     ServiceException,
     UsageError,
@@ -40,9 +44,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "INTERRUPTED",
+    "NO_MASTER",
+    "RosText",
+    "WordedError",
+    "Wording",
     "complain",
     "hint_near",
     "refuse_bag",
+    "ros_words",
     "run",
     "tool_node",
     "warn",
@@ -59,12 +68,60 @@ def refuse_bag(command: str) -> NoReturn:
     raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
-def run(
-    name: str, body: Callable[[], int | None], interrupted: int = 0, *, heeds_interrupts: bool = True
-) -> int:
-    """Run ``body`` and return the exit status, at Ctrl-C ``interrupted``; print a named error as ``name: ERROR: text``.
+class RosText(NamedTuple):
+    """What ROS prints about an error, and its exit status.
 
-    ``heeds_interrupts``: whether SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
+    ``text`` may name ``{name}`` and ``{uri}`` of the error.
+    """
+
+    text: str
+    status: int = 1
+
+
+class WordedError(MinirospyError):
+    """An error for which ROS has words that depend on more than the error: ``ros`` are printed first."""
+
+    def __init__(self, error: Exception, ros: RosText) -> None:
+        super().__init__(str(error))
+        self.ros = ros
+
+
+Wording = Mapping[str, RosText]
+"""Kind of a NotFoundError, ``no answer from`` + kind of a NodeUnreachableError, or ``master`` -> ROS's words."""
+
+NO_MASTER = RosText("ERROR: Unable to communicate with master!")
+
+
+def ros_words(error: Exception, wording: Wording) -> RosText:
+    """Return what ROS prints about an error; an empty text where it has no words of its own."""
+    if isinstance(error, CommandLineError):
+        return RosText(error.ros_text, 2)
+    if isinstance(error, WordedError):
+        return error.ros
+
+    key, fields = "", {"name": "", "uri": ""}
+    if isinstance(error, MasterUnreachableError):
+        key = "master"
+    elif isinstance(error, NotFoundError):
+        key, fields = error.kind, {"name": error.name, "uri": ""}
+    elif isinstance(error, NodeUnreachableError):
+        key, fields = f"no answer from {error.kind}", {"name": error.name, "uri": error.uri}
+    text, status = wording.get(key, RosText("", 2 if isinstance(error, UsageError) else 1))
+    return RosText(text.format(**fields), status)
+
+
+def run(
+    name: str,
+    body: Callable[[], int | None],
+    interrupted: int = 0,
+    wording: Wording = MappingProxyType({}),
+    *,
+    heeds_interrupts: bool = True,
+) -> int:
+    """Run ``body`` and return the exit status, at Ctrl-C ``interrupted``.
+
+    A named error becomes ``name: ERROR: text`` on stderr, after ROS's words for it. ``heeds_interrupts``: whether
+    SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
     """
     _open_streams()
     if heeds_interrupts and not interrupted:
@@ -73,12 +130,9 @@ def run(
         status = body() or 0
         sys.stdout.flush()
         return status
-    except CommandLineError as error:
-        return complain(name, error, 2, error.ros_text)
-    except UsageError as error:
-        return complain(name, error, 2)
     except (MinirospyError, ROSException, ServiceException, MessageException) as error:
-        return complain(name, error)
+        text, status = ros_words(error, wording)
+        return complain(name, error, status, text)
     except UnicodeEncodeError as error:
         wrong = error.object[error.start : error.end]
         return complain(name, UsageError(f"{wrong!r} was typed, which is no UTF-8 text"), 2)

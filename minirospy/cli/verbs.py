@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
-from minirospy.cli.command import run
+from minirospy.cli.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
 from minirospy.cli.parser import Misuse, Parser
-from minirospy.errors import UsageError, did_you_mean
+from minirospy.errors import MinirospyError, UsageError, did_you_mean
 from minirospy.names import parse_arguments
 
-__all__ = ["Command", "Family", "Verb"]
+__all__ = ["Command", "Family", "HelpStatus", "Verb"]
 
 
 class Command(NamedTuple):
@@ -25,23 +26,35 @@ class Command(NamedTuple):
     parser: Callable[[], Parser]
     body: Callable[..., int | None]
     interrupted: int = 0
+    wording: Wording = MappingProxyType({})
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the command; return the exit status as :func:`minirospy.cli.command.run` does."""
         words = sys.argv[1:] if argv is None else argv
-        return run(self.name, lambda: _call(self.parser(), self.body, words), self.interrupted)
+        return run(self.name, lambda: _call(self.parser(), self.body, words), self.interrupted, self.wording)
 
 
 class Verb(NamedTuple):
     """One verb of a family: its name, one line of help, its parser, and the function that is given what it parsed.
 
-    In a family that is a node, the function takes ``arguments``, the remapping arguments, besides.
+    In a family that is a node, the function takes ``arguments``, the remapping arguments, besides. ``wording`` has ROS's
+    words for errors of this verb.
     """
 
     name: str
     summary: str
     parser: Callable[[], Parser]
     body: Callable[..., int | None]
+    wording: Wording = MappingProxyType({})
+
+
+class HelpStatus(NamedTuple):
+    """The exit statuses of a family's help: without a verb, for `-h`, for `--help`, and for an unknown verb."""
+
+    none: int = 2
+    short: int = 0
+    long: int = 0
+    unknown: int = 2
 
 
 class Family(NamedTuple):
@@ -49,6 +62,7 @@ class Family(NamedTuple):
 
     A verb may be a family itself. ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic"
     args="pub ..."/>`), with `__name:=` and remappings among its words. ``interrupted``: the exit status at Ctrl-C.
+    ``wording``: ROS's words for errors. ``shows_help_on_error``: an unknown verb prints the help on stdout, too.
     """
 
     name: str
@@ -58,11 +72,14 @@ class Family(NamedTuple):
     is_node: bool = False
     interrupted: int = 0
     summary: str = ""
+    help_status: HelpStatus = HelpStatus()
+    wording: Wording = MappingProxyType({"master": NO_MASTER})
+    shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the verb that was typed; return the exit status as :func:`minirospy.cli.command.run` does."""
         words = list(sys.argv[1:] if argv is None else argv)
-        return run(self.name, lambda: self._dispatch(words), self.interrupted)
+        return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 
     def verb_name(self, verb: Verb | Family) -> str:
         """Return what is typed for a verb."""
@@ -82,20 +99,32 @@ class Family(NamedTuple):
     def _dispatch(self, words: list[str]) -> int | None:
         if not words or words[0] in ("-h", "--help"):
             print(self.help())
-            return 0 if words else 2
+            status = self.help_status
+            return status.none if not words else status.short if words[0] == "-h" else status.long
 
         verb = self.find(words[0])
         if isinstance(verb, Family):
             return verb._dispatch(words[1:])
         if verb is None:
-            hint = did_you_mean(words[0], map(self.verb_name, self.verbs))
-            raise UsageError(
-                f"there is no `{self.name} {words[0]}`{hint} (`{self.name} -h` shows what there is)"
-            )
-        if not self.is_node:
-            return _call(verb.parser(), verb.body, words[1:])
-        arguments = parse_arguments(words[1:])
-        return _call(verb.parser(), verb.body, arguments.plain, arguments=arguments)
+            return self._refuse(words[0])
+        try:
+            if not self.is_node:
+                return _call(verb.parser(), verb.body, words[1:])
+            arguments = parse_arguments(words[1:])
+            return _call(verb.parser(), verb.body, arguments.plain, arguments=arguments)
+        except MinirospyError as error:
+            ros = ros_words(error, verb.wording)
+            if not verb.wording or not ros.text:
+                raise
+            raise WordedError(error, ros) from error
+
+    def _refuse(self, name: str) -> int:
+        """Report a verb that does not exist."""
+        hint = did_you_mean(name, map(self.verb_name, self.verbs))
+        error = UsageError(f"there is no `{self.name} {name}`{hint} (`{self.name} -h` shows what there is)")
+        if self.shows_help_on_error:
+            print(self.help())
+        return complain(self.name, error, self.help_status.unknown)
 
 
 def _call(

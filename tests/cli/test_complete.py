@@ -100,7 +100,7 @@ def test_asking_a_command_leaves_it_as_it_was(capsys: pytest.CaptureFixture[str]
     from minirospy.cli.ros import rostopic
 
     tab("rostopic pub -")
-    assert rostopic.main(["-h"]) == 0
+    assert rostopic.main(["-h"]) == 64
     assert "rostopic pub" in capsys.readouterr().out
 
 

@@ -65,9 +65,8 @@ def test_lists(command: Any) -> None:
         (["rosmsg", "show", "Bol"], 1, "message type [Bol] not found; did you mean Bool"),
         (["rosmsg", "show", "nope/Nope"], 1, "message type [nope/Nope] not found"),
         (["rossrv", "md5", "SetBol"], 1, "service type [SetBol] not found; did you mean SetBool"),
-        (["rosmsg", "package", "std_msg"], 1, "package [std_msg] not found; did you mean std_msgs"),
+        (["rosmsg", "package", "std_msg"], 64, "package [std_msg] not found; did you mean std_msgs"),
         (["rosmsg", "show"], 2, "a name is missing"),
-        (["rosmsg", "shw"], 2, "did you mean show"),
     ],
 )
 def test_what_cannot_be(
@@ -78,6 +77,12 @@ def test_what_cannot_be(
     assert (result.status, result.out) == (status, "")
     assert why in result.err
     assert len(own_lines(result.err)) == 1
+
+
+def test_an_unknown_verb_prints_the_help(command: Any) -> None:
+    result = command("rosmsg", "shw")
+    assert (result.status, result.out) == (64, command("rosmsg", "-h").out)
+    assert "did you mean show" in result.err
 
 
 def test_help(command: Any) -> None:

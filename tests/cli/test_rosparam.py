@@ -99,7 +99,7 @@ def test_files(master: str, command: Any, tmp_path: Path, monkeypatch: pytest.Mo
         (["set", "/a", "2020-01-01"], 1, "date"),
         (["set", "/", "1"], 1, "the root holds parameters"),
         (["set", "/a"], 2, "please specify a value"),
-        (["set", "-t", "nope", "/a"], 1, "file [nope] not found"),
+        (["set", "-t", "nope", "/a"], 2, "file [nope] not found"),
         (["load", "nope"], 1, "file [nope] not found"),
         (["load", "bad.yaml"], 1, "'bad.yaml': "),
         (["load", "five.yaml"], 1, "no names"),

@@ -81,11 +81,11 @@ def test_call_verbosely_and_from_standard_input(
 @pytest.mark.parametrize(
     ("arguments", "status", "why"),
     [
-        (["/fail"], 1, "service [/fail] responded with an error: error processing request: bad thing\n"),
-        (["/set_led_stat", "True"], 1, "service [/set_led_stat] not found; did you mean /set_led_state?\n"),
-        (["/set_led_state", "datum: True"], 1, "No field name [datum] ("),
-        (["/set_led_state", "data: 3.5"], 1, "field data is not a bool ("),
-        (["/set_led_state", "True", "False"], 1, "Too many arguments"),
+        (["/fail"], 2, "service [/fail] responded with an error: error processing request: bad thing\n"),
+        (["/set_led_stat", "True"], 2, "service [/set_led_stat] not found; did you mean /set_led_state?\n"),
+        (["/set_led_state", "datum: True"], 2, "No field name [datum] ("),
+        (["/set_led_state", "data: 3.5"], 2, "field data is not a bool ("),
+        (["/set_led_state", "True", "False"], 2, "Too many arguments"),
         (["/set_led_state", "data: [True"], 1, "'data: [True': "),
         ([], 2, "arguments are required: service"),
     ],
@@ -106,13 +106,13 @@ def test_missing_arguments_are_named(robot: Any, command: Any, monkeypatch: pyte
 def test_unknown_and_silent_services(robot: Any, master: str, command: Any) -> None:
     for verb in ("type", "uri", "args", "info"):
         status, out, err = command("rosservice", verb, "/fial")
-        assert (status, out) == (1, "")
+        assert (status, out) == (2 if verb == "args" else 1, "")
         assert err == "rosservice: ERROR: service [/fial] not found; did you mean /fail?\n"
     proxy = MasterProxy(master, "/ghost")
     proxy.register_service("/haunt", "rosrpc://localhost:1", "http://localhost:1/")
     proxy.close()
     status, out, err = command("rosservice", "type", "/haunt")
-    assert (status, out) == (1, "")
+    assert (status, out) == (2, "")
     assert "does not answer at rosrpc://localhost:1" in err
     assert command("rosservice", "find", "std_srvs/Trigger").out == "/fail\n"
 
@@ -123,7 +123,7 @@ def test_waiting_for_a_service(master: str, command: Any, monkeypatch: pytest.Mo
     monkeypatch.setattr("minirospy.introspect.services.time.sleep", lambda _: looked.set())
     probes = iter([None, None, "std_srvs/SetBool"])
     monkeypatch.setattr("minirospy.introspect.services._probed_type", lambda *_: next(probes))
-    assert command("rosservice", "call", "--wait", "/late", "True").status == 1
+    assert command("rosservice", "call", "--wait", "/late", "True").status == 2
     assert looked.is_set()
     assert next(probes, "all asked for") == "all asked for"
 
@@ -134,7 +134,7 @@ def test_help_and_no_master(command: Any) -> None:
         assert command("rosservice", verb, "-h").status == 0
     for argv in (["list"], ["info", "/a"], ["call", "/a"], ["find", "std_srvs/Empty"]):
         status, out, err = command("rosservice", *argv)
-        assert (status, out) == (1, "")
+        assert (status, out) == (2, "")
         assert "no ROS master answers at http://localhost:1" in err
 
 
@@ -149,7 +149,7 @@ def test_a_service_that_does_not_answer(master: str, command: Any) -> None:
     for verb in ("type", "call", "args", "info"):
         status, out, err = command("rosservice", verb, "/gone")
         # What the master alone knows is told all the same.
-        assert (status, out) == (1, "Node: /ghost\nURI: rosrpc://localhost:9\n" if verb == "info" else "")
+        assert (status, out) == (2, "Node: /ghost\nURI: rosrpc://localhost:9\n" if verb == "info" else "")
         assert err.startswith("rosservice: ERROR: service [/gone] does not answer at rosrpc://localhost:9 (")
         assert "`rosnode cleanup` forgets nodes that have ended" in err
     assert command("rosservice", "find", "std_srvs/Empty") == (0, "\n", "")

@@ -18,13 +18,17 @@ from command_table import (
     ASKING,
     CHANGING,
     ECHOING,
+    HELP,
+    OTHER_WORDS,
     OURS,
     PAGE,
     REAL,
     STREAMING,
     UNREACHABLE,
     WITHOUT_MASTER,
+    WRONG,
     compare,
+    other_words,
     page,
     unexpected,
     verdicts,
@@ -78,6 +82,8 @@ def test_the_table(scene: str, tmp_path: Path) -> None:
     (tmp_path / "text.txt").write_text("a text\nof two lines\n")
     (tmp_path / "values.yaml").write_text("a: 1\nb: {c: [1, 2]}\n---\n_ns: inner\nx: 2\n")
     sections = {"Questions to the graph, and types": compare(ASKING, scene, tmp_path)}
+    sections["Help"] = compare(HELP, scene, tmp_path)
+    sections["Usage errors"] = compare(WRONG, scene, tmp_path)
     sections["Messages, and publishing"] = compare(ECHOING, scene, tmp_path)
     with _publishers(scene):
         sections["Streams, until Ctrl-C"] = compare(STREAMING, scene, tmp_path, streaming=True)
@@ -90,6 +96,7 @@ def test_the_table(scene: str, tmp_path: Path) -> None:
         PAGE.write_text(page(sections))
     different = unexpected(row for rows in sections.values() for row in rows)
     assert not different, different
+    assert other_words(row for rows in sections.values() for row in rows) == OTHER_WORDS
     assert verdicts(page(sections)) == verdicts(PAGE.read_text())
 
 

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Sequence
 
+from minirospy.cli.command import NO_MASTER
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
 from minirospy.introspect.graph import Graph
@@ -55,7 +56,7 @@ def _text(nodes: dict[str, Neighbours], services: Sequence[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-COMMAND = Command("rosgraph", _parser, _rosgraph)
+COMMAND = Command("rosgraph", _parser, _rosgraph, wording={"master": NO_MASTER})
 
 if __name__ == "__main__":
     sys.exit(main())

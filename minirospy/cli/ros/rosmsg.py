@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from minirospy.cli.command import refuse_bag
+from minirospy.cli.command import RosText, refuse_bag
 from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 __all__ = ["ROSMSG", "ROSSRV", "main", "main_srv"]
@@ -34,11 +34,10 @@ class _Verbs:
         self.kind = kind
 
     def show_parser(self, verb: str = "show") -> Parser:
-        # `rosmsg info` prints the usage of show.
         parser = Parser(
             f"{self.command} {verb}",
             f"Print the definition of a {self.kind.word} type, inner types unfolded.",
-            f"{self.command} show [options] <{self.kind.word} type>",
+            f"{self.command} {verb} [options] <{self.kind.word} type>",
         )
         self._add_type(parser)
         parser.add_argument(
@@ -93,9 +92,7 @@ class _Verbs:
             help="the package's name; without it, read from standard input",
             completer="package_names",
         )
-        parser.add_argument(
-            "-s", dest="one_line", action="store_true", help=f"list all {self.kind.value}s on a single line"
-        )
+        parser.add_argument("-s", dest="one_line", action="store_true", help="list all msgs on a single line")
         return parser
 
     def package(self, package: str | None, one_line: bool) -> None:
@@ -147,6 +144,8 @@ def _names(name: str | None) -> list[str]:
 def _family(command: str, kind: Kind) -> Family:
     verbs = _Verbs(command, kind)
     word = kind.word
+    unknown_type = {f"{word} type": RosText("Cannot locate [{name}]")}
+    unknown_package = {"package": RosText("Invalid package: {name}", 64)}
     return Family(
         command,
         f"{command} is a command-line tool for displaying information about ROS {word.capitalize()} types.",
@@ -154,11 +153,25 @@ def _family(command: str, kind: Kind) -> Family:
             Verb("show", f"Show {word} description", verbs.show_parser, verbs.show),
             Verb("info", f"Alias for {command} show", partial(verbs.show_parser, "info"), verbs.show),
             Verb("list", f"List all {word}s", verbs.list_parser, verbs.list),
-            Verb("md5", f"Display {word} md5sum", verbs.md5_parser, verbs.md5),
-            Verb("package", f"List {word}s in a package", verbs.package_parser, verbs.package),
+            Verb(
+                "md5",
+                f"Display {word} md5sum",
+                verbs.md5_parser,
+                verbs.md5,
+                unknown_type,
+            ),
+            Verb(
+                "package",
+                f"List {word}s in a package",
+                verbs.package_parser,
+                verbs.package,
+                unknown_package,
+            ),
             Verb("packages", f"List packages that contain {word}s", verbs.packages_parser, verbs.packages),
         ),
         f"Type {command} <command> -h for more detailed usage",
+        help_status=HelpStatus(none=0, short=64, long=0, unknown=64),
+        shows_help_on_error=True,
     )
 
 

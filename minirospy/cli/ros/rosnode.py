@@ -9,9 +9,9 @@ import sys
 import time
 from collections.abc import Sequence
 
-from minirospy.cli.command import complain
+from minirospy.cli.command import RosText, complain
 from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import (
@@ -76,7 +76,9 @@ def _ping(node: str | None, all: bool, count: int) -> int:
     with Graph.open("rosnode") as graph:
         if not node:
             return _ping_all(graph)
-        return _ping_one(graph, find_node(graph, graph.resolve(node)), count)
+        name = graph.resolve(node)
+        print(f"rosnode: node is [{name}]", flush=True)
+        return _ping_one(graph, find_node(graph, name), count)
 
 
 def _no_node_to_ping() -> Misuse:
@@ -95,7 +97,6 @@ def _no_node_to_ping() -> Misuse:
 
 def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
     """Ping a node once a second: ``count`` times, or until Ctrl-C where it is 0."""
-    print(f"rosnode: node is [{node.name}]")
     print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
     times: list[float] = []
     try:
@@ -121,7 +122,7 @@ def _ping_all(graph: Graph) -> int:
         try:
             _ping_once(graph, node, [])
         except NodeUnreachableError as error:
-            complain("rosnode", error)
+            complain("rosnode", error, ros_text=f"ERROR: connection refused to [{error.uri}]")
             silent += 1
     return 1 if silent else 0
 
@@ -181,7 +182,7 @@ def _info(nodes: Sequence[str], quiet: bool) -> int:
             try:
                 detail = node_detail(graph, graph.resolve(name))
             except NotFoundError as error:
-                complain("rosnode", error)
+                complain("rosnode", error, ros_text=f"cannot contact [{error.name}]: unknown node")
                 failed += 1
                 continue
 
@@ -196,7 +197,7 @@ def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
     try:
         connections = node_connections(graph, NodeAddress(detail.name, detail.uri))
     except NodeUnreachableError as error:
-        complain("rosnode", error)
+        complain("rosnode", error, ros_text=f"ERROR: Communication with node[{error.uri}] failed!")
         return False
     print(connections_text(graph, connections))
     return True
@@ -268,12 +269,20 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
     """The nodes of ``names`` that there are; of each other one it is said that it is not."""
-    found = []
+    found: list[NodeAddress] = []
+    unknown: list[NotFoundError] = []
     for name in names:
         try:
             found.append(find_node(graph, name))
         except NotFoundError as error:
-            complain("rosnode", error)
+            unknown.append(error)
+
+    if unknown:
+        print(
+            "ERROR: Unknown node(s):", *(f" * {error.name}" for error in unknown), sep="\n", file=sys.stderr
+        )
+    for each in unknown:
+        complain("rosnode", each)
     return found
 
 
@@ -333,7 +342,16 @@ FAMILY = Family(
     "rosnode",
     "rosnode is a command-line tool for printing information about ROS Nodes.",
     (
-        Verb("ping", "test connectivity to node", _ping_parser, _ping),
+        Verb(
+            "ping",
+            "test connectivity to node",
+            _ping_parser,
+            _ping,
+            {
+                "node": RosText("cannot ping [{name}]: unknown node"),
+                "no answer from node": RosText("ERROR: connection refused to [{uri}]"),
+            },
+        ),
         Verb("list", "list active nodes", _list_parser, _list),
         Verb("info", "print information about node", _info_parser, _info),
         Verb(
@@ -341,9 +359,12 @@ FAMILY = Family(
             "list nodes running on a particular machine or list machines",
             _machine_parser,
             _machine,
+            {"machine": RosText("ERROR: cannot resolve machine name [{name}] to address")},
         ),
         Verb("kill", "kill a running node", _kill_parser, _kill),
         Verb("cleanup", "purge registration information of unreachable nodes", _cleanup_parser, _cleanup),
     ),
     "Type rosnode <command> -h for more detailed usage, e.g. 'rosnode ping -h'",
+    help_status=HelpStatus(none=64, short=64, long=0, unknown=64),
+    shows_help_on_error=True,
 )

@@ -5,11 +5,13 @@ Source: http://wiki.ros.org/rosparam. What is printed is what ROS prints.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
+from minirospy.cli.command import RosText
 from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError, ValueTextError
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
@@ -63,6 +65,9 @@ def _set(parameter: str, value: str | None, textfile: str | None, binfile: str |
         raise Misuse("please specify a value, or one of -t and -b", _ros_misuse(value, textfile, binfile))
 
     new: object
+    file = textfile if textfile is not None else binfile
+    if file is not None and not os.path.exists(file):
+        raise Misuse(str(_missing_file(file)), f"file '{file}' does not exist")
     if textfile is not None:
         new = _read(textfile)
     elif binfile is not None:
@@ -223,13 +228,19 @@ def _read_bytes(file: str) -> bytes:
         with open(file, "rb") as stream:
             return stream.read()
     except FileNotFoundError:
-        from pathlib import Path
-
-        beside = [str(Path(file).parent / each.name) for each in Path(file).absolute().parent.glob("*")]
-        raise NotFoundError("file", file, beside) from None
+        raise _missing_file(file) from None
     except OSError as error:
         raise ValueTextError(file, f"cannot be read: {error.strerror}") from error
 
+
+def _missing_file(file: str) -> NotFoundError:
+    from pathlib import Path
+
+    beside = [str(Path(file).parent / each.name) for each in Path(file).absolute().parent.glob("*")]
+    return NotFoundError("file", file, beside)
+
+
+_NOT_SET = RosText("ERROR: Parameter [{name}] is not set")
 
 FAMILY = Family(
     "rosparam",
@@ -237,10 +248,25 @@ FAMILY = Family(
     "from the ROS Parameter Server.",
     (
         Verb("set", "set parameter", _set_parser, _set),
-        Verb("get", "get parameter", _get_parser, _get),
-        Verb("load", "load parameters from file", _load_parser, _load),
-        Verb("dump", "dump parameters to file", _dump_parser, _dump),
-        Verb("delete", "delete parameter", _delete_parser, _delete),
+        Verb("get", "get parameter", _get_parser, _get, {"parameter": _NOT_SET}),
+        Verb(
+            "load",
+            "load parameters from file",
+            _load_parser,
+            _load,
+            {"file": RosText("ERROR: file [{name}] does not exist")},
+        ),
+        Verb("dump", "dump parameters to file", _dump_parser, _dump, {"parameter": _NOT_SET}),
+        Verb(
+            "delete",
+            "delete parameter",
+            _delete_parser,
+            _delete,
+            {"parameter": RosText("ERROR: parameter [{name}] is not set")},
+        ),
         Verb("list", "list parameter names", _list_parser, _list),
     ),
+    # ROS ends with 0 for an unknown verb, too; that would hide the error from scripts.
+    help_status=HelpStatus(none=0, short=0, long=0, unknown=64),
+    shows_help_on_error=True,
 )

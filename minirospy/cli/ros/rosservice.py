@@ -9,10 +9,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from minirospy.cli.command import complain, hint_near, warn
+from minirospy.cli.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.cli.parser import Parser
-from minirospy.cli.verbs import Family, Verb
-from minirospy.errors import UsageError
+from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.errors import MessageException, ServiceException, UsageError
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
@@ -153,7 +153,24 @@ def _call(
         for request in _requests(type_, args):
             if verbose:
                 print(f"{request}\n---", flush=True)
-            print(services.call_service(graph, name, type_, request), flush=True)
+            try:
+                response = services.call_service(graph, name, type_, request)
+            except ServiceException as error:
+                raise WordedError(error, RosText(f"ERROR: {error}", 2)) from error
+            except MessageException as error:
+                raise _incorrect_type(type_, error) from error
+            print(response, flush=True)
+
+
+def _incorrect_type(type_: str, error: MessageException) -> WordedError:
+    """Return the error of a request whose values do not fit, with ROS's words: they end with the definition."""
+    from minirospy.introspect.interfaces import Interfaces, Kind
+    from minirospy.workspace.packages import Packages
+
+    definition = Interfaces(Packages(), Kind.SERVICE).description(type_)
+    why = f"  {error.__cause__ or error}\n\nsrv file:\n{definition}"
+    text = f"ERROR: Unable to send request. One of the fields has an incorrect type:\n{why}"
+    return WordedError(error, RosText(text, 2))
 
 
 def _warn_waiting(graph: Graph, service: str) -> None:
@@ -176,7 +193,7 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
             services.fill_request(type_, [dict(zip(names, values, strict=False))]), names[: len(values)]
         )
     elif texts or not names:
-        yield services.fill_request(type_, values)
+        yield _filled_request(type_, values)
     else:
         found = False
         for each in message_values(parse_lines(sys.stdin, "standard input")):
@@ -184,6 +201,20 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
             yield services.fill_request(type_, each)
         if not found:
             raise UsageError(f"please specify service arguments: {' '.join(names)}")
+
+
+def _filled_request(type_: str, values: Sequence[object]) -> Any:
+    try:
+        return services.fill_request(type_, values)
+    except MessageException as error:
+        given = [f" * {value} (type {type(value).__name__})" for value in values]
+        lines = [
+            f"ERROR: Incompatible arguments to call service:\n{error}",
+            "Provided arguments are:",
+            *given,
+            f"\nService arguments are: [{' '.join(services.service_arguments(type_))}]",
+        ]
+        raise WordedError(error, RosText("\n".join(lines), 2)) from error
 
 
 def _asked_for(request: Any, known: Sequence[str]) -> Any:
@@ -198,18 +229,52 @@ def _asked_for(request: Any, known: Sequence[str]) -> Any:
         raise UsageError("the input ended before all values were given") from None
 
 
+_NOT_AVAILABLE = RosText("ERROR: Service [{name}] is not available.", 2)
+
 FAMILY = Family(
     "rosservice",
     "",
     (
-        Verb("args", "print service arguments", _args_parser, _args),
-        Verb("call", "call the service with the provided args", _call_parser, _call),
+        Verb("args", "print service arguments", _args_parser, _args, {"service": _NOT_AVAILABLE}),
+        Verb(
+            "call",
+            "call the service with the provided args",
+            _call_parser,
+            _call,
+            {"service": _NOT_AVAILABLE},
+        ),
         Verb("find", "find services by service type", _find_parser, _find),
-        Verb("info", "print information about service", _info_parser, _info),
+        Verb(
+            "info",
+            "print information about service",
+            _info_parser,
+            _info,
+            {"service": RosText("ERROR: unknown service")},
+        ),
         Verb("list", "list active services", _list_parser, _list),
-        Verb("type", "print service type", _type_parser, _type),
-        Verb("uri", "print service ROSRPC uri", _uri_parser, _uri),
+        Verb(
+            "type",
+            "print service type",
+            _type_parser,
+            _type,
+            {"service": RosText("Unknown service [{name}]")},
+        ),
+        Verb(
+            "uri",
+            "print service ROSRPC uri",
+            _uri_parser,
+            _uri,
+            {"service": RosText("Unknown service: {name}")},
+        ),
     ),
     "Type rosservice <command> -h for more detailed usage, e.g. 'rosservice call -h'",
     is_node=True,
+    help_status=HelpStatus(none=64, short=64, long=64, unknown=64),
+    shows_help_on_error=True,
+    wording={
+        "master": NO_MASTER._replace(status=2),
+        "no answer from service": RosText(
+            "ERROR: Unable to communicate with service [{name}], address [{uri}]", 2
+        ),
+    },
 )

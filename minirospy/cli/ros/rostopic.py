@@ -10,9 +10,9 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
-from minirospy.cli.command import refuse_bag, tool_node, warn_unpublished
+from minirospy.cli.command import RosText, WordedError, refuse_bag, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser
-from minirospy.cli.verbs import Family, Verb
+from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError
 from minirospy.idl.protocols import is_stamped
 from minirospy.introspect import topics
@@ -142,8 +142,13 @@ def _type_parser() -> Parser:
 
 def _type(topic: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
-        field = topics.require_topic(graph, graph.resolve(topic))
-    print(f"{field.type} {field.path} {topics.topic_field_type(field)}" if field.path else field.type)
+        name = graph.resolve(topic)
+        try:
+            field = topics.require_topic(graph, name)
+            path_type = topics.topic_field_type(field) if field.path else ""
+        except NotFoundError as error:
+            raise WordedError(error, RosText(f"unknown topic type [{name}]")) from error
+    print(f"{field.type} {field.path} {path_type}" if field.path else field.type)
 
 
 def _find_parser() -> Parser:
@@ -498,7 +503,7 @@ def _positive(text: str) -> float:
     try:
         rate = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"rate must be a number, not {text}") from None
+        raise argparse.ArgumentTypeError("rate must be a number") from None
     if not 0.0 < rate < 1e6:
         raise argparse.ArgumentTypeError("rate must be greater than zero")
     return rate
@@ -519,10 +524,19 @@ def _add_window(parser: Parser, default: int) -> None:
     parser.add_argument(
         "-w",
         "--window",
-        type=int,
+        type=_window,
         default=default,
         help="window size, in # of messages, for calculating rate",
     )
+
+
+def _window(text: str) -> int:
+    import argparse
+
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError("window size must be an integer") from None
 
 
 def _add_tcp_nodelay(parser: Parser) -> None:
@@ -546,11 +560,19 @@ FAMILY = Family(
         Verb("echo", "print messages to screen", _echo_parser, _echo),
         Verb("find", "find topics by type", _find_parser, _find),
         Verb("hz", "display publishing rate of topic    ", _hz_parser, _hz),
-        Verb("info", "print information about active topic", _info_parser, _info),
+        Verb(
+            "info",
+            "print information about active topic",
+            _info_parser,
+            _info,
+            {"topic": RosText("ERROR: Unknown topic {name}")},
+        ),
         Verb("list", "list active topics", _list_parser, _list),
         Verb("pub", "publish data to topic", _pub_parser, _pub),
         Verb("type", "print topic or field type", _type_parser, _type),
     ),
     "Type rostopic <command> -h for more detailed usage, e.g. 'rostopic echo -h'",
     is_node=True,
+    help_status=HelpStatus(none=64, short=64, long=64, unknown=64),
+    shows_help_on_error=True,
 )

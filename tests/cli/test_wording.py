@@ -1,0 +1,108 @@
+"""What commands print in ROS's own words, before their own line: scripts and ROS's tests match it.
+
+The texts are ROS's; tests/interop compares them with what the real commands print.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import pytest
+
+USAGE = "Usage: rostopic list [/namespace]\n\n"
+
+
+@pytest.mark.usefixtures("master")
+@pytest.mark.parametrize(
+    ("line", "status", "text"),
+    [
+        ("rostopic list --hots", 2, f"{USAGE}rostopic: error: no such option: --hots\n"),
+        ("rostopic list a b", 2, f"{USAGE}rostopic: error: you may only specify one input topic\n"),
+        ("rostopic list -p -s", 2, f"{USAGE}rostopic: error: you may only specify one of -p, -s\n"),
+        (
+            "rostopic find",
+            2,
+            "Usage: rostopic find msg-type\n\nrostopic: error: please specify a message type\n",
+        ),
+        (
+            "rostopic bw -w",
+            2,
+            "Usage: rostopic bw /topic\n\nrostopic: error: -w option requires 1 argument\n",
+        ),
+        ("rostopic info /nope", 1, "ERROR: Unknown topic /nope\n"),
+        ("rostopic type /nope", 1, "unknown topic type [/nope]\n"),
+        ("rosnode ping nope", 1, "cannot ping [/nope]: unknown node\n"),
+        ("rosnode info nope", 1, "cannot contact [/nope]: unknown node\n"),
+        ("rosnode kill nope nada", 1, "ERROR: Unknown node(s):\n * /nope\n * /nada\n"),
+        ("rosservice type nope", 1, "Unknown service [/nope]\n"),
+        ("rosservice call nope", 2, "ERROR: Service [/nope] is not available.\n"),
+        ("rosparam get nope", 1, "ERROR: Parameter [/nope] is not set\n"),
+        ("rosparam delete nope", 1, "ERROR: parameter [/nope] is not set\n"),
+        ("rosmsg md5 std_msgs/Nope", 1, "Cannot locate [std_msgs/Nope]\n"),
+    ],
+)
+def test_error_begins_with_ros_words(
+    line: str, status: int, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, *words = line.split()
+    assert import_module(f"minirospy.cli.ros.{name}").main(words) == status
+    ros, own = capsys.readouterr().err.partition(f"{name}: ERROR: ")[::2]
+    assert ros == text
+    assert own
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("rostopic list", 1),
+        ("rostopic hz /a", 1),
+        ("rosnode list", 1),
+        ("rosnode info /a", 1),
+        ("rosservice list", 2),
+        ("rosparam list", 1),
+        ("rosgraph -1", 1),
+    ],
+)
+def test_no_master_in_ros_words(line: str, status: int, capsys: pytest.CaptureFixture[str]) -> None:
+    name, *words = line.split()
+    assert import_module(f"minirospy.cli.ros.{name}").main(words) == status
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "ERROR: Unable to communicate with master!"
+    assert second.startswith(f"{name}: ERROR: no ROS master answers at ")
+
+
+def test_help_begins_with_that_of_ros(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from minirospy.cli.ros.rosnode import main
+
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(["info", "-h"])
+    assert capsys.readouterr().out.startswith(
+        "Usage: rosnode info [options] node1 [node2...]\n"
+        "\n"
+        "Options:\n"
+        "  -h, --help   show this help message and exit\n"
+        "  -q, --quiet  Prints only basic information such as pubs/subs and does not\n"
+        "               contact nodes for more information\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "statuses"),
+    [
+        ("rostopic", (64, 64, 64, 64)),
+        ("rosnode", (64, 64, 0, 64)),
+        ("rosservice", (64, 64, 64, 64)),
+        # Real ROS ends with 0 for an unknown verb of rosparam, which hides the error from scripts.
+        ("rosparam", (0, 0, 0, 64)),
+        ("rosmsg", (0, 64, 0, 64)),
+    ],
+)
+def test_exit_status_of_help_is_that_of_ros(
+    name: str, statuses: tuple[int, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = import_module(f"minirospy.cli.ros.{name}").main
+    assert tuple(main(words) for words in ([], ["-h"], ["--help"], ["nope"])) == statuses
+    assert f"Commands:\n\t{name} " in capsys.readouterr().out
