@@ -115,7 +115,7 @@ class Environment(NamedTuple):
         return "::" if self.ipv6 else "0.0.0.0"
 
     @property
-    def nearby(self) -> bool:
+    def same_host(self) -> bool:
         """Return whether processes of this machine may be reached by Unix sockets."""
         return self.transport != "tcp"
 

@@ -476,7 +476,7 @@ class Node:
                     self.name,
                     probe=True,
                     timeout=_PROBE_SECONDS,
-                    nearby=self._node.environment.nearby,
+                    same_host=self._node.environment.same_host,
                 )
             except (RpcError, MasterUnreachableError):
                 pass

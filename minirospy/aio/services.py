@@ -112,7 +112,7 @@ class ServiceProxy(Generic[_Response_co]):
                 node.name,
                 persistent=self._persistent,
                 headers=self._headers,
-                nearby=node._node.environment.nearby,
+                same_host=node._node.environment.same_host,
             )
         except HandshakeRefused as error:
             raise ServiceException(f"unable to connect to service: remote error reported: {error}") from None

@@ -258,7 +258,7 @@ class ServiceProxy(Generic[_S]):
             persistent=self.persistent,
             headers=self._headers,
             waits=waits,
-            nearby=current_session().identity.environment.nearby,
+            same_host=current_session().identity.environment.same_host,
         )
 
     def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
@@ -360,8 +360,8 @@ def _probe(name: str, timeout: float) -> str | None:
     except (MasterUnreachableError, RpcError) as error:
         return f"the master does not answer ({error})"
     try:
-        nearby = session.identity.environment.nearby
-        ServiceClient(uri, name, ANY, session.name, probe=True, timeout=timeout, nearby=nearby).close()
+        same_host = session.identity.environment.same_host
+        ServiceClient(uri, name, ANY, session.name, probe=True, timeout=timeout, same_host=same_host).close()
     except (OSError, WireError):
         return _NO_CONTACT
     return None

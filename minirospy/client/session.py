@@ -97,7 +97,7 @@ class Session:
         if self._master is None or self._master.caller_id != self.name:
             environment = self.identity.environment
             self._master = MasterProxy(
-                environment.master_uri, self.name, _MASTER_SECONDS, nearby=environment.nearby
+                environment.master_uri, self.name, _MASTER_SECONDS, same_host=environment.same_host
             )
         return self._master
 

@@ -29,7 +29,7 @@ class Access:
         return cls(text.replace(",", " ").split())
 
     def allows(self, peer: str, here: str = "") -> bool:
-        """Return whether a connection from the address ``peer`` is welcome; ``here`` is this end's address."""
+        """Return whether a connection from the address ``peer`` is allowed; ``here`` is this end's address."""
         if not self.networks:
             return True
         known = self._known.get(peer)

@@ -20,12 +20,12 @@ from typing import Protocol
 
 from minirospy.errors import WireError
 from minirospy.runtime.sockets import (
-    EXPECTED_SECONDS,
+    BUSY_POLL_SECONDS,
     FAMILIES,
+    busy_receive,
     is_readable,
     is_writable,
-    may_expect,
-    receive_awake,
+    may_busy_poll,
 )
 from minirospy.wire.framing import (
     CHUNK,
@@ -39,7 +39,7 @@ from minirospy.wire.framing import (
     split_sizes,
 )
 
-__all__ = ["Keeps", "OutLink", "Readers", "read_frames", "watch_frames"]
+__all__ = ["OutLink", "QueueSize", "ReaderSet", "read_frames", "watch_frames"]
 
 _GATHER = 64
 _DRAIN_BYTES = 64 * 1024 * 1024
@@ -48,7 +48,7 @@ _CLAIM = 16 * 1024 * 1024
 
 _PUSH_SECONDS = 0.005
 _PUSH_WAIT_MS = 1
-"""How long the thread that publishes a large message helps it into the socket, and waits for one step."""
+"""How long the thread that publishes a large message writes it into the socket, and waits for one step."""
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 _log = logging.getLogger(__name__)
@@ -58,13 +58,13 @@ _Waiting = bytes | list[bytes | memoryview]
 
 
 class OutLink:
-    """The publisher's end of one connection: frames from any thread, in order, and never in the way.
+    """The publisher's end of one connection: frames from any thread, in order, without blocking the publisher.
 
     A frame is written at once by the thread that sends it. What the socket does not take waits in the
     outbox, which the loop empties; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit).
     Before that a thread waits for room, a few milliseconds at most, but only for a peer on this machine that has read
     since the last wait.
-    The first that is sent is ``header``, when the link is opened; frames that come before that wait behind it.
+    ``header`` is sent first, when the link is opened; frames that are published before that wait behind it.
     With ``split`` large messages are sent as split frames where they can be.
     """
 
@@ -86,14 +86,14 @@ class OutLink:
         self.sent_bytes = 0
         self.sent = 0
         self.dropped = 0
-        self._is_near = sock.family not in FAMILIES
-        if self._is_near:
+        self._is_same_host = sock.family not in FAMILIES
+        if self._is_same_host:
             self.address, self.transport = "unix", "UNIXROS"
         else:
             with contextlib.suppress(OSError):
                 host, port = sock.getpeername()[:2]
                 self.address = f"{host}:{port}"
-                self._is_near = host == sock.getsockname()[0]
+                self._is_same_host = host == sock.getsockname()[0]
         self._sock = sock
         self._loop = loop
         self._on_closed = on_closed
@@ -238,7 +238,7 @@ class OutLink:
 
     def _may_stay(self) -> bool:
         """Return whether this thread may wait a moment: it is not the loop's, and the peer answers in microseconds."""
-        return self._is_near and threading.get_ident() != self._loop_thread
+        return self._is_same_host and threading.get_ident() != self._loop_thread
 
     def _gather(self, buffers: list[bytes | memoryview]) -> int:
         """Write some of ``buffers``, take it off them, and return how many bytes it was. Raises OSError."""
@@ -309,7 +309,7 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """A subscriber sends nothing: what becomes readable is its end."""
+        """Close the link: a subscriber sends nothing, so what becomes readable is its end."""
         try:
             if self._sock.recv(4096):
                 return
@@ -320,29 +320,29 @@ class OutLink:
         self.close()
 
 
-class Keeps(Protocol):
-    """Whoever knows how many frames a slow receiver is to get: a number that may change at any time."""
+class QueueSize(Protocol):
+    """How many frames a slow receiver gets; the number may change at any time."""
 
     newest: int
 
 
 @dataclass(eq=False)
-class Readers:
-    """The readers of a node's topics. One that finds that it alone reads may look for its next message awake.
+class ReaderSet:
+    """The readers of a node's topics. A reader that is the only active one may busy-poll for its next message.
 
-    Two would wait for each other's turn in the interpreter, which takes longer than to be woken.
+    Two would wait for each other's GIL, which takes longer than to be woken.
     """
 
     last: object = None
-    """Who has read last."""
+    """The reader that has read last."""
 
 
 def read_frames(
-    sock: socket.socket, deliver: Callable[[Frame], None], keeps: Keeps, readers: Readers
+    sock: socket.socket, deliver: Callable[[Frame], None], size: QueueSize, readers: ReaderSet
 ) -> None:
     """Read frames in the calling thread until the peer ends; closes the socket.
 
-    ``keeps.newest``: of what lies ready when the thread comes to read, only so many frames, the newest, are
+    ``size.newest``: of what is ready when the thread reads, only so many frames, the newest, are
     delivered (0: all), so that a slow receiver sees the present. Raises OSError or WireError.
     """
     source = _Source(sock, readers)
@@ -351,8 +351,8 @@ def read_frames(
         with contextlib.suppress(_Ended):
             while True:
                 frames = source.read()
-                if keeps.newest:
-                    _deliver_newest(source, frames, deliver, keeps.newest)
+                if size.newest:
+                    _deliver_newest(source, frames, deliver, size.newest)
                 else:
                     for frame in frames:
                         deliver(frame)
@@ -390,16 +390,16 @@ def watch_frames(
 
 
 class _Source:
-    """Frames off a blocking socket: small ones by the bufferful, large ones each in memory of its own."""
+    """Frames off a blocking socket: small ones by the bufferful, each large one in its own memory."""
 
-    def __init__(self, sock: socket.socket, readers: Readers) -> None:
+    def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
         self.sock = sock
         self._readers = readers
         self._reader = FrameReader(gathers=False)
         self._rest = b""
         self._was_large = False
-        self._may_look = may_expect(sock)
-        self._is_lively = False
+        self._may_busy_poll = may_busy_poll(sock)
+        self._is_fast = False
 
     def read(self) -> Iterable[Frame]:
         """Wait for the next frames; they are valid until the next call, large ones for good.
@@ -408,7 +408,7 @@ class _Source:
         """
         reader = self._reader
         if self._was_large:
-            # Another large one is likely: its first bytes shall not come into the small ones' buffer.
+            # Another large one is likely: its first bytes are kept out of the small ones' buffer.
             word = self._take(4)
             length = int.from_bytes(word, "little")
             if length > CHUNK:
@@ -421,16 +421,16 @@ class _Source:
         return self._small(count)
 
     def _receive(self, space: memoryview) -> int:
-        """Wait for bytes; without falling asleep, where the last ones let wait no longer than waking up takes."""
-        begun = time.perf_counter()
+        """Wait for bytes; busy-poll where the last ones came within the time that waking up takes."""
+        start = time.perf_counter()
         count = None
-        if self._is_lively and self._readers.last is self:
+        if self._is_fast and self._readers.last is self:
             with contextlib.suppress(BlockingIOError):
-                count = receive_awake(self.sock, space)
+                count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # Also where the bytes were there, but the interpreter was not: others of this process need it.
-        self._is_lively = self._may_look and time.perf_counter() - begun < EXPECTED_SECONDS
+        # Also where the bytes were there, but the GIL was not: other threads of this process need it.
+        self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
 
@@ -483,14 +483,14 @@ class _Source:
 def _deliver_newest(
     source: _Source, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
-    """Read on while something lies ready, then deliver the newest frames."""
+    """Read on while something is ready, then deliver the newest frames."""
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
     ended = False
     while True:
         for frame in frames:
             total += len(frame)
-            # A small frame lies in the reader's buffer, which the next receive reuses.
+            # A small frame is in the reader's buffer, which the next receive reuses.
             kept.append(frame if isinstance(frame, bytes) else bytes(frame))
         if total >= _DRAIN_BYTES or not is_readable(source.sock):
             break

@@ -1,6 +1,6 @@
 """Connections between two processes of one machine, over a Unix socket in place of TCP.
 
-Beside the port of a server stands a socket of Linux' abstract kind, and its name is made of the server's host and
+Each port of a server has a socket of Linux' abstract kind, whose name is made of the server's host and
 port: no file, so nothing is left behind, however a process ends. It is seen by those that share the machine's
 network, as the port is. Source: docs/transports.md.
 """
@@ -22,7 +22,7 @@ _PREFIX = "minirospy-"
 """How the names of sockets start."""
 
 _TRUSTED = frozenset({0})
-"""Users that are believed to be whom they say: root, and oneself."""
+"""Users that are trusted besides this process's own: root."""
 
 
 class UnixAddress(NamedTuple):
@@ -34,7 +34,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return what is the same for two processes if, and only if, abstract sockets join them; "" where there are none."""
+    """Return a text that two processes share if, and only if, abstract sockets connect them; "" where there are none."""
     if sys.platform != "linux":
         return ""
     try:
@@ -66,9 +66,9 @@ def connect(name: str) -> socket.socket:
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Return a connected, non-blocking socket to what ``host`` serves at ``port``; None where only TCP leads there.
+    """Return a connected, non-blocking socket to the server of ``host`` at ``port``; None where only TCP reaches it.
 
-    Others of this machine could take a name before its server does: so the server is this user's or root's.
+    Other users of this machine could take a name before its server does: so the server is this user's or root's.
     """
     if sys.platform != "linux":
         return None
@@ -86,7 +86,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 def parse_answer(answer: Any) -> UnixAddress | None:
     """Return the address out of a publisher's answer to requestTopic; None where it is of another protocol."""
     match answer:
-        # Any other socket of this machine is not for a peer to choose: it is a display's, a message bus's.
+        # A peer must not choose any other socket of this machine, such as a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:

@@ -31,7 +31,7 @@ class LoopThread:
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
-        # A signal's handler may find its thread holding it.
+        # A signal handler may run while its thread holds it.
         self._lock = threading.RLock()
         self._is_ending = False
         self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
@@ -46,12 +46,12 @@ class LoopThread:
         """Run ``coroutine`` on the loop and wait for its result.
 
         Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
-        and RuntimeError on the loop's own thread, where waiting would never end.
+        and RuntimeError on the loop's own thread, which would wait for itself.
         """
         return self.begin(coroutine)(timeout)
 
     def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[float | None], _T]:
-        """Return the first half of :meth:`run`: coroutines begin in the order of these calls. What is returned waits."""
+        """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls; return the function that waits."""
         if threading.current_thread() is self._thread:
             coroutine.close()
             raise RuntimeError("a blocking call on the event loop's thread would wait for itself")
@@ -75,7 +75,7 @@ class LoopThread:
             raise
 
     def post(self, function: Callable[..., object], *args: object) -> None:
-        """Call ``function`` on the loop soon; without effect once the loop is closed."""
+        """Call ``function`` on the loop soon; no effect once the loop is closed."""
         with contextlib.suppress(RuntimeError):
             self.loop.call_soon_threadsafe(function, *args)
 
@@ -94,7 +94,7 @@ class LoopThread:
         finally:
             with self._lock:
                 self._is_ending = True
-            # What was begun by then becomes a task here, and what has just ended tells so: else callers would wait for ever.
+            # What was started by then becomes a task here, and what has just ended reports it: else callers would wait for ever.
             self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:

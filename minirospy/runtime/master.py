@@ -74,12 +74,12 @@ class Master(MasterApi):
         fresh: bool = False,
         timeout: float = 3.0,
         most_clients: int = 4000,
-        nearby: bool = True,
+        same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
         """``journal``: the file that keeps what it knows (None: no file); ``fresh``: what stands there is dropped.
 
-        ``timeout``: seconds that a node has to take a call. ``nearby``: processes of this machine may come, and are
+        ``timeout``: seconds that a node has to take a call. ``same_host``: processes of this machine may come, and are
         called, by Unix sockets. ``owns_process``: nothing else runs in it, so the garbage collector is the master's.
         """
         super().__init__()
@@ -95,7 +95,7 @@ class Master(MasterApi):
         self._journal: Any = None
         # Large values whose parts were found in the journal.
         self._parts: dict[int, list[bytes]] = {}
-        self._nearby = nearby
+        self._same_host = same_host
         self._owns_process = owns_process
         self._server = RpcServer(
             self.serve,
@@ -103,9 +103,9 @@ class Master(MasterApi):
             port=port,
             most_idle=most_clients,
             access=access,
-            known_as=_names_of(host, bind_host) if nearby else (),
+            known_as=_names_of(host, bind_host) if same_host else (),
         )
-        self._notifier = Notifier(self, self._server.turns, timeout, nearby=nearby)
+        self._notifier = Notifier(self, self._server.turns, timeout, same_host=same_host)
         self._replaced = Complaints(_log, 10)
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
@@ -408,7 +408,7 @@ class Master(MasterApi):
     # --- the nodes of a master that was killed
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
-        rpc = AsyncRpcClient(nearby=self._nearby)
+        rpc = AsyncRpcClient(same_host=self._same_host)
         calls = [_lives(rpc, name, uri, _QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
         try:
             return any(await asyncio.gather(*calls))
@@ -417,7 +417,7 @@ class Master(MasterApi):
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
         """Forget the nodes that are gone; tell the others what they may have missed."""
-        rpc, slots = AsyncRpcClient(nearby=self._nearby), asyncio.Semaphore(_CHECKS_AT_ONCE)
+        rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_CHECKS_AT_ONCE)
 
         async def check(name: str, uri: str) -> bool:
             async with slots:

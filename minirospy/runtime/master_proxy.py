@@ -16,7 +16,7 @@ __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_
 
 
 class SystemState(NamedTuple):
-    """Who publishes, subscribes and serves: topic or service name -> node names."""
+    """Publishers, subscribers and service providers: topic or service name -> node names."""
 
     publishers: dict[str, list[str]]
     subscribers: dict[str, list[str]]
@@ -24,7 +24,7 @@ class SystemState(NamedTuple):
 
 
 class BusConnection(NamedTuple):
-    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` where it tells."""
+    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` where the node reports it."""
 
     id: Any
     destination: str
@@ -54,19 +54,19 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 class MasterProxy:
     """The master at ``uri``, called as the node ``caller_id``.
 
-    Each method raises MasterUnreachableError where it does not answer, RpcRefused where it says no.
+    Each method raises MasterUnreachableError where it does not answer, RpcRefused where it refuses.
     """
 
-    def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, nearby: bool = True) -> None:
+    def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
         self.uri = uri
         self.caller_id = caller_id
         try:
-            self._client = RpcClient(uri, timeout, nearby=nearby)
+            self._client = RpcClient(uri, timeout, same_host=same_host)
         except RpcUnreachable as error:
             raise MasterUnreachableError(uri) from error
 
     def call(self, method: str, *args: Any) -> Any:
-        """Any method of the API; the caller's id is put in front."""
+        """Call any method of the API; the caller's id is put in front."""
         try:
             return unwrap(method, self._client.call(method, self.caller_id, *args))
         except RpcUnreachable as error:
@@ -77,7 +77,7 @@ class MasterProxy:
         self._client.close()
 
     def is_online(self) -> bool:
-        """Return whether it answers."""
+        """Return whether the master answers."""
         try:
             self.get_pid()
         except MasterUnreachableError:
@@ -89,7 +89,7 @@ class MasterProxy:
         return int(self.call("getPid"))
 
     def get_uri(self) -> str:
-        """Return the URI that the master tells of itself."""
+        """Return the URI that the master reports for itself."""
         return str(self.call("getUri"))
 
     def lookup_node(self, name: str) -> str:
@@ -97,7 +97,7 @@ class MasterProxy:
         return str(self.call("lookupNode", name))
 
     def get_published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """(topic, type) of each published topic at or below ``subgraph``."""
+        """Return (topic, type) of each published topic at or below ``subgraph``."""
         return [(topic, type_) for topic, type_ in self.call("getPublishedTopics", subgraph)]
 
     def get_topic_types(self) -> dict[str, str]:
@@ -105,7 +105,7 @@ class MasterProxy:
         return dict(self.call("getTopicTypes"))
 
     def get_system_state(self) -> SystemState:
-        """Who publishes, subscribes and serves what."""
+        """Return publishers, subscribers and services."""
         return SystemState(*(dict(table) for table in self.call("getSystemState")))
 
     def lookup_service(self, name: str) -> str:
@@ -113,19 +113,19 @@ class MasterProxy:
         return str(self.call("lookupService", name))
 
     def register_publisher(self, topic: str, type_: str, caller_api: str) -> list[str]:
-        """Register a publisher; the URIs of the topic's subscribers."""
+        """Register a publisher; return the URIs of the topic's subscribers."""
         return list(self.call("registerPublisher", topic, type_, caller_api))
 
     def unregister_publisher(self, topic: str, caller_api: str) -> int:
-        """Take a publisher back; how many there were (0 or 1)."""
+        """Unregister a publisher; return how many there were (0 or 1)."""
         return int(self.call("unregisterPublisher", topic, caller_api))
 
     def register_subscriber(self, topic: str, type_: str, caller_api: str) -> list[str]:
-        """Register a subscriber; the URIs of the topic's publishers."""
+        """Register a subscriber; return the URIs of the topic's publishers."""
         return list(self.call("registerSubscriber", topic, type_, caller_api))
 
     def unregister_subscriber(self, topic: str, caller_api: str) -> int:
-        """Take a subscriber back; how many there were (0 or 1)."""
+        """Unregister a subscriber; return how many there were (0 or 1)."""
         return int(self.call("unregisterSubscriber", topic, caller_api))
 
     def register_service(self, name: str, service_api: str, caller_api: str) -> None:
@@ -133,7 +133,7 @@ class MasterProxy:
         self.call("registerService", name, service_api, caller_api)
 
     def unregister_service(self, name: str, service_api: str) -> int:
-        """Take a service back; how many there were (0 or 1)."""
+        """Unregister a service; return how many there were (0 or 1)."""
         return int(self.call("unregisterService", name, service_api))
 
     def get_param(self, key: str) -> Any:
@@ -153,7 +153,7 @@ class MasterProxy:
         self.call("deleteParam", key)
 
     def search_param(self, key: str) -> str | None:
-        """Return the nearest parameter of this name, upwards from the caller's namespace; None where there is none."""
+        """Return the closest parameter of this name, upwards from the caller's namespace; None where there is none."""
         try:
             return str(self.call("searchParam", key))
         except RpcRefused:
@@ -164,24 +164,24 @@ class MasterProxy:
         return list(self.call("getParamNames"))
 
     def subscribe_param(self, caller_api: str, key: str) -> Any:
-        """Be told of changes at or below ``key``; its value now."""
+        """Subscribe to changes at or below ``key``; return its present value."""
         return self.call("subscribeParam", caller_api, key)
 
     def unsubscribe_param(self, caller_api: str, key: str) -> int:
-        """Be told no more."""
+        """Unsubscribe from changes of ``key``."""
         return int(self.call("unsubscribeParam", caller_api, key))
 
 
 class SlaveProxy:
     """A node at ``uri``. Each method raises RpcUnreachable, RpcRefused or another RpcError."""
 
-    def __init__(self, uri: str, caller_id: str, timeout: float = 3.0, *, nearby: bool = True) -> None:
+    def __init__(self, uri: str, caller_id: str, timeout: float = 3.0, *, same_host: bool = True) -> None:
         self.uri = uri
         self.caller_id = caller_id
-        self._client = RpcClient(uri, timeout, nearby=nearby)
+        self._client = RpcClient(uri, timeout, same_host=same_host)
 
     def call(self, method: str, *args: Any) -> Any:
-        """Any method of the API; the caller's id is put in front."""
+        """Call any method of the API; the caller's id is put in front."""
         return unwrap(method, self._client.call(method, self.caller_id, *args))
 
     def close(self) -> None:
@@ -197,7 +197,7 @@ class SlaveProxy:
         return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
 
     def get_bus_stats(self) -> list[Any]:
-        """Statistics, as the node tells them."""
+        """Return statistics, as the node reports them."""
         return list(self.call("getBusStats"))
 
     def get_master_uri(self) -> str:
@@ -209,11 +209,11 @@ class SlaveProxy:
         self.call("shutdown", reason)
 
     def get_subscriptions(self) -> list[tuple[str, str]]:
-        """(topic, type) of what the node subscribes to."""
+        """Return (topic, type) of what the node subscribes to."""
         return [(topic, type_) for topic, type_ in self.call("getSubscriptions")]
 
     def get_publications(self) -> list[tuple[str, str]]:
-        """(topic, type) of what the node publishes."""
+        """Return (topic, type) of what the node publishes."""
         return [(topic, type_) for topic, type_ in self.call("getPublications")]
 
     def request_topic(self, topic: str, protocols: list[list[Any]]) -> list[Any]:

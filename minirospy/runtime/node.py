@@ -1,7 +1,7 @@
-"""A node: its servers, its registrations with the master, and what arrives for it.
+"""A node: its servers, its registrations with the master, and the connections of its peers.
 
-Everything here runs on one event loop; a process may hold several nodes. The blocking API of
-``minirospy.client`` stands in front of it.
+Everything here runs on one event loop; a process may hold several nodes. ``minirospy.client`` is the blocking
+API in front of it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from minirospy.errors import (
 )
 from minirospy.runtime import local, tcp
 from minirospy.runtime.access import Access
-from minirospy.runtime.links import Readers
+from minirospy.runtime.links import ReaderSet
 from minirospy.runtime.master_proxy import master_unreachable, unwrap
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.rpc_server import RpcServer
@@ -57,16 +57,16 @@ _CALLS_AT_ONCE = 100
 """Unregistrations in one system.multicall."""
 
 _MOST_IDLE = 200
-"""Clients of the Slave API that are connected and ask nothing; a graph has about as many as this node has peers."""
+"""Idle connections to the Slave API; a graph has about as many as this node has peers."""
 
 _STALE_SECONDS = 5.0
-"""So long a master may still send a list of publishers to one who has unsubscribed."""
+"""How long a master may still send a list of publishers to a node that has unsubscribed."""
 
-_ASK_AGAIN_SECONDS = 0.5
+_REQUEST_AGAIN_SECONDS = 0.5
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
-"""What a part is to the master, as the names of its calls have it ("Publisher"), and its topic or name."""
+"""The kind of a part, as in the names of the master's calls ("Publisher"), and its topic or name."""
 _Call: TypeAlias = tuple[str, tuple[Any, ...]]
 """A method of the Master API, and its arguments after the caller's name."""
 
@@ -76,7 +76,7 @@ class Node:
 
     ``await start()`` opens its servers; ``advertise``, ``subscribe`` and ``serve`` register with the master
     and raise MasterUnreachableError or RpcRefused where that fails, with the topic or service in place all
-    the same: the master is told later. Methods are called on the loop, unless they say otherwise.
+    the same: it is registered later. Methods are called on the loop, unless they say otherwise.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Node:
     ) -> None:
         """``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
 
-        ``watch_seconds`` lie between two looks at whether the master still knows this node.
+        Every ``watch_seconds`` the node checks whether the master still knows it.
         """
         self.name = name
         self.environment = environment
@@ -99,35 +99,35 @@ class Node:
         self.subscriptions: dict[str, Subscription] = {}
         self.services: dict[str, ServiceServer] = {}
         self.parameters: set[str] = set()
-        """The parameters of whose changes the master tells this node: subscribed to by whoever put them here."""
+        """The parameters that this node has subscribed to at the master; the caller that subscribes adds them."""
         self._tables: Mapping[str, dict[str, Any]] = {
             "Publisher": self.publications,
             "Subscriber": self.subscriptions,
             "Service": self.services,
         }
         self._known: dict[_Key, _Part | None] = {}
-        """What the master has of this node; None where a call failed, or has no answer yet."""
+        """What is registered with the master; None where a call failed, or has no answer yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
-        self._telling: set[asyncio.Task[None]] = set()
+        self._registering: set[asyncio.Task[None]] = set()
         self._left: dict[str, asyncio.TimerHandle] = {}
-        """Topics of which subscriptions have ended of late."""
-        self._asking: dict[str, asyncio.TimerHandle] = {}
-        """Topics whose publishers the master is to be asked for again."""
+        """Topics with a subscription that has ended recently."""
+        self._requesting: dict[str, asyncio.TimerHandle] = {}
+        """Topics whose publishers are to be requested from the master again."""
         self.uri = ""
         self._on_shutdown = on_shutdown
         self._on_parameter = on_parameter
-        self._parameters_told = InOrder(self.workers)
+        self._parameter_updates = InOrder(self.workers)
         self._watch_seconds = watch_seconds
         self.when_registered_again: list[Callable[[], object]] = []
-        """Called in workers when the master had forgotten this node: for what else it has to be told."""
-        self._readers = Readers()
-        self._rpc = AsyncRpcClient(nearby=environment.nearby)
+        """Called in workers when the master had forgotten this node: to register what else it needs."""
+        self._readers = ReaderSet()
+        self._rpc = AsyncRpcClient(same_host=environment.same_host)
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
         self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
-        self._nearby = tcp.Listener(self._accept)
+        self._unix_listener = tcp.Listener(self._accept)
         self.this_host = ""
-        """What :func:`local.this_host` says, where this node talks by Unix sockets too."""
+        """The value of :func:`local.this_host`, where this node uses Unix sockets too."""
         self.unix_name = ""
         """Where topics are served to processes of this machine; "" where they are not."""
         self._watching: asyncio.Task[None] | None = None
@@ -151,8 +151,8 @@ class Node:
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
-        if self.environment.nearby:
-            self._open_nearby()
+        if self.environment.same_host:
+            self._open_unix_listener()
         self._server = RpcServer(
             SlaveApi(self).dispatch,
             bind_host=host,
@@ -160,7 +160,7 @@ class Node:
             ports=ports,
             most_idle=_MOST_IDLE,
             access=self._access,
-            known_as=(self.environment.uri_host,) if self.environment.nearby else (),
+            known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )
         try:
             await self._server.start()
@@ -170,7 +170,7 @@ class Node:
         self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
         self._watching = asyncio.ensure_future(self._watch_master())
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
-            # Looking for the address of a name may wait for a server.
+            # Resolving a name may wait for a server.
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
     async def close(self) -> None:
@@ -189,7 +189,7 @@ class Node:
         watching = [self._watching] if self._watching else []
         for task in watching:
             task.cancel()
-        for timer in [*self._left.values(), *self._asking.values()]:
+        for timer in [*self._left.values(), *self._requesting.values()]:
             timer.cancel()
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
@@ -200,7 +200,7 @@ class Node:
         )
 
         # Its name goes before the port, which the next server takes with a name of its own.
-        await self._nearby.close()
+        await self._unix_listener.close()
         await self._listener.close()
         for table in (self.publications, self.subscriptions, self.services):
             for part in table.values():
@@ -209,10 +209,10 @@ class Node:
             await self._server.close()
         await self._rpc.close()
 
-        # A master that does not answer has had its time.
-        for telling in self._telling:
-            telling.cancel()
-        await asyncio.gather(*self._telling, return_exceptions=True)
+        # Calls that the master has not answered.
+        for task in self._registering:
+            task.cancel()
+        await asyncio.gather(*self._registering, return_exceptions=True)
 
     async def master(self, method: str, *args: Any) -> Any:
         """Call the master as this node; the value of its answer.
@@ -234,7 +234,7 @@ class Node:
         return answer
 
     async def _look(self, method: str, name: str) -> None:
-        """Ask the master about this node. Raises MasterUnreachableError, RpcError."""
+        """Look up this node, or one of its services. Raises MasterUnreachableError, RpcError."""
         try:
             await asyncio.wait_for(self.master(method, name), _LOOK_SECONDS)
         except asyncio.TimeoutError as error:
@@ -242,17 +242,17 @@ class Node:
             raise MasterUnreachableError(self.environment.master_uri) from error
 
     async def advertise(self, publication: Publication) -> None:
-        """Publish a topic from now on. One publication a topic: a second is a ValueError."""
+        """Publish a topic. One publication a topic: a second is a ValueError."""
         if self.publications.setdefault(publication.topic, publication) is not publication:
             raise ValueError(f"{self.name} publishes {publication.topic} already")
-        await self._tell(("Publisher", publication.topic))
+        await self._update(("Publisher", publication.topic))
 
     async def unadvertise(self, publication: Publication) -> None:
-        """Stop publishing."""
+        """Stop publishing a topic."""
         if self.publications.get(publication.topic) is publication:
             del self.publications[publication.topic]
             try:
-                await self._tell(("Publisher", publication.topic))
+                await self._update(("Publisher", publication.topic))
             finally:
                 publication.close()
 
@@ -282,14 +282,14 @@ class Node:
         )
 
     async def subscribe(self, subscription: Subscription) -> None:
-        """Listen to a topic from now on. One subscription a topic: a second is a ValueError."""
+        """Subscribe to a topic. One subscription a topic: a second is a ValueError."""
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
-        await self._tell(("Subscriber", topic))
+        await self._update(("Subscriber", topic))
 
     async def unsubscribe(self, subscription: Subscription) -> None:
-        """Stop listening."""
+        """Unsubscribe from a topic."""
         topic = subscription.topic
         if self.subscriptions.get(topic) is subscription:
             del self.subscriptions[topic]
@@ -298,7 +298,7 @@ class Node:
                 self._left[topic].cancel()
             loop = asyncio.get_running_loop()
             self._left[topic] = loop.call_later(_STALE_SECONDS, self._left.pop, topic)
-            await self._tell(("Subscriber", topic))
+            await self._update(("Subscriber", topic))
 
     def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
@@ -315,17 +315,17 @@ class Node:
         )
 
     async def serve(self, server: ServiceServer) -> None:
-        """Offer a service from now on. One of a name: a second is a ValueError."""
+        """Offer a service. One of a name: a second is a ValueError."""
         if self.services.setdefault(server.name, server) is not server:
             raise ValueError(f"service [{server.name}] already registered")
-        await self._tell(("Service", server.name))
+        await self._update(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
         """Stop offering a service; calls under way are ended."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()
-            await self._tell(("Service", server.name))
+            await self._update(("Service", server.name))
 
     @property
     def service_uri(self) -> str:
@@ -333,40 +333,40 @@ class Node:
         return f"rosrpc://{self.environment.uri_host}:{self.tcpros_port}"
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """The master's list of a topic's publishers has come."""
+        """Take over the master's list of a topic's publishers."""
         subscription = self.subscriptions.get(topic)
         if subscription:
             subscription.publishers_changed(uris)
-            if topic in self._left and topic not in self._asking:
+            if topic in self._left and topic not in self._requesting:
                 # It may have been meant for the subscription before: rosmaster's lists wait in a queue.
                 loop = asyncio.get_running_loop()
-                self._asking[topic] = loop.call_later(_ASK_AGAIN_SECONDS, self._ask_again, topic)
+                self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
     def parameter_changed(self, key: str, value: Any) -> None:
-        """The master told of a parameter's new value."""
+        """Pass on a parameter's new value, of which the master has notified this node."""
         if self._on_parameter:
-            self._parameters_told.start(self._on_parameter, key, value)
+            self._parameter_updates.start(self._on_parameter, key, value)
 
     def request_shutdown(self, reason: str) -> None:
-        """Somebody outside asks this node to stop."""
+        """Stop on the request of another process."""
         if self._on_shutdown:
             self.workers.start(self._on_shutdown, reason)
 
-    def _ask_again(self, topic: str) -> None:
-        del self._asking[topic]
+    def _request_again(self, topic: str) -> None:
+        del self._requesting[topic]
         key = ("Subscriber", topic)
         if self._known.get(key):
             self._known[key] = None
-            self._start_telling(key)
+            self._start_registering(key)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
-        """A peer has connected: its header says which topic or service it wants."""
+        """Serve a peer that has connected: its header names a topic or service."""
         try:
             fields = await tcp.receive_header(sock)
         except (OSError, WireError):
             if not self._closed:
                 raise
-            sock.close()  # the master has told the peer that this node leaves
+            sock.close()  # the master has notified the peer that this node leaves
             return
         if "service" in fields:
             server = self.services.get(fields["service"])
@@ -384,35 +384,35 @@ class Node:
         else:
             why = "no topic or service name detected"
         if why:
-            self._listener.tell_refusal(f"Could not process inbound connection: {why}{fields}")
+            self._listener.log_refusal(f"Could not process inbound connection: {why}{fields}")
             await tcp.send_header(sock, {"error": why})
             sock.close()
 
-    def _open_nearby(self) -> None:
+    def _open_unix_listener(self) -> None:
         """Serve topics and services by a Unix socket too, where there are such sockets."""
         sock = local.bind(self.environment.uri_host, self.tcpros_port)
         if sock:
             self.this_host = local.this_host()
             self.unix_name = local.name_of(self.environment.uri_host, self.tcpros_port)
-            self._nearby.listen(sock)
+            self._unix_listener.listen(sock)
 
     def _check_own_address(self) -> None:
         environment = self.environment
         if not environment.master_is_local:
             _log.warning(
-                "this node tells everybody that it is at '%s', but the master is on another machine (%s): set ROS_IP "
+                "this node is registered at '%s', but the master is on another machine (%s): set ROS_IP "
                 "to the address by which that one reaches this one",
                 environment.host,
                 environment.master_uri,
             )
 
-    async def _tell(self, key: _Key, *, again: bool = False) -> None:
-        """Tell the master what this node has of one name, a part or nothing, where it does not know.
+    async def _update(self, key: _Key, *, again: bool = False) -> None:
+        """Register what this node has of one name, a part or nothing, where the master does not know it.
 
-        One call after the other for each name, and what is on its way is not taken back: a registration could overtake
-        the end of the one before, which would undo it, or the end of the node could overtake a registration.
+        One call after the other for each name, and none is cancelled half way: a registration could overtake the
+        unregistration before it, which would undo it, or the shutdown of the node could overtake a registration.
         """
-        task = self._start_telling(key, again=again)
+        task = self._start_registering(key, again=again)
         try:
             await asyncio.shield(task)
         except asyncio.CancelledError as error:
@@ -421,19 +421,19 @@ class Node:
             # close() has given up.
             raise MasterUnreachableError(self.environment.master_uri) from error
 
-    def _start_telling(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
-        task = asyncio.ensure_future(self._tell_in_turn(key, again=again))
-        self._telling.add(task)
-        task.add_done_callback(self._has_told)
+    def _start_registering(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
+        task = asyncio.ensure_future(self._register_in_turn(key, again=again))
+        self._registering.add(task)
+        task.add_done_callback(self._has_registered)
         return task
 
-    def _has_told(self, task: asyncio.Task[None]) -> None:
-        self._telling.discard(task)
+    def _has_registered(self, task: asyncio.Task[None]) -> None:
+        self._registering.discard(task)
         if not task.cancelled():
-            # Whoever waits gets its error; nobody has to, since it is tried again.
+            # A caller that waits gets its error; nobody has to, since it is tried again.
             task.exception()
 
-    async def _tell_in_turn(self, key: _Key, *, again: bool) -> None:
+    async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
         async with self._turns.setdefault(key, asyncio.Lock()):
             part = self._wanted(key)
             if part is not None and self._known.get(key) is not part:
@@ -444,11 +444,11 @@ class Node:
                 self._known[key] = None
                 method, args = self._unregistration(key)
                 await self.master(method, *args)
-                # A look at a master that has restarted may have come first.
+                # A check of a master that has restarted may have come first.
                 self._known.pop(key, None)
 
     def _wanted(self, key: _Key) -> _Part | None:
-        """Return what the master is to have of one name."""
+        """Return what is to be registered for one name."""
         kind, name = key
         return None if self._closed else self._tables[kind].get(name)
 
@@ -467,10 +467,10 @@ class Node:
             await self.master("registerService", part.name, self.service_uri, self.uri)
 
     async def _register_subscription(self, subscription: Subscription) -> list[str]:
-        """Tell the master of a subscription; its publishers.
+        """Register a subscription; return its publishers.
 
         A publisherUpdate comes by another connection, and may overtake the answer, which is then the older list.
-        Where one came, the master is asked again.
+        Where one came, the call is made again.
         """
         while True:
             lists = subscription.lists
@@ -482,11 +482,11 @@ class Node:
                 return uris
 
     async def _watch_master(self) -> None:
-        """Notice a master that has restarted and forgotten this node, and register again; say what it missed.
+        """Notice a master that has restarted and forgotten this node, and register again.
 
-        The master is asked for a service of this node, or else for its name, by which it may know it again on account
-        of a topic that is newer than the restart. Its process id tells nothing in a container, where each has the same,
-        nor of a master that kept its tables.
+        It looks up a service of this node, or else its name, which the master may know again by a topic that is newer
+        than the restart. The master's process id says nothing in a container, where each has the same, nor about a
+        master that kept its tables.
         """
         failures = 0
         while True:
@@ -507,36 +507,36 @@ class Node:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # What was ended meanwhile is unknown for good reason.
+                # What was unregistered meanwhile is unknown for good reason.
                 has_forgotten = asked is not None and self._known.get(asked) is not None
             except RpcError as error:
-                _log.debug("asking the master for this node: %s", error)
+                _log.debug("looking up this node: %s", error)
                 continue
             failures = 0
             if has_forgotten:
                 self._known.clear()
             with contextlib.suppress(MasterUnreachableError):
-                await self._tell_all(again=has_forgotten)
+                await self._register_all(again=has_forgotten)
             if has_forgotten and any(self._known.values()):
                 _log.warning("the master at %s has restarted: registered again", self.environment.master_uri)
                 for function in self.when_registered_again:
                     self.workers.start(function)
             elif has_forgotten:
-                # Once: it is not taken for one that knows this node any more.
+                # Once: this master does not count as one that knows this node any more.
                 _log.warning("the master does not know this node, and refuses to")
 
-    async def _tell_all(self, *, again: bool = False) -> None:
-        """Tell the master of all that it does not know. Raises MasterUnreachableError."""
+    async def _register_all(self, *, again: bool = False) -> None:
+        """Register all that the master does not know. Raises MasterUnreachableError."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
-            # One that the master never accepts must not keep the others from it.
+            # One that the master never accepts must not block the others.
             try:
-                await self._tell(key, again=again)
+                await self._update(key, again=again)
             except RpcError as error:
-                _log.debug("telling the master of %s: %s", key, error)
+                _log.debug("registering %s: %s", key, error)
 
     async def _unregister_all(self) -> None:
-        """Take everything back that the master has of this node, in as few calls as it allows."""
+        """Unregister everything that the master has of this node, in as few calls as it allows."""
         # A name with a call under way comes after that call, which would undo its unregistration.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
@@ -545,7 +545,7 @@ class Node:
             del self._known[key]
 
         tasks = [asyncio.ensure_future(self._call_all(calls))]
-        tasks += [asyncio.ensure_future(self._tell(key)) for key in under_way]
+        tasks += [asyncio.ensure_future(self._update(key)) for key in under_way]
         try:
             await self._wait_for_answers(tasks)
         finally:

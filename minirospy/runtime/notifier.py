@@ -91,12 +91,12 @@ class Notifier:
     follows after a pause.
     """
 
-    def __init__(self, state: State, turns: Turns, timeout: float, *, nearby: bool = True) -> None:
+    def __init__(self, state: State, turns: Turns, timeout: float, *, same_host: bool = True) -> None:
         """``turns`` runs what takes long. ``timeout``: seconds that a call may take."""
         self._state = state
         self._turns = turns
         self._timeout = timeout
-        self._rpc = AsyncRpcClient(nearby=nearby, max_answer=_MAX_ANSWER)
+        self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
         self._nodes: dict[str, _Node] = {}

@@ -46,9 +46,9 @@ _Address = tuple[str, int]
 class AsyncRpcClient:
     """Calls methods of any server; a few connections to each are kept for a while and reused."""
 
-    def __init__(self, *, nearby: bool = True, max_answer: int = MAX_BODY) -> None:
-        """``nearby``: a Unix socket is tried first. ``max_answer``: bytes that an answer may have."""
-        self.nearby = nearby
+    def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
+        """``same_host``: a Unix socket is tried first. ``max_answer``: bytes that an answer may have."""
+        self.same_host = same_host
         self.max_answer = max_answer
         # Of each server, in the order of their last use.
         self._idle: dict[_Address, list[_Connection]] = {}
@@ -314,9 +314,9 @@ class Call:
     def _connect(self) -> None:
         """A new connection, at once where the host needs no looking up."""
         host, port = self._address
-        near = local.reach(host, port) if self._client.nearby else None
-        if near:
-            self._use(self._connected_by(near))
+        unix = local.reach(host, port) if self._client.same_host else None
+        if unix:
+            self._use(self._connected_by(unix))
             self._send()
             return
         literal = _literal(host)

@@ -29,17 +29,17 @@ class RpcClient:
     middle of another call of the same thread gets one of its own.
     """
 
-    def __init__(self, uri: str, timeout: float = 5.0, *, nearby: bool = True) -> None:
+    def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
         """``timeout`` in seconds bounds each wait for bytes, and connecting, which takes 5 s at most.
 
-        ``nearby``: a Unix socket is tried first.
+        ``same_host``: a Unix socket is tried first.
 
         Raises RpcUnreachable on a bad URI.
         """
         self.uri = uri
         self._host, self._port, self._path = parse_http_uri(uri)
         self._timeout = timeout
-        self._nearby = nearby
+        self._same_host = same_host
         self._idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: Any) -> Any:
@@ -77,10 +77,10 @@ class RpcClient:
             raise RpcUnreachable(self.uri, why) from error
 
     def _connect(self) -> socket.socket:
-        near = local.reach(self._host, self._port) if self._nearby else None
-        if near:
-            near.settimeout(self._timeout)
-            return near
+        unix = local.reach(self._host, self._port) if self._same_host else None
+        if unix:
+            unix.settimeout(self._timeout)
+            return unix
         seconds = min(self._timeout, _CONNECT_SECONDS)
         try:
             # "localhost" may name IPv6 first, where a server of ROS 1 listens only with ROS_IPV6.
@@ -103,7 +103,7 @@ class RpcClient:
         reader = HttpReader()
         try:
             sock.sendall(request)
-            sockets.expect_answer(sock)
+            sockets.busy_poll(sock)
             while True:
                 data = sock.recv(_RECEIVE)
                 if not data and reader.is_idle:

@@ -183,10 +183,10 @@ class RpcServer:
         assert self._sock
         self._watch(self._sock)
         for host in self._known_as:
-            near = local.bind(host, self.port)
-            if near:
-                near.listen(_BACKLOG)
-                self._watch(near)
+            unix = local.bind(host, self.port)
+            if unix:
+                unix.listen(_BACKLOG)
+                self._watch(unix)
 
     async def close(self) -> None:
         """Stop listening and end all connections. Idempotent."""

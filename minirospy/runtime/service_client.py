@@ -52,9 +52,9 @@ class ServiceClient:
         headers: Mapping[str, str] | None = None,
         timeout: float = sockets.HANDSHAKE_SECONDS,
         waits: bool = True,
-        nearby: bool = True,
+        same_host: bool = True,
     ) -> None:
-        """Connect to ``uri`` (rosrpc://host:port), ``nearby`` by a Unix socket where it can be, and exchange headers.
+        """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` by a Unix socket where possible, and exchange headers.
 
         With ``waits`` false the server's header is left for :meth:`finish`, so that the caller can do something
         else meanwhile. Raises HandshakeRefused where the server says no, OSError or WireError where it cannot be
@@ -68,7 +68,7 @@ class ServiceClient:
         )
         # Made before connecting, so that the server finds it when it looks at the connection for the first time.
         header = serialize_header(fields)
-        self._sock = _connected(parse_service_uri(uri), timeout, nearby=nearby)
+        self._sock = _connected(parse_service_uri(uri), timeout, same_host=same_host)
         try:
             self._sock.sendall(header)
             self._reader = Reader(self._sock)
@@ -84,8 +84,8 @@ class ServiceClient:
     def finish(self, request: bytes | None = None) -> None:
         """Receive the server's header. Raises as the constructor does; the connection is closed then.
 
-        The ``request`` of the :meth:`call` that follows goes ahead where the server is known to wait for no other
-        order: so both answers need but one wait. A server that sends no header has not begun with it.
+        The ``request`` of the :meth:`call` that follows is sent first where the server is known to accept that:
+        so both answers need one wait. A server that sends no header has not started on it.
         """
         try:
             # By a Unix socket, which only minirospy serves: rospy may lose what comes with a header.
@@ -106,7 +106,7 @@ class ServiceClient:
         else:
             self._send(request)
         if not self._reader.rest:
-            sockets.expect_answer(self._sock)
+            sockets.busy_poll(self._sock)
         ok, length = ANSWER.unpack(self._reader.take(ANSWER.size))
         body = self._reader.take(checked(length))
         if not ok:
@@ -114,8 +114,8 @@ class ServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Return whether the server has hung up: a request that is sent now would not be read."""
-        # Nothing comes unasked: what can be read is the end. A poll object of its own, since each call looks.
+        """Return whether the server has disconnected: a request that is sent now would not be read."""
+        # A server sends nothing by itself: what can be read is the end. A separate poll object, since each call uses it.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:
@@ -131,7 +131,7 @@ class ServiceClient:
         self._sock.sendall(LENGTH.pack(len(request)) + request)
 
     def _receive_header(self) -> Header:
-        sockets.expect_answer(self._sock)
+        sockets.busy_poll(self._sock)
         try:
             (length,) = LENGTH.unpack(self._reader.take(4))
             if length > MAX_HEADER:
@@ -181,7 +181,7 @@ class Reader:
     def __init__(self, sock: socket.socket) -> None:
         self._receive = sock.recv
         self.rest = b""
-        """What has come beyond the last read."""
+        """The bytes behind the last read."""
 
     def take(self, count: int, *, at_end_ok: bool = False) -> bytes:
         """``count`` bytes; b"" where the peer ended before the first and that is in order. Raises WireError."""
@@ -203,7 +203,7 @@ class Reader:
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # It ended with something unread: the end all the same.
+            # It closed with something unread: an end all the same.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:
@@ -220,12 +220,12 @@ class Reader:
         return whole[:count]
 
 
-def _connected(address: tuple[str, int], timeout: float, *, nearby: bool) -> socket.socket:
+def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> socket.socket:
     """Return a tuned blocking socket. Raises OSError."""
-    near = local.reach(*address) if nearby else None
-    if near:
-        near.settimeout(timeout)
-        return near
+    unix = local.reach(*address) if same_host else None
+    if unix:
+        unix.settimeout(timeout)
+        return unix
     try:
         socket.inet_pton(socket.AF_INET, address[0])
     except OSError:
@@ -233,7 +233,7 @@ def _connected(address: tuple[str, int], timeout: float, *, nearby: bool) -> soc
         sock = socket.create_connection(named, timeout)
         sockets.tune(sock)
         return sock
-    # Most services are found by an address: no resolver has to be asked.
+    # Most services have an address for a host: no resolver is needed.
     sock = socket.socket()
     try:
         sockets.tune(sock)

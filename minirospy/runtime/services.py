@@ -107,7 +107,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Serve no more: clients that wait for an answer get it, the others are hung up on."""
+        """Serve no more: clients that wait for an answer get it, the others are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -236,14 +236,14 @@ class AsyncServiceClient:
         probe: bool = False,
         headers: Mapping[str, str] | None = None,
         timeout: float = sockets.HANDSHAKE_SECONDS,
-        nearby: bool = True,
+        same_host: bool = True,
     ) -> AsyncServiceClient:
         """Connect to ``uri`` and exchange headers. Raises as :class:`ServiceClient` does."""
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
         address = parse_service_uri(uri)
-        sock = (local.reach(*address) if nearby else None) or await tcp.connect(*address, timeout)
+        sock = (local.reach(*address) if same_host else None) or await tcp.connect(*address, timeout)
         try:
             sockets.tune(sock)
             await tcp.send_header(sock, fields)

@@ -1,4 +1,4 @@
-"""Sockets, without a loop: what is set on them, and how they are looked at and ended."""
+"""Sockets, without a loop: what is set on them, and how they are polled and closed."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ import time
 from typing import NamedTuple
 
 __all__ = [
-    "EXPECTED_SECONDS",
+    "BUSY_POLL_SECONDS",
     "FAMILIES",
     "HANDSHAKE_SECONDS",
-    "expect_answer",
+    "busy_poll",
+    "busy_receive",
     "hang_up",
     "is_readable",
     "is_writable",
-    "may_expect",
+    "may_busy_poll",
     "peer",
-    "receive_awake",
     "resolvable",
     "tune",
 ]
 
 FAMILIES = (socket.AF_INET, socket.AF_INET6)
-"""What a socket of TCP is of."""
+"""The address families of TCP sockets."""
 
 HANDSHAKE_SECONDS = 10.0
-"""Others may never answer: each handshake ends after this."""
+"""A peer may never answer: each handshake ends after this."""
 
-EXPECTED_SECONDS = 0.0002
-"""Within this most answers come from a process of this machine."""
+BUSY_POLL_SECONDS = 0.0002
+"""Most answers of a process on the same host come within this."""
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between questions, questions. macOS calls the first TCP_KEEPALIVE."""
+"""Seconds of silence, seconds between probes, number of probes. macOS calls the first TCP_KEEPALIVE."""
 
 _PEER = struct.Struct("iII")
-"""What the system says of a peer, see Peer."""
+"""The system's record of a peer, see Peer."""
 
 
 class Peer(NamedTuple):
@@ -51,7 +51,7 @@ class Peer(NamedTuple):
 
 
 def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
-    """TCP_NODELAY as asked; keepalive, so that a peer that lost power is noticed within a minute.
+    """Set TCP_NODELAY as requested, and keepalive, so that a peer that lost power is noticed within a minute.
 
     A socket of another kind is left as it is.
     """
@@ -67,18 +67,18 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """Return a host's name as a resolver takes it. Raises OSError where it can be nobody's.
+    """Return a host's name as a resolver takes it. Raises OSError where it is not a host name.
 
     A str would have the resolver import the IDNA codec, which takes a command a tenth of its time.
     """
     try:
         return host.encode("ascii" if host.isascii() else "idna")
     except UnicodeError as error:
-        raise OSError(f"'{host}' is no name of a machine") from error
+        raise OSError(f"'{host}' is not a name of a machine") from error
 
 
 def peer(sock: socket.socket) -> Peer:
-    """Who has connected this Unix socket, or listened for it. Linux only."""
+    """Return the process that has connected this Unix socket, or listened for it. Linux only."""
     return Peer(*_PEER.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)))
 
 
@@ -96,35 +96,35 @@ def is_readable(sock: socket.socket) -> bool:
 
 
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Return whether the socket takes something within so long; first it is looked at awake, as in expect_answer."""
+    """Return whether the socket is writable within so long; busy-polls first, as busy_poll() does."""
     if hasattr(select, "poll"):
-        return (may_expect(sock) and _expect(sock, select.POLLOUT)) or bool(
+        return (may_busy_poll(sock) and _busy_poll(sock, select.POLLOUT)) or bool(
             _poll(sock, select.POLLOUT).poll(milliseconds)
         )
     return bool(select.select([], [sock], [], milliseconds / 1000)[1])
 
 
-def expect_answer(sock: socket.socket) -> None:
-    """Wait for what another process answers, a fifth of a millisecond at most, without falling asleep.
+def busy_poll(sock: socket.socket) -> None:
+    """Busy-poll for the answer of another process, for up to a fifth of a millisecond.
 
-    To be woken takes as long as such a call. The processor is offered to others meanwhile: the peer may need it. Does
-    nothing with a socket that may not be waited for so.
+    To be woken takes as long as such a call. The processor is yielded to other processes meanwhile: the peer may need it.
+    Does nothing with a socket that may not be busy-polled.
     """
-    if may_expect(sock):
-        _expect(sock, select.POLLIN)
+    if may_busy_poll(sock):
+        _busy_poll(sock, select.POLLIN)
 
 
-def may_expect(sock: socket.socket) -> bool:
-    """Return whether the peer is another process of this machine, at a Unix socket; one of this process needs the interpreter."""
+def may_busy_poll(sock: socket.socket) -> bool:
+    """Return whether the peer is another process of this machine, at a Unix socket; a peer in this process needs the GIL."""
     return sys.platform == "linux" and sock.family == socket.AF_UNIX and peer(sock).process != os.getpid()
 
 
-def receive_awake(sock: socket.socket, space: memoryview) -> int:
-    """Receive what another process sends within a fifth of a millisecond, without falling asleep.
+def busy_receive(sock: socket.socket, space: memoryview) -> int:
+    """Receive what another process sends within a fifth of a millisecond, by busy-polling.
 
-    For a socket of which ``may_expect`` is true. Raises BlockingIOError where nothing comes, OSError.
+    For a socket of which ``may_busy_poll`` is true. Raises BlockingIOError where nothing comes, OSError.
     """
-    end = time.perf_counter() + EXPECTED_SECONDS
+    end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
         os.sched_yield()
         try:
@@ -134,10 +134,10 @@ def receive_awake(sock: socket.socket, space: memoryview) -> int:
                 raise
 
 
-def _expect(sock: socket.socket, events: int) -> bool:
-    """Look for the events for a fifth of a millisecond; whether they have come."""
+def _busy_poll(sock: socket.socket, events: int) -> bool:
+    """Poll for the events for up to a fifth of a millisecond; return whether they have come."""
     poll = _poll(sock, events)
-    end = time.perf_counter() + EXPECTED_SECONDS
+    end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
         # First, since the peer may wait for this processor.
         os.sched_yield()

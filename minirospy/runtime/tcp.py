@@ -1,7 +1,7 @@
 """Sockets: listening, connecting, and the exact reads of a handshake, on the loop.
 
-A handshake reads exactly a header's bytes, so nothing of what follows is ever taken with it, and the
-socket can be handed to a worker or a writer as it is.
+A handshake reads exactly a header's bytes, so nothing of what follows is read with it, and the
+socket can be passed to a worker or a writer as it is.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ __all__ = [
 ]
 
 MOST_HANDSHAKES = 200
-"""Handshakes under way at once: one more ends the oldest, since who means it is done in milliseconds."""
+"""Handshakes under way at a time: one more ends the oldest, since a genuine one takes milliseconds."""
 
 _AT_HAND = 8192
-_REFUSALS_TOLD = 10
+_REFUSALS_LOGGED = 10
 _log = logging.getLogger(__name__)
 
 
@@ -100,11 +100,11 @@ async def send_header(sock: socket.socket, fields: Header) -> None:
 
 
 class Listener:
-    """A listening TCP socket; each connection is handed to ``accept`` in a task of its own.
+    """A listening TCP socket; each connection is passed to ``accept`` in its own task.
 
     ``accept(socket, address)`` does the handshake. What it raises, OSError or WireError, is logged, and the
-    connection is closed. Of handshakes that do not come to an end only so many are kept. ``allows(peer's
-    address, own address)`` says who may connect at all.
+    connection is closed. The number of unfinished handshakes is limited. ``allows(peer's
+    address, own address)`` returns whether a peer may connect.
     """
 
     def __init__(
@@ -115,9 +115,9 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # In the order of their beginning, and who is at the other end.
+        # In the order of their start, with the address of the peer.
         self._handshakes: dict[asyncio.Task[None], str] = {}
-        self._complaints = Complaints(_log, _REFUSALS_TOLD)
+        self._complaints = Complaints(_log, _REFUSALS_LOGGED)
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
@@ -148,8 +148,8 @@ class Listener:
         await asyncio.gather(*tasks, return_exceptions=True)
         self._complaints.close()
 
-    def tell_refusal(self, line: str) -> None:
-        """Log the line that says why a connection was refused; a flood of them is summed up."""
+    def log_refusal(self, line: str) -> None:
+        """Log why a connection was refused; a flood of such lines is counted."""
         self._complaints.warning("%s", line)
 
     def _watch(self) -> None:
@@ -157,14 +157,14 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection; the loop comes back for the next, and so those inside get on meanwhile."""
+        """Accept one connection; the loop comes back for the next, so that accepted ones proceed meanwhile."""
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            # Out of file descriptors, or the peer has gone already: the next one may do, a moment later.
-            self.tell_refusal(f"a connection could not be accepted: {explain(error)}")
+            # Out of file descriptors, or the peer has disconnected already: the next one may succeed, a moment later.
+            self.log_refusal(f"a connection could not be accepted: {explain(error)}")
             if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")
             loop = asyncio.get_running_loop()
@@ -173,14 +173,14 @@ class Listener:
             return
         peer.setblocking(False)
         if self._allows and not self._allows(address[0], peer.getsockname()[0]):
-            self.tell_refusal(
+            self.log_refusal(
                 f"connection from {address[0]} refused: MINIROSPY_ALLOW does not name its network"
             )
             peer.close()
             return
         if len(self._handshakes) >= MOST_HANDSHAKES:
-            self._end_oldest(f"it said nothing, and {MOST_HANDSHAKES} others are waiting")
-        # Who comes by a Unix socket has no address.
+            self._end_oldest(f"it sent nothing, and {MOST_HANDSHAKES} others are waiting")
+        # A peer at a Unix socket has no address.
         where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))
         self._handshakes[task] = where
@@ -197,11 +197,11 @@ class Listener:
         try:
             await self._accept(peer, address)
         except (_NothingSaidError, BrokenPipeError):
-            # A node that ended meanwhile, or somebody who looked whether the port is open.
-            _log.debug("connection from %s: it hung up before it was answered", address)
+            # A node that exited meanwhile, or a port scan.
+            _log.debug("connection from %s: it disconnected before it was answered", address)
             peer.close()
         except (OSError, WireError) as error:
-            self.tell_refusal(f"connection from {address} refused: {error}")
+            self.log_refusal(f"connection from {address} refused: {error}")
             peer.close()
         except Exception:
             peer.close()
@@ -210,7 +210,7 @@ class Listener:
     def _end_oldest(self, why: str) -> None:
         for task in list(self._handshakes)[:1]:
             task.cancel()
-            self.tell_refusal(f"connection from {self._handshakes.pop(task)} closed: {why}")
+            self.log_refusal(f"connection from {self._handshakes.pop(task)} closed: {why}")
 
 
 def _bind(host: str, port: int) -> socket.socket:
@@ -232,7 +232,7 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 async def _addresses(host: str, port: int) -> Sequence[tuple[int, Any]]:
-    """(family, address) of a host; an address or "localhost" asks no resolver. Raises OSError.
+    """(family, address) of a host; an address or "localhost" needs no resolver. Raises OSError.
 
     IPv4 comes first: there the servers of ROS 1 listen, and many resolvers name IPv6 first.
     """
@@ -246,13 +246,13 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, Any]]:
         name = sockets.resolvable(host)
         infos = await asyncio.get_running_loop().getaddrinfo(name, port, type=socket.SOCK_STREAM)
     except RuntimeError as error:
-        # Python lets no thread begin once the program is ending.
+        # Python starts no thread once the interpreter is shutting down.
         raise OSError(f"the address of {host} was not looked for: {error}") from error
     return sorted(((info[0], info[4]) for info in infos), key=lambda found: found[0] != socket.AF_INET)
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has come as a whole, as that of one who has just connected mostly has: no task, no timer."""
+    """Return a header that has come as a whole, as the header of a new peer mostly has: no task, no timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
@@ -262,7 +262,7 @@ def _header_at_hand(sock: socket.socket) -> Header | None:
 
 
 class _NothingSaidError(WireError):
-    """The peer connected and hung up."""
+    """The peer connected and disconnected."""
 
 
 async def _receive_header(sock: socket.socket) -> Header:

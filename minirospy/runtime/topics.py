@@ -1,6 +1,6 @@
-"""Topics at run time: a Publication sends frames to its links, a Subscription takes frames off its links.
+"""The transport of topics: a Publication sends frames to its links, a Subscription receives frames from its links.
 
-Both work on bytes: message classes are the business of ``minirospy.client``.
+Both work on bytes; ``minirospy.client`` and ``minirospy.aio`` know the message classes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime import local, sockets, tcp
 from minirospy.runtime.complaints import Complaints
 from minirospy.runtime.limits import explain, is_file_limit
-from minirospy.runtime.links import OutLink, Readers, read_frames, watch_frames
+from minirospy.runtime.links import OutLink, ReaderSet, read_frames, watch_frames
 from minirospy.runtime.rpc_async import AsyncRpcClient
 from minirospy.runtime.workers import Workers
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
@@ -38,19 +38,19 @@ __all__ = ["Deliver", "InLink", "Publication", "Subscription"]
 _log = logging.getLogger(__name__)
 
 _SETTLE_SECONDS = 10.0
-"""A master that has forgotten everything hears of all nodes again within this."""
+"""A master that has forgotten everything has all nodes registered again within this."""
 
-_TELL_AFTER = 3
-"""A publisher that refuses is told of at this failure: one that just leaves has left by then."""
+_WARN_AFTER = 3
+"""A publisher that refuses is reported at this failure: one that is shutting down has left by then."""
 
-_REFUSALS_TOLD = 10
-"""Of publishers that answer nonsense, before they are summed up."""
+_REFUSALS_LOGGED = 10
+"""Log lines about publishers that answer nonsense, before the rest are counted."""
 
 _WORKED_SECONDS = 5.0
-"""A link that lived so long, or brought a message, was a good one."""
+"""A link that was open for this long, or brought a message, was a good one."""
 
 Deliver = Callable[[Frame, Header], None]
-"""What is called with each message's bytes and its publisher's connection header."""
+"""Called with each message's bytes and its publisher's connection header."""
 
 
 class Publication:
@@ -69,7 +69,7 @@ class Publication:
     ) -> None:
         """``queue_size`` frames may wait for a slow subscriber (0: any number; None: publish waits itself).
 
-        ``on_link(link, is_up)`` is called on the loop when a subscriber has come or gone.
+        ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
         """
         self.topic = topic
         self.type = type_
@@ -208,7 +208,7 @@ class Subscription:
         *,
         rpc: AsyncRpcClient,
         workers: Workers,
-        readers: Readers,
+        readers: ReaderSet,
         newest: int = 0,
         tcp_nodelay: bool = False,
         on_loop: bool = False,
@@ -228,13 +228,13 @@ class Subscription:
         self._readers = readers
         self._on_loop = on_loop
         self.lists = 0
-        """How many lists of publishers have come."""
+        """How many lists of publishers have been received."""
         self._plan = SubscriptionPlan()
         self._named: list[str] = []
         self._settling: asyncio.TimerHandle | None = None
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         # /rosout has as many publishers as there are nodes.
-        self._complaints = Complaints(_log, _REFUSALS_TOLD)
+        self._complaints = Complaints(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
         self.on_connected: list[Callable[[], object]] = []
         """Called on the loop when a publisher is connected."""
@@ -246,7 +246,7 @@ class Subscription:
         return tuple(self._links.values())
 
     def publishers_changed(self, uris: Iterable[str]) -> None:
-        """The master's list of publishers has come (on the loop)."""
+        """Take over the master's list of publishers (on the loop)."""
         if self._closed:
             return
         self.lists += 1
@@ -258,9 +258,9 @@ class Subscription:
                 self._start_connecting(action)
 
     def registered_again(self, uris: Iterable[str]) -> None:
-        """The master had forgotten everything; its first list has come (on the loop).
+        """Take over the first list of a master that had forgotten everything (on the loop).
 
-        Its lists lack whom it has not heard of yet, so for a while they leave no publisher out.
+        Its lists lack nodes that are not registered again yet, so for a while no connected publisher is dropped.
         """
         if self._settling:
             self._settling.cancel()
@@ -279,7 +279,7 @@ class Subscription:
             self._disconnect(uri)
 
     def _settle(self) -> None:
-        """Forget whom the master does not name, unless the link is up: nodes of rospy never register again."""
+        """Forget publishers that the master does not list, unless the link is up: nodes of rospy never register again."""
         self._settling = None
         for action in self._plan.publishers_changed(self._named):
             if isinstance(action, Connect):
@@ -291,7 +291,7 @@ class Subscription:
         task = self._connecting.pop(uri, None)
         if task:
             task.cancel()
-        # At once: a link itself ends when its reader has noticed.
+        # Immediately: a link itself ends when its reader has noticed.
         link = self._links.pop(uri, None)
         if link:
             link.close()
@@ -319,7 +319,7 @@ class Subscription:
             if self.lists == lists:
                 self._plan.refused(uri)
             else:
-                # The next list, which may be the last, has come already, and may be due to what it refuses no more.
+                # The next list, perhaps the last one, is older than this refusal: the publisher may accept by now.
                 self._retry(uri, error)
         except _NoPublisher as error:
             self._complaints.warning("no connection for %s: %s", self.topic, error)
@@ -347,13 +347,13 @@ class Subscription:
                     self._complaints.error("messages of %s are not received: %s", self.topic, error)
                     self._retry(uri, error)
                     return
-            for tell in self.on_connected:
-                tell()
+            for notify in self.on_connected:
+                notify()
 
     async def _open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
-            # Behind TCPROS: what others see first is what they know.
+            # After TCPROS: third-party nodes look at the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
@@ -364,7 +364,7 @@ class Subscription:
                 self.type,
                 self._caller_id,
                 tcp_nodelay=self.tcp_nodelay,
-                # Elsewhere a peer is told what ROS 1 knows, and no more.
+                # Peers on other hosts get the fields of ROS 1, and no more.
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
             await tcp.send_header(sock, fields)
@@ -373,18 +373,18 @@ class Subscription:
         except BaseException:
             sock.close()
             raise
-        # Others leave the topic out; user code reads it.
+        # Third-party nodes leave the topic out; user code reads it.
         header.setdefault("topic", self.topic)
         return InLink(uri, address, sock, header)
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
         """Return a socket that is connected to the publisher which gave this answer, and its address."""
-        nearby = local.parse_answer(answer) if self._this_host else None
-        if nearby:
+        unix = local.parse_answer(answer) if self._this_host else None
+        if unix:
             with contextlib.suppress(OSError):
-                return local.connect(nearby.name), nearby.name
-            # Something between the two, such as a sandbox, keeps them apart.
-            host, port = nearby.host, nearby.port
+                return local.connect(unix.name), unix.name
+            # Something between the two, such as a sandbox, separates them.
+            host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
         return await tcp.connect(host, port), f"{host}:{port}"
@@ -398,7 +398,7 @@ class Subscription:
             deliver(frame, header)
 
         def on_latched_frame(frame: Frame) -> None:
-            # A small frame lies in a buffer that the next receive reuses.
+            # A small frame is in a buffer that the next receive reuses.
             link.latched = frame if len(frame) > CHUNK else bytes(frame)
             on_frame(frame)
 
@@ -421,11 +421,11 @@ class Subscription:
         del self._links[link.uri]
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Once is enough to tell: what follows in such a stream is garbage too.
+            # Logged once: what follows in such a stream is garbage too.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self._plan.worked(link.uri)
-            self._told.discard(link.uri)
+            self._reported.discard(link.uri)
         self._retry(link.uri, fault)
 
     def _retry(self, uri: str, error: Exception) -> None:
@@ -441,10 +441,10 @@ class Subscription:
             self._start_connecting(action)
             return
         nameless = isinstance(cause, socket.gaierror)
-        # Who just leaves refuses, or hangs up; silence or a closed way is the address's fault, or a firewall's.
+        # A publisher that is shutting down refuses or disconnects; silence is the address's fault, or a firewall's.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
-        if (at_once or self._plan.failures(uri) >= _TELL_AFTER) and uri not in self._told:
-            self._told.add(uri)
+        if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
+            self._reported.add(uri)
             _log.warning(
                 "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
                 self.topic,
@@ -456,7 +456,7 @@ class Subscription:
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Whose address is wrong, and which variable sets it."""
+    """Return whose address is wrong, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     try:
@@ -485,7 +485,7 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
 
 
 class _NoPublisher(WireError):
-    """What a publisher never answers: to ask again would bring the same, as rospy holds it too."""
+    """An answer that no publisher gives: a retry would bring the same, and rospy does not retry either."""
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:

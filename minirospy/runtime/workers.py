@@ -1,4 +1,4 @@
-"""Worker threads: where user code runs, so that it never runs on the loop."""
+"""Worker threads: user code runs here, so that it never runs on the loop."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Workers:
         """Run ``function(*args)`` in a worker; an exception that it lets out is logged. Raise ThreadLimitError."""
         with self._lock:
             if self._idle:
-                # A claimed worker surely takes an entry: it leaves only when it can withdraw itself.
+                # A claimed worker takes an entry in any case: it exits only when it can withdraw itself.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -59,7 +59,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # Claimed in the moment of leaving: the entry is on its way.
+                # Claimed at the moment of exiting: the entry is about to come.
                 function, args = self._work.get()
 
 
@@ -96,5 +96,5 @@ class InOrder:
                 function, args = self._waiting.popleft()
             try:
                 function(*args)
-            except Exception:  # noqa: BLE001 - the edge to user code: the others have to run all the same
+            except Exception:  # noqa: BLE001 - the edge to user code: the others run all the same
                 _log.exception("fault in a worker")

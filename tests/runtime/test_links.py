@@ -44,7 +44,7 @@ def loop() -> Iterator[LoopThread]:
 
 
 @dataclass
-class Keeps:
+class QueueSize:
     """How many frames a slow receiver is to get."""
 
     newest: int
@@ -144,7 +144,7 @@ def test_reading_ends_at_a_length_over_the_limit(pair: tuple[socket.socket, sock
     pair[1].sendall(serialize_frame(b"good") + b"\xff\xff\xff\xff")
     bodies: list[bytes] = []
     with pytest.raises(WireError, match="over the limit"):
-        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0), links.Readers())
+        links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), links.ReaderSet())
     assert bodies == [b"good"]
     assert pair[0].fileno() == -1
 
@@ -153,7 +153,7 @@ def test_reading_ends_with_half_a_frame(pair: tuple[socket.socket, socket.socket
     pair[1].sendall(serialize_frame(b"whole") + b"\x05\0\0\0ab")
     pair[1].close()
     bodies: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), Keeps(0), links.Readers())
+    links.read_frames(pair[0], lambda frame: bodies.append(bytes(frame)), QueueSize(0), links.ReaderSet())
     assert bodies == [b"whole"]
 
 
@@ -164,7 +164,7 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
     pair[1].sendall(b"".join(serialize_frame(bytes([number])) for number in range(10)))
     pair[1].close()
     bodies: list[int] = []
-    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), Keeps(newest), links.Readers())
+    links.read_frames(pair[0], lambda frame: bodies.append(frame[0]), QueueSize(newest), links.ReaderSet())
     assert bodies == expected
 
 
@@ -181,7 +181,7 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
     one, other = socket.socketpair()
     looked = 0
 
-    def receive_awake(sock: socket.socket, space: memoryview) -> int:
+    def busy_receive(sock: socket.socket, space: memoryview) -> int:
         nonlocal looked
         looked += 1
         if looked == 1:
@@ -197,11 +197,11 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
         if not looks:
             other.close()
 
-    monkeypatch.setattr(links, "EXPECTED_SECONDS", seconds)
-    monkeypatch.setattr(links, "may_expect", lambda _: True)
-    monkeypatch.setattr(links, "receive_awake", receive_awake)
+    monkeypatch.setattr(links, "BUSY_POLL_SECONDS", seconds)
+    monkeypatch.setattr(links, "may_busy_poll", lambda _: True)
+    monkeypatch.setattr(links, "busy_receive", busy_receive)
     bodies: list[bytes] = []
-    readers = links.Readers()
+    readers = links.ReaderSet()
     waiting = threading.Event()
 
     class Waiting(socket.socket):
@@ -211,7 +211,7 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
 
     with other:
         reader = threading.Thread(
-            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, Keeps(0), readers)
+            target=links.read_frames, args=(Waiting(fileno=one.detach()), deliver, QueueSize(0), readers)
         )
         reader.start()
         assert waiting.wait(60)
@@ -233,20 +233,20 @@ def test_a_reader_that_looked_in_vain_or_waited_for_the_interpreter_falls_asleep
         clock.now += 0.0001
         return 4
 
-    def receive_awake(sock: socket.socket, space: memoryview) -> int:
+    def busy_receive(sock: socket.socket, space: memoryview) -> int:
         looks.append("look")
         if len(looks) == 1:
-            clock.now += links.EXPECTED_SECONDS
+            clock.now += links.BUSY_POLL_SECONDS
             raise BlockingIOError
         clock.now += 0.005
         return 4
 
-    monkeypatch.setattr(links, "may_expect", lambda _: True)
-    monkeypatch.setattr(links, "receive_awake", receive_awake)
+    monkeypatch.setattr(links, "may_busy_poll", lambda _: True)
+    monkeypatch.setattr(links, "busy_receive", busy_receive)
     monkeypatch.setattr(links, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     with one, other:
         sock: Any = SimpleNamespace(recv_into=recv_into)
-        source = links._Source(sock, links.Readers())
+        source = links._Source(sock, links.ReaderSet())
         space = memoryview(bytearray(8))
         for expected in (0, 1, 1, 2, 2):  # asleep, in vain, asleep, late, asleep
             source._receive(space)
@@ -277,8 +277,8 @@ def read_in_thread(sock: socket.socket, frames: list[Frame], newest: int = 0) ->
         args=(
             sock,
             lambda frame: frames.append(frame if isinstance(frame, bytes) else bytes(frame)),
-            Keeps(newest),
-            links.Readers(),
+            QueueSize(newest),
+            links.ReaderSet(),
         ),
     )
     thread.start()
@@ -370,7 +370,7 @@ def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
     pair[1].sendall(serialize_frame(b"whole") + begin)
     pair[1].close()
     frames: list[Frame] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(0), links.Readers())
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(0), links.ReaderSet())
     assert frames == [b"whole"]
 
 
@@ -391,7 +391,7 @@ def test_split_frames_that_lie(
     sender = threading.Thread(target=pair[1].sendall, args=(data,))
     sender.start()
     with pytest.raises(WireError, match=words):
-        links.read_frames(pair[0], lambda _: None, Keeps(0), links.Readers())
+        links.read_frames(pair[0], lambda _: None, QueueSize(0), links.ReaderSet())
     sender.join(30)
 
 
@@ -411,7 +411,7 @@ def test_no_memory_for_a_message_ends_the_link_with_a_line() -> None:
         close=lambda: None,
     )
     with pytest.raises(WireError, match="no memory for a message of 536870912 bytes"):
-        links.read_frames(sock, lambda _: None, Keeps(0), links.Readers())
+        links.read_frames(sock, lambda _: None, QueueSize(0), links.ReaderSet())
 
 
 def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> None:
@@ -420,7 +420,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
     sender = threading.Thread(target=lambda: (pair[1].sendall(data), pair[1].close()))
     sender.start()
     frames: list[bytes] = []
-    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), Keeps(1), links.Readers())
+    links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(1), links.ReaderSet())
     sender.join(30)
     assert frames[-1] == joined(image(bytes([2]) * CHUNK))
 

@@ -253,7 +253,7 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
 
 def test_a_kept_connection_ends_with_its_server() -> None:
     async def test() -> None:
-        client, server = AsyncRpcClient(nearby=False), RpcServer(lambda *_: 5)
+        client, server = AsyncRpcClient(same_host=False), RpcServer(lambda *_: 5)
         await server.start()
         await client.call(f"http://127.0.0.1:{server.port}/", "a")
         await until(lambda: client._idle)

@@ -187,7 +187,7 @@ def test_a_thousand_silent_connections_neither_stop_the_node_nor_fill_its_log(
 
     run(scene)
     lines = [record.getMessage() for record in caplog.records]
-    assert lines[0].endswith("closed: it said nothing, and 200 others are waiting")
+    assert lines[0].endswith("closed: it sent nothing, and 200 others are waiting")
     assert 10 < len(lines) < 30
     assert lines[-1].endswith(" more like the last ones")
 

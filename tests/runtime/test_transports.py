@@ -138,12 +138,12 @@ def test_a_service_and_the_slave_api_are_reached_by_the_socket_beside_their_port
         return request
 
     def call(node: Node) -> None:
-        nearby = not of_client
-        client = ServiceClient(node.service_uri, "/s", "*", "/c", nearby=nearby)
+        same_host = not of_client
+        client = ServiceClient(node.service_uri, "/s", "*", "/c", same_host=same_host)
         families.append(client._sock.family)
         assert client.call(b"abc") == b"abc"
         client.close()
-        slave = RpcClient(node.uri, nearby=nearby)
+        slave = RpcClient(node.uri, same_host=same_host)
         assert slave.call("getPid", "/c")[2] == os.getpid()
         families.append(slave._idle[0].family)
         slave.close()
@@ -154,7 +154,9 @@ def test_a_service_and_the_slave_api_are_reached_by_the_socket_beside_their_port
             service = LoopServiceServer("/s", STRING, node.name, echo, workers=node.workers, **types)
             await node.serve(service)
             await asyncio.get_running_loop().run_in_executor(None, call, node)
-            client = await AsyncServiceClient.connect(node.service_uri, "/s", "*", "/c", nearby=not of_client)
+            client = await AsyncServiceClient.connect(
+                node.service_uri, "/s", "*", "/c", same_host=not of_client
+            )
             families.append(client._sock.family)
             assert await client.call(b"abc") == b"abc"
             client.close()
@@ -173,23 +175,23 @@ def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.Monkey
             other.send(b"x")
 
     monkeypatch.setattr(os, "sched_yield", answer_at_third_turn)
-    monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
+    monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 60.0)
     one, other = socket.socketpair()
     with one, other:
-        sockets.expect_answer(one)  # of this process
+        sockets.busy_poll(one)  # of this process
         assert turns == 0
         monkeypatch.setattr(sockets, "peer", lambda _: sockets.Peer(process=0, user=0, group=0))
-        sockets.expect_answer(one)
+        sockets.busy_poll(one)
         assert (turns, one.recv(1)) == (3, b"x")
-        monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 0.0)
-        sockets.expect_answer(one)  # nobody answers
+        monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 0.0)
+        sockets.busy_poll(one)  # nobody answers
         assert turns == 4
         with pytest.raises(BlockingIOError):
-            sockets.receive_awake(one, memoryview(bytearray(1)))
+            sockets.busy_receive(one, memoryview(bytearray(1)))
         assert turns == 5
     with socket.socket() as tcp:
-        monkeypatch.setattr(sockets, "EXPECTED_SECONDS", 60.0)
-        sockets.expect_answer(tcp)
+        monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 60.0)
+        sockets.busy_poll(tcp)
     assert turns == 5
 
 
@@ -367,7 +369,7 @@ def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytes
         async with graph("/a") as (_, (node,)):
 
             async def closing(listener: Listener) -> None:
-                order.append("name" if listener is node._nearby else "port")
+                order.append("name" if listener is node._unix_listener else "port")
                 await close(listener)
 
             monkeypatch.setattr(Listener, "close", closing)

@@ -238,7 +238,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         access=access,
         timeout=options.timeout,
         most_clients=_most_clients(),
-        nearby=environment.nearby,
+        same_host=environment.same_host,
         owns_process=True,
     )
     stop = _stop_event()

@@ -49,7 +49,7 @@ class ServerProxy:
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
-        self._client = RpcClient(uri, nearby=current_session().identity.environment.nearby)
+        self._client = RpcClient(uri, same_host=current_session().identity.environment.same_host)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("__"):

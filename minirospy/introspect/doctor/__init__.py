@@ -90,7 +90,7 @@ class Examination:
             yield from check_own_address(own)
         for host in self._machines:
             yield from check_machine(host, place.port)
-        master = MasterProxy(environment.master_uri, own.name, CONNECT_SECONDS, nearby=False)
+        master = MasterProxy(environment.master_uri, own.name, CONNECT_SECONDS, same_host=False)
         graph = self._stack.enter_context(Graph(master, own.name.lstrip("/")))
         answers = list(check_master(master, place))
         yield from answers

@@ -252,7 +252,7 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
 def _ask(tool: str, node: NodeAddress) -> NodeAnswer:
     if node.uri is None:
         return NodeAnswer(node, Trouble(Fault.OTHER, "the master does not know its address"))
-    slave = SlaveProxy(node.uri, "/" + tool, CONNECT_SECONDS, nearby=False)
+    slave = SlaveProxy(node.uri, "/" + tool, CONNECT_SECONDS, same_host=False)
     with contextlib.closing(slave):
         slave.get_pid()
         # Not all clients send their name.
@@ -324,7 +324,7 @@ def _probe_service(graph: Graph, name: str) -> str:
     uri = graph.master.lookup_service(name)
     look_up(host_port(uri)[0])
     client = ServiceClient(
-        uri, name, _ANY, "/" + graph.tool, probe=True, timeout=CONNECT_SECONDS, nearby=False
+        uri, name, _ANY, "/" + graph.tool, probe=True, timeout=CONNECT_SECONDS, same_host=False
     )
     client.close()
     type_, md5sum = client.header.get("type", ""), client.header["md5sum"]

@@ -132,7 +132,7 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
 def _call(uri: str, service: str, caller_id: str) -> str:
     """Return the text of a listener's answer. Raise OSError, WireError."""
     type_ = service_class("std_srvs/Trigger")
-    client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, nearby=False)
+    client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, same_host=False)
     try:
         response = type_._response_class()
         response.deserialize(client.call(b""))

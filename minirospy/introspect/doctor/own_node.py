@@ -145,7 +145,7 @@ class _Node(Node):
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
     """Yield whether this machine reaches its own nodes at the address that they advertise."""
     host, ports = own.environment.host, own.environment.ports
-    slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, nearby=False)
+    slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, same_host=False)
     try:
         slave.get_pid()
     except RpcError as error:

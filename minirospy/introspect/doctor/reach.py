@@ -204,7 +204,7 @@ def read_topic(
     ``timeout`` seconds are for each step. Raise RpcError, WireError, OSError.
     """
     look_up(host_port(uri)[0])
-    with contextlib.closing(SlaveProxy(uri, caller_id, timeout, nearby=False)) as slave:
+    with contextlib.closing(SlaveProxy(uri, caller_id, timeout, same_host=False)) as slave:
         answer = slave.request_topic(topic, [["TCPROS"]])
 
     match answer:
