@@ -50,6 +50,10 @@ _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up on a master that answers nothing for this long; the shorter limit is for one that was already
 silent before. There is no limit on the whole: a busy master that answers call after call is waited for."""
 
+_CLOSING_CALL_SECONDS = 3600.0
+_PROBE_SECONDS = 3.0
+"""How often a closing node checks that the master answers anything."""
+
 _NOTICE_SECONDS = 3.0
 """A node that is still waiting for the master after this says so."""
 
@@ -224,8 +228,10 @@ class Node:
     async def _call_master(self, method: str, *args: Any) -> Any:
         """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self.environment.master_uri
+        # Of a node that closes _wait_for_answers() decides.
+        seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
         try:
-            answer = await self._rpc.call(uri, method, *args, timeout=_CALL_SECONDS)
+            answer = await self._rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
             self._is_master_silent = True
             raise master_unreachable(error) from error
@@ -554,20 +560,36 @@ class Node:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]]) -> None:
-        """Wait for the last calls of the master, for as long as it answers one after the other."""
+        """Wait for the last calls of the master, for as long as it answers anything.
+
+        Of many nodes that shut down at once each waits for its turn: a short call, which a busy master answers in between,
+        shows that it is alive.
+        """
         loop = asyncio.get_running_loop()
-        patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
-        self._answered = loop.time()
         uri = self.environment.master_uri
+        patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
         text = "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s"
         notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience)
 
+        self._answered = loop.time()
         pending = set(tasks)
+        probe: asyncio.Task[None] | None = None
         while pending and (left := self._answered + patience - loop.time()) > 0:
-            done, pending = await asyncio.wait(pending, timeout=left, return_when=asyncio.FIRST_EXCEPTION)
+            done, pending = await asyncio.wait(
+                pending, timeout=min(left, _PROBE_SECONDS), return_when=asyncio.FIRST_EXCEPTION
+            )
             if any(isinstance(task.exception(), MasterUnreachableError) for task in done):
                 break
+            if pending and (probe is None or probe.done()):
+                probe = asyncio.ensure_future(self._probe_master())
+
         notice.cancel()
+        if probe:
+            probe.cancel()
+
+    async def _probe_master(self) -> None:
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            await self._call_master("getPid", self.name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, whatever is answered; many in one where the master has system.multicall (not all masters do).

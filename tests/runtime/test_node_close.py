@@ -16,6 +16,7 @@ from minirospy.runtime.node import Node
 from minirospy.runtime.rpc_server import RpcServer
 from minirospy.runtime.topics import Publication
 from minirospy.wire.tcpros import InterfaceType
+from tests.manual_loop import ManualLoop, run_manually, until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
 TOPICS = 5
@@ -199,6 +200,36 @@ def test_close_leaves_a_name_with_a_call_under_way_to_the_end_of_that() -> None:
             assert master.unregistered == ALL
 
     run(scene)
+
+
+def test_close_waits_for_a_master_that_is_busy_for_minutes() -> None:
+    """It has other nodes to unregister, and answers short calls meanwhile."""
+
+    async def scene(clock: ManualLoop) -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            busy, dispatch = asyncio.Event(), master._dispatch
+
+            async def answer_short_calls(method: str, args: Sequence[Any]) -> Any:
+                if method == "system.multicall":
+                    await busy.wait()
+                return await dispatch(method, args)
+
+            master._server.dispatch = answer_short_calls
+            closing = asyncio.ensure_future(node.close())
+            for number in range(40):
+                await clock.advance(3.0)
+                await until(lambda number=number: _count(master, "getPid") > number)  # type: ignore[misc]
+                assert not closing.done()
+            busy.set()
+            await closing
+            assert master.unregistered == ALL
+
+    run_manually(scene)
+
+
+def _count(master: FakeMaster, method: str) -> int:
+    return [name for name, _ in master.calls].count(method)
 
 
 def test_close_gives_up_on_a_master_that_is_silent(
