@@ -61,8 +61,8 @@ def measure(server: str, client: str, uri: str, seconds: float) -> list[float]:
 
 def main() -> None:
     """Measure and print."""
-    from minirospy.runtime.loop import LoopThread
-    from minirospy.runtime.master import Master
+    from minirospy.runtime.master.master import Master
+    from minirospy.runtime.transport.loop import LoopThread
 
     async def start() -> Master:
         master = Master()

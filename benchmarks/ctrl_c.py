@@ -16,9 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master import Master
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 
 HANG_SECONDS = 30.0
 

@@ -28,7 +28,7 @@ from xmlrpc.client import ServerProxy, dumps
 
 import psutil
 
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.client import RpcClient
 
 OURS = [sys.executable, "-m", "minirospy.cli.ros.master", "-q"]
 STACKS = {

@@ -448,7 +448,7 @@ def run_control() -> None:
 
 def run_nodes(port: int, count: int) -> None:
     """Register nodes of three publications and three subscriptions, and unregister them; a line for each round."""
-    from minirospy.runtime.master_proxy import MasterProxy
+    from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     with socket.create_server(("127.0.0.1", 0), backlog=200) as api:
         threading.Thread(target=_serve_nodes, args=(api,), daemon=True).start()

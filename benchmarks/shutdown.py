@@ -28,7 +28,7 @@ from pathlib import Path
 import psutil
 
 from minirospy.errors import MinirospyError
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 TESTED = "/tested"
 START_SECONDS = 300.0

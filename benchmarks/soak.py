@@ -27,7 +27,7 @@ import psutil
 from master import Dummy
 
 from minirospy.errors import RpcError
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.client import RpcClient
 
 NAMES = 500
 LIVE = 200

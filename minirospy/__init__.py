@@ -6,13 +6,13 @@ first used, so that a command which needs none of them starts at once.
 The way of a message, file by file::
 
     Bool.msg -> idl/parse -> spec -> idl/emit -> class
-    publish  -> client/publisher (serialize, caller's thread) -> runtime/topics.Publication -> runtime/links.OutLink
-             ==> TCP ==>
-    runtime/links.read_frames (worker) -> wire/framing -> runtime/topics.Subscription
+    publish  -> client/publisher (serialize, caller's thread) -> runtime/node/topics.Publication
+             -> runtime/transport/links.OutLink ==> TCP ==>
+    runtime/transport/links.read_frames (worker) -> wire/framing -> runtime/node/topics.Subscription
              -> client/subscriber (deserialize, user's function)
 
-and how the two ends find each other: client/publisher -> runtime/node -> runtime/master -> graph/registry ->
-publisherUpdate -> runtime/slave -> runtime/topics -> graph/subscription (whom to connect) -> requestTopic
+and how the two ends find each other: client/publisher -> runtime/node/node -> runtime/master/master -> graph/registry ->
+publisherUpdate -> runtime/node/slave -> runtime/node/topics -> graph/subscription (whom to connect) -> requestTopic
 -> wire/tcpros (headers).
 """
 

@@ -1,6 +1,6 @@
 """Long work in short steps: generators that yield about once a millisecond, so that others have their turn between.
 
-What runs on an event loop is run by ``runtime/turns.py``; :func:`finish` runs it in one go.
+What runs on an event loop is run by ``runtime/rpc/turns.py``; :func:`finish` runs it in one go.
 """
 
 from __future__ import annotations

@@ -81,8 +81,8 @@ def _own_environment(
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """The URI of a master of the test's own, which ROS_MASTER_URI names while the test runs."""
-    from minirospy.runtime.loop import LoopThread
-    from minirospy.runtime.master import Master
+    from minirospy.runtime.master.master import Master
+    from minirospy.runtime.transport.loop import LoopThread
 
     loop = LoopThread("test-master")
 

@@ -63,7 +63,7 @@ class Target:
         self._loop.close()
 
     async def _take(self, data: bytes) -> None:
-        from minirospy.runtime import rpc_server
+        from minirospy.runtime.rpc import server as rpc_server
         from minirospy.wire.xmlrpc import parse_response, serialize_response
 
         if self._count % INPUTS_PER_MASTER == 0:
@@ -90,7 +90,7 @@ class Target:
         parse_response(serialize_response(master.serve("getSystemState", ["/x"])))
 
     async def _renew(self) -> None:
-        from minirospy.runtime.master import Master
+        from minirospy.runtime.master.master import Master
 
         if self._master:
             await self._master.close()
@@ -153,7 +153,7 @@ def with_atheris(minutes: float) -> int:
     import atheris  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     with atheris.instrument_imports(include=["minirospy"]):
-        import minirospy.runtime.master  # noqa: F401
+        import minirospy.runtime.master.master  # noqa: F401
     target = Target()
     with tempfile.TemporaryDirectory() as folder:
         for number, seed in enumerate(seeds()):

@@ -62,7 +62,7 @@ ROOMS = {
     ),
     "wire": Room(["wire/*.py"], ["tests/wire"]),
     "journal": Room(
-        ["runtime/journal.py", "private_files.py"],
+        ["runtime/master/journal.py", "private_files.py"],
         [
             "tests/runtime/test_journal.py",
             "tests/test_private_files.py",

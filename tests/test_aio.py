@@ -31,7 +31,7 @@ from minirospy.errors import (
     RpcRefused,
     ServiceException,
 )
-from minirospy.runtime.master_proxy import MasterProxy, SlaveProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from minirospy.times import Duration, Time
 
 SECONDS = 40.0

@@ -18,8 +18,8 @@ from minirospy import private_files
 from minirospy.gpio.place import Place
 from minirospy.launch.output import Output
 from minirospy.launch.process import start_process
-from minirospy.runtime.journal import Journal
-from minirospy.runtime.log_file import LogFile, LogFileHandler
+from minirospy.runtime.master.journal import Journal
+from minirospy.runtime.master.log_file import LogFile, LogFileHandler
 from minirospy.testing.junit import Result
 from tests.conftest import free_port
 

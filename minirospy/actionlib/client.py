@@ -17,8 +17,8 @@ from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
 from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message
-from minirospy.runtime.links import OutLink
-from minirospy.runtime.topics import InLink
+from minirospy.runtime.node.topics import InLink
+from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["ActionClient"]
 

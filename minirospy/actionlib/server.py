@@ -27,7 +27,7 @@ from minirospy.actionlib.statuses import StatusList
 from minirospy.clock import SignalSafeEvent
 from minirospy.graph.goals import is_meant
 from minirospy.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
-from minirospy.runtime.limits import naming_thread_limit
+from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["ActionServer", "nop_cb"]
 

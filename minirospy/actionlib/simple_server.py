@@ -16,7 +16,7 @@ from minirospy import client as rospy
 from minirospy.actionlib.handle import ServerGoalHandle
 from minirospy.actionlib.server import ActionServer
 from minirospy.idl.protocols import Action, Message
-from minirospy.runtime.limits import naming_thread_limit
+from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["SimpleActionServer"]
 

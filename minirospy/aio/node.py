@@ -28,9 +28,9 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.idl.protocols import Message
-from minirospy.runtime.node import Node as RuntimeNode
-from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.node import Node as RuntimeNode
+from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
+from minirospy.runtime.node.topics import Publication
 from minirospy.times import Duration, Time
 from minirospy.wire.tcpros import ANY, InterfaceType
 

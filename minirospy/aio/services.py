@@ -21,7 +21,7 @@ from minirospy.errors import (
 )
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.service import to_response
-from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer, ServiceServer
+from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 

@@ -19,9 +19,9 @@ from minirospy.errors import (
 )
 from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.protocols import Message
-from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.topics import Publication
-from minirospy.runtime.topics import Subscription as RuntimeSubscription
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
+from minirospy.runtime.transport.complaints import Complaints
 from minirospy.wire.framing import CHUNK, Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType

@@ -323,7 +323,7 @@ def _configured_by_file(session: Session) -> bool:
 
 def _log_to_file(session: Session, path: Path) -> None:
     """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
-    from minirospy.runtime.log_file import LogFileHandler
+    from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(_DeferringHandler, LogFileHandler):
         """Of the name that programs find among the root logger's handlers with rospy."""

@@ -22,12 +22,12 @@ from minirospy.client.topic import (
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import ROSException, ROSSerializationException, SerializationError
 from minirospy.idl.message import args_kwds_to_message
-from minirospy.runtime.workers import InOrder
+from minirospy.runtime.transport.workers import InOrder
 from minirospy.wire.framing import LargeFrame, Pieces
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
-    from minirospy.runtime.links import OutLink
+    from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["Published", "Publisher", "SubscribeListener"]
 
@@ -124,7 +124,7 @@ class Published(Shared):
 
     def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
         # asyncio comes with it.
-        from minirospy.runtime.topics import Publication
+        from minirospy.runtime.node.topics import Publication
 
         super().__init__(session, topic, data_class)
         self._deferral = session.lifecycle.deferral

@@ -34,8 +34,8 @@ from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
-    from minirospy.runtime.service_client import ServiceClient
-    from minirospy.runtime.services import ServiceServer
+    from minirospy.runtime.node.service_client import ServiceClient
+    from minirospy.runtime.node.services import ServiceServer
 
 __all__ = ["Service", "ServiceProxy", "wait_for_service"]
 
@@ -238,7 +238,7 @@ class ServiceProxy(Generic[_S]):
 
         Only within this machine: elsewhere to connect may take its time.
         """
-        from minirospy.runtime.service_client import parse_service_uri
+        from minirospy.runtime.node.service_client import parse_service_uri
 
         node = current_session().node
         if self.uri and node:
@@ -248,7 +248,7 @@ class ServiceProxy(Generic[_S]):
         return None
 
     def _client_of(self, uri: str, *, waits: bool) -> ServiceClient:
-        from minirospy.runtime.service_client import ServiceClient
+        from minirospy.runtime.node.service_client import ServiceClient
 
         return ServiceClient(
             uri,
@@ -350,7 +350,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 def _probe(name: str, timeout: float) -> str | None:
     """Return why the service cannot be called yet; None where it can."""
-    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.runtime.node.service_client import ServiceClient
 
     session = current_session()
     try:

@@ -18,15 +18,15 @@ from minirospy.client.signals import SignalWatchdog
 from minirospy.clock import Clock, WallClock, wait_for_event
 from minirospy.errors import ROSInitException
 from minirospy.graph.parameter_cache import ParameterCache
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     # A program that has no node yet does not pay for asyncio.
     from minirospy.client.publisher import Published
     from minirospy.client.services import Service
     from minirospy.client.subscriber import Subscribed
-    from minirospy.runtime.loop import LoopThread
-    from minirospy.runtime.node import Node
+    from minirospy.runtime.node.node import Node
+    from minirospy.runtime.transport.loop import LoopThread
 
 __all__ = ["Session", "current_session", "replace_session", "replace_session_in_fork"]
 
@@ -104,8 +104,8 @@ class Session:
     def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
         """Start the loop and the node's servers. Raises ROSInitException."""
         # Imported here: a program that has no node need not pay for asyncio.
-        from minirospy.runtime.loop import LoopThread
-        from minirospy.runtime.node import Node
+        from minirospy.runtime.node.node import Node
+        from minirospy.runtime.transport.loop import LoopThread
 
         self._loop = LoopThread()
         self._opened = Node(
@@ -214,7 +214,7 @@ class Session:
         return self._opened is not None and self._opened.is_sending
 
     def _or_interrupted(self, function: Callable[[], _T]) -> _T:
-        from minirospy.runtime.loop import LoopClosedError
+        from minirospy.runtime.transport.loop import LoopClosedError
 
         try:
             return function()

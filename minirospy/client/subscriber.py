@@ -14,14 +14,14 @@ from minirospy.client.session import Session, current_session
 from minirospy.client.topic import Shared, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
-from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.transport.complaints import Complaints
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.client.statistics import StatisticsPublisher
-    from minirospy.runtime.topics import InLink, Subscription
+    from minirospy.runtime.node.topics import InLink, Subscription
 
 __all__ = ["Subscribed", "Subscriber", "wait_for_message"]
 

@@ -14,7 +14,7 @@ from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.session import current_session
 from minirospy.clock import SignalSafeEvent, SimulatedClock
 from minirospy.errors import ROSInitException
-from minirospy.runtime.limits import naming_thread_limit
+from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = [
     "Duration",

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy import names
 from minirospy.environment import master_and_namespace
 from minirospy.errors import NotFoundError, RpcRefused
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from minirospy.runtime.master_proxy import SystemState
+    from minirospy.runtime.rpc.master_proxy import SystemState
 
 __all__ = [
     "Graph",

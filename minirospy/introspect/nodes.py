@@ -19,12 +19,12 @@ from minirospy.errors import (
 )
 from minirospy.introspect.graph import Graph, NodeAddress, in_namespace, node_host
 from minirospy.introspect.topics import UNKNOWN_TYPE
-from minirospy.runtime.master_proxy import SlaveProxy
+from minirospy.runtime.rpc.master_proxy import SlaveProxy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from minirospy.runtime.master_proxy import BusConnection, MasterProxy, SystemState
+    from minirospy.runtime.rpc.master_proxy import BusConnection, MasterProxy, SystemState
 
 __all__ = [
     "Connections",
@@ -188,7 +188,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
     ``state``: the master's, where the caller has it. Raise MasterUnreachableError.
     """
-    from minirospy.runtime.master_proxy import MasterProxy
+    from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     state = state or graph.state()
     uri = node.uri or ""

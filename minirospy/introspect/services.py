@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from minirospy.idl.protocols import Message
-    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.runtime.node.service_client import ServiceClient
     from minirospy.wire.header import Header
 
 __all__ = [
@@ -186,6 +186,6 @@ def _why(error: Exception) -> str:
 
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
     # Imported here: listing needs none of it.
-    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.runtime.node.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

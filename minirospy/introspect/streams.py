@@ -19,10 +19,10 @@ from minirospy.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.idl.protocols import is_stamped
 from minirospy.introspect.messages import MessageClasses, serialize
 from minirospy.introspect.topics import TopicField, find_topic
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.runtime.node import Node
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType

@@ -15,7 +15,7 @@ from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError, V
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, start_process
 from minirospy.launch.spec import LaunchSpec
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["CORE_PARAMETERS", "LaunchMaster"]
 

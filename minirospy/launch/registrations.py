@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from minirospy.errors import MasterUnreachableError, RpcError
 from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import forget_node, has_exited
-from minirospy.runtime.master_proxy import MasterProxy, SystemState
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 

@@ -23,11 +23,11 @@ from minirospy.errors import LaunchError, MinirospyError, RpcError, RpcFault
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process, Timeouts, end_processes, start_process
 from minirospy.launch.spec import MachineSpec, NodeSpec
-from minirospy.runtime.access import Access
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master_proxy import unwrap
-from minirospy.runtime.rpc_client import RpcClient
-from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.rpc.client import RpcClient
+from minirospy.runtime.rpc.master_proxy import unwrap
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.loop import LoopThread
 
 __all__ = ["Api", "RemoteMachines", "call", "launch_text"]
 

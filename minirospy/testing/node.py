@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 
 from minirospy.environment import Environment
-from minirospy.runtime.master_proxy import MasterProxy, SystemState
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 from minirospy.testing import unit
 
 __all__ = ["get_master", "is_publisher", "is_subscriber", "rosrun", "run", "unitrun"]

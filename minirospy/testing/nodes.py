@@ -16,7 +16,7 @@ from minirospy import client as rospy
 from minirospy.environment import Environment
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.services import service_type
-from minirospy.runtime.master_proxy import MasterProxy, SystemState
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 from minirospy.testing.node import rosrun
 
 __all__ = ["AdvertiseTest", "HzTest", "ParamTest", "PublishTest", "SubscribeTest", "main"]

@@ -20,10 +20,10 @@ from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.launch.runner import Launcher, RunOptions
 from minirospy.launch.spec import LaunchSpec, TestSpec
-from minirospy.runtime.access import Access
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master import Master
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
 from minirospy.testing.unit import XML_OUTPUT_FLAG, xml_results_file
 from minirospy.workspace.packages import NotExecutableError, Packages

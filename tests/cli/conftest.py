@@ -18,9 +18,9 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
 from minirospy.environment import Environment
 from minirospy.errors import ServiceException
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.node import Node
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 BIN = Path(sys.executable).parent

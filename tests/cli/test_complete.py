@@ -24,7 +24,7 @@ from minirospy.environment import Environment
 from minirospy.idl.load import Catalogue, message_class
 from minirospy.introspect.messages import fill, serialize
 from minirospy.introspect.prototype import prototype
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
 from .conftest import Robot

@@ -13,9 +13,9 @@ from std_msgs.msg import Bool, String
 
 from minirospy.cli import doctor
 from minirospy.environment import Environment
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.runtime.node import Node
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import InterfaceType
 from tests.conftest import free_port
 

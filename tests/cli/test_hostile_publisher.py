@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.cli.conftest import BIN
 
 MARK = "OWNED"

@@ -17,8 +17,8 @@ import pytest
 from minirospy.environment import Environment
 from minirospy.launch.command import node_environment
 from minirospy.launch.spec import NodeSpec
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.node import Node
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
 
 BIN = Path(sys.executable).parent

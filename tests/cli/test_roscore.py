@@ -17,7 +17,7 @@ import pytest
 from minirospy.cli.ros.master import main, roscore
 from minirospy.cli.ros.rostopic import main as rostopic
 from minirospy.errors import MasterUnreachableError
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
 from .conftest import own_lines

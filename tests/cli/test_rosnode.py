@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
 Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]

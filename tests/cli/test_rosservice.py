@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import own_lines
 

@@ -18,8 +18,8 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool, String
 
-from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.tcpros import InterfaceType
 
 from .conftest import own_lines

@@ -18,7 +18,7 @@ import pytest
 from minirospy.cli import main as umbrella
 from minirospy.cli.ros import roslaunch, rosrun
 from minirospy.errors import MasterUnreachableError
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
 from .conftest import own_lines

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from minirospy.errors import RpcRefused
-from minirospy.runtime.master_proxy import MasterProxy, SlaveProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 
 SPINNER = """
 import rospy

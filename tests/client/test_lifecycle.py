@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 from minirospy.errors import RpcRefused
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
 

@@ -142,8 +142,8 @@ logging.getLogger("rosout").log(35, "between two levels")
 def test_logging_never_calls_the_master() -> None:
     program = """
 import rospy
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.rpc.client import RpcClient
 rospy.init_node("case")
 rospy.loginfo("first")
 calls = []

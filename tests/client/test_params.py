@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master import Master
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.transport.loop import LoopThread
 
 
 @pytest.fixture
@@ -62,8 +62,8 @@ CACHED = """
 import os
 import threading
 import rospy
-from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.rpc.client import RpcClient
 rospy.init_node("case", disable_rosout=True)
 other = MasterProxy(os.environ["ROS_MASTER_URI"], "/other")
 def eventually(name, value):

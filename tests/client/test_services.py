@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 SERVER = """
 import sys

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 BEGIN = """
 import sys, threading, rospy

@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 if os.environ.get("TEST_KEEPALIVE"):
     # A cable that was pulled is noticed after seconds, not after a minute.
-    from minirospy.runtime import sockets
+    from minirospy.runtime.transport import sockets
 
     sockets._KEEPALIVE.update(dict.fromkeys(sockets._KEEPALIVE, 1))
 

@@ -26,7 +26,7 @@ from minirospy.introspect.doctor.reach import (
     own_address_towards,
     trouble_of,
 )
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import built_in_roots
 
 HERE = MasterPlace("localhost", 11311, ["127.0.0.1"])

@@ -12,7 +12,7 @@ from std_msgs.msg import String
 
 from minirospy.environment import Environment
 from minirospy.introspect.streams import ToolNode
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 

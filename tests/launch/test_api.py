@@ -13,7 +13,7 @@ import pytest
 import roslaunch
 import roslaunch.roslaunch_logs
 
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
 

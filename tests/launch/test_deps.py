@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.cli.ros import roslaunch, roslaunch_deps, roslaunch_logs
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 
 @pytest.fixture

@@ -17,9 +17,9 @@ from minirospy.introspect.graph import Graph, NodeAddress
 from minirospy.introspect.nodes import forget_node
 from minirospy.launch import registrations
 from minirospy.launch.registrations import DeadNodes, unregister_dead
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master_proxy import MasterProxy
-from minirospy.runtime.node import Node
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
 from tests.launch.conftest import Start
 

@@ -18,7 +18,7 @@ from minirospy.launch.output import Output
 from minirospy.launch.process import Guardian, Process, start_process
 from minirospy.launch.runner import Launcher, RunOptions
 from minirospy.launch.spec import LaunchSpec, NodeSpec
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.conftest import free_port
 from tests.launch.conftest import Start

@@ -1,11 +1,11 @@
-"""runtime/complaints: the first of a flood of lines is told, and then how many there were."""
+"""runtime/transport/complaints: the first of a flood of lines is told, and then how many there were."""
 
 from __future__ import annotations
 
 import pytest
 
-from minirospy.runtime import complaints
-from minirospy.runtime.complaints import Complaints
+from minirospy.runtime.transport import complaints
+from minirospy.runtime.transport.complaints import Complaints
 
 
 def test_a_flood_is_told_by_its_first_line_and_its_number(

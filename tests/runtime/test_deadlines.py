@@ -1,8 +1,8 @@
-"""runtime/deadlines: one timer of the loop for the time limits of many things."""
+"""runtime/transport/deadlines: one timer of the loop for the time limits of many things."""
 
 from __future__ import annotations
 
-from minirospy.runtime.deadlines import Deadlines
+from minirospy.runtime.transport.deadlines import Deadlines
 from tests.manual_loop import ManualLoop, run_manually
 
 

@@ -1,4 +1,4 @@
-"""runtime/journal: the file itself, with a clock that the test holds and without a master."""
+"""runtime/master/journal: the file itself, with a clock that the test holds and without a master."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime import journal as journal_module
-from minirospy.runtime.journal import RETRY_SECONDS, Journal, JournalBusyError, boot_id
+from minirospy.runtime.master import journal as journal_module
+from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError, boot_id
 from minirospy.steps import PAUSE, Steps, finish
 from minirospy.wire.journal import HEAD, parse_journal, serialize_record, unpack
 

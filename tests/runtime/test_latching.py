@@ -1,4 +1,4 @@
-"""runtime/topics: a latched message and a subscriber that joins at the same moment."""
+"""runtime/node/topics: a latched message and a subscriber that joins at the same moment."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.tcpros import InterfaceType
 

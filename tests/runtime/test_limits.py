@@ -15,13 +15,13 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import CallFailed, MasterUnreachableError, ROSException, ThreadLimitError
-from minirospy.runtime import tcp
-from minirospy.runtime.limits import explain, naming_thread_limit
-from minirospy.runtime.loop import LoopThread, new_event_loop
-from minirospy.runtime.node import Node
-from minirospy.runtime.service_client import ServiceClient
-from minirospy.runtime.topics import Publication
-from minirospy.runtime.workers import InOrder, Workers
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.service_client import ServiceClient
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.limits import explain, naming_thread_limit
+from minirospy.runtime.transport.loop import LoopThread, new_event_loop
+from minirospy.runtime.transport.workers import InOrder, Workers
 from minirospy.wire.framing import Frame
 from minirospy.wire.tcpros import InterfaceType
 
@@ -250,8 +250,8 @@ def test_a_master_that_cannot_be_called_for_want_of_a_socket_is_not_called_absen
             raise OSError(errno.EMFILE, "Too many open files")
 
         with monkeypatch.context() as patch:
-            patch.setattr("minirospy.runtime.rpc_async.local.reach", lambda *_: None)
-            patch.setattr("minirospy.runtime.rpc_async.socket.socket", no_socket)
+            patch.setattr("minirospy.runtime.rpc.async_client.local.reach", lambda *_: None)
+            patch.setattr("minirospy.runtime.rpc.async_client.socket.socket", no_socket)
             with pytest.raises(
                 MasterUnreachableError, match="cannot be called: this process has no file desc"
             ):

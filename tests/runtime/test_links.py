@@ -1,4 +1,4 @@
-"""runtime/links: what carries frames, over TCP and over a Unix socket, and peers that stall, end and lie."""
+"""runtime/transport/links: what carries frames, over TCP and over a Unix socket, and peers that stall, end and lie."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 from minirospy.errors import WireError
-from minirospy.runtime import links
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.sockets import is_writable
+from minirospy.runtime.transport import links
+from minirospy.runtime.transport.loop import LoopThread
+from minirospy.runtime.transport.sockets import is_writable
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 
 KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]

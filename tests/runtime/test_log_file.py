@@ -1,4 +1,4 @@
-"""runtime/log_file: lines are written in batches, and a warning immediately."""
+"""runtime/master/log_file: lines are written in batches, and a warning immediately."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from minirospy.runtime import log_file
-from minirospy.runtime.log_file import LogFile
+from minirospy.runtime.master import log_file
+from minirospy.runtime.master.log_file import LogFile
 
 
 def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

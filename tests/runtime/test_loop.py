@@ -1,4 +1,4 @@
-"""runtime/loop: the bridge between threads and the loop, at the loop's end."""
+"""runtime/transport/loop: the bridge between threads and the loop, at the loop's end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from minirospy.runtime.loop import LoopClosedError, LoopThread
+from minirospy.runtime.transport.loop import LoopClosedError, LoopThread
 
 
 def test_a_call_that_comes_while_the_loop_ends_is_told_so() -> None:

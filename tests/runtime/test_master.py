@@ -1,4 +1,4 @@
-"""runtime/master over real sockets: the answers of real rosmaster (master_answers.json), and what it tells nodes."""
+"""runtime/master/master over real sockets: the answers of real rosmaster (master_answers.json), and what it tells nodes."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 import pytest
 
 from minirospy.escape import has_controls
-from minirospy.runtime import notifier
-from minirospy.runtime.master import Master
+from minirospy.runtime.master.master import Master, notifier
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import serialize_response
 

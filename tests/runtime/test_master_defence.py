@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcFault, UsageError
-from minirospy.runtime import rpc_server
-from minirospy.runtime.access import Access, listening_lines
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master import Master
-from minirospy.runtime.node import Node
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.rpc import server as rpc_server
+from minirospy.runtime.transport.access import Access, listening_lines
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import parse_response, serialize_response
 
@@ -312,7 +312,7 @@ def test_networks() -> None:
 
 
 def test_the_start_up_line_warns_of_the_open_internet(monkeypatch: pytest.MonkeyPatch) -> None:
-    from minirospy.runtime import access
+    from minirospy.runtime.transport import access
 
     assert listening_lines("127.0.0.1", 1, Access()) == [
         "listening on 127.0.0.1:1, open to this machine alone"
@@ -339,7 +339,7 @@ def test_master_and_nodes_hang_up_on_strangers(
     master: str, loop: LoopThread, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MINIROSPY_ALLOW", "192.168.65.0/24")
-    monkeypatch.setattr("minirospy.runtime.node.Access", _Stranger)
+    monkeypatch.setattr("minirospy.runtime.node.node.Access", _Stranger)
 
     async def start() -> tuple[Master, Node]:
         serving = Master(access=_Stranger(["192.168.65.0/24"]))

@@ -22,12 +22,12 @@ from xmlrpc.client import Fault, ServerProxy
 import pytest
 
 from minirospy.errors import RpcFault, RpcUnreachable
-from minirospy.runtime import journal as journal_module
-from minirospy.runtime import master as master_module
-from minirospy.runtime.journal import Journal
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master import Master
-from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.master import journal as journal_module
+from minirospy.runtime.master import master as master_module
+from minirospy.runtime.master.journal import Journal
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.journal import HEAD, parse_journal
 from minirospy.wire.xmlrpc import parse_response, serialize_response
 from tests.conftest import free_port

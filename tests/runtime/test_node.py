@@ -1,4 +1,4 @@
-"""runtime/node and runtime/slave: what a node answers its peers, and what it says of its own address."""
+"""runtime/node/node and runtime/node/slave: what a node answers its peers, and what it says of its own address."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcFault
-from minirospy.runtime import node as node_module
-from minirospy.runtime import tcp
-from minirospy.runtime.loop import new_event_loop
-from minirospy.runtime.node import Node
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.slave import SlaveApi
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node import node as node_module
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.slave import SlaveApi
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.steps import finish
 from minirospy.wire.tcpros import InterfaceType
 

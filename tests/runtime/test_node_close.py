@@ -1,4 +1,4 @@
-"""runtime/node: a node registers and unregisters everything, however slow its master is, and waits for no dead one."""
+"""runtime/node/node: a node registers and unregisters everything, however slow its master is, and waits for no dead one."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcFault
-from minirospy.runtime import node as node_module
-from minirospy.runtime.loop import new_event_loop
-from minirospy.runtime.node import Node
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node import node as node_module
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.tcpros import InterfaceType
 from tests.manual_loop import ManualLoop, run_manually, until
 

@@ -1,4 +1,4 @@
-"""runtime/notifier: nodes that do not answer share a few slots, and keep the others waiting no longer."""
+"""runtime/master/notifier: nodes that do not answer share a few slots, and keep the others waiting no longer."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 
 from minirospy.errors import RpcError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
-from minirospy.runtime import notifier as notifier_module
-from minirospy.runtime.notifier import Notifier
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.master import notifier as notifier_module
+from minirospy.runtime.master.notifier import Notifier
+from minirospy.runtime.rpc.turns import Turns
 from tests.manual_loop import ManualLoop, run_manually
 
 ANSWER = b"<methodResponse/>"

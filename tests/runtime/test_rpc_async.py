@@ -1,4 +1,4 @@
-"""runtime/rpc_async and runtime/notifier: connections that are kept, lost, refused or late; lists that are long."""
+"""runtime/rpc/async_client and runtime/master/notifier: connections that are kept, lost, refused or late; lists that are long."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import pytest
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.registry import PublisherUpdate
-from minirospy.runtime.notifier import Notifier
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.rpc_client import RpcClient
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.master.notifier import Notifier
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.rpc.client import RpcClient
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.xmlrpc import serialize_call
 
 CALL = serialize_call("getPid", ["/x"])

@@ -1,4 +1,4 @@
-"""runtime/rpc_server: clients take turns, and a time limit is for those that stand still."""
+"""runtime/rpc/server: clients take turns, and a time limit is for those that stand still."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime import rpc_server
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.rpc import server as rpc_server
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.http import HttpReader, serialize_request
 from minirospy.wire.xmlrpc import serialize_call
 

@@ -12,10 +12,10 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import CallFailed, HandshakeRefused, ServiceException, WireError
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.node import Node
-from minirospy.runtime.service_client import ServiceClient, parse_service_uri
-from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer, ServiceServer
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.service_client import ServiceClient, parse_service_uri
+from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 TYPE = InterfaceType("a/B", "0" * 32)

@@ -1,4 +1,4 @@
-"""runtime/tcp: links, listeners and handshakes with real sockets, and with peers that mean no good."""
+"""runtime/transport/tcp: links, listeners and handshakes with real sockets, and with peers that mean no good."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime import sockets, tcp
-from minirospy.runtime.loop import new_event_loop
+from minirospy.runtime.transport import sockets, tcp
+from minirospy.runtime.transport.loop import new_event_loop
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:

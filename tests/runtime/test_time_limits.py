@@ -14,12 +14,12 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.graph.registry import PublisherUpdate
-from minirospy.runtime.master import Master
-from minirospy.runtime.node import Node
-from minirospy.runtime.notifier import Notifier
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.topics import Publication
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.master.notifier import Notifier
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.http import serialize_request
 from minirospy.wire.tcpros import InterfaceType
 from minirospy.wire.xmlrpc import serialize_call

@@ -1,4 +1,4 @@
-"""runtime/topics and runtime/node: links between nodes of one loop, with real sockets, and what ends them."""
+"""runtime/node/topics and runtime/node/node: links between nodes of one loop, with real sockets, and what ends them."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import HandshakeRefused, MasterUnreachableError, RpcUnreachable, WireError
-from minirospy.runtime import tcp, topics
-from minirospy.runtime.loop import new_event_loop
-from minirospy.runtime.master import Master
-from minirospy.runtime.node import Node
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.topics import Publication, Subscription
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.node.node import Node, topics
+from minirospy.runtime.node.topics import Publication, Subscription
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.loop import new_event_loop
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType
@@ -801,7 +801,7 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
             subscription.close()
 
     run(scene)
-    lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.topics"]
+    lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.node.topics"]
     assert len(lines) == 11
     assert lines[0].startswith(
         "no connection for /t: http://127.0.0.1:1/ answered requestTopic for /t with [1, "

@@ -19,16 +19,16 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcUnreachable, UsageError, WireError
-from minirospy.runtime import local, sockets
-from minirospy.runtime.access import Access
-from minirospy.runtime.node import Node
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.rpc_client import RpcClient
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.service_client import ANSWER, ServiceClient
-from minirospy.runtime.services import AsyncServiceClient, LoopServiceServer
-from minirospy.runtime.slave import SlaveApi
-from minirospy.runtime.tcp import Listener
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.service_client import ANSWER, ServiceClient
+from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
+from minirospy.runtime.node.slave import SlaveApi
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.rpc.client import RpcClient
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport import local, sockets
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.tcp import Listener
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import InterfaceType, service_client_header
@@ -243,7 +243,7 @@ def test_each_user_believes_himself_and_root(user: int) -> None:
     printed = program(
         f"""
 import os
-from minirospy.runtime import local
+from minirospy.runtime.transport import local
 OWN = {OWN!r}
 server = local.bind(OWN, 2)
 os.setresuid({user}, {user}, 0)
@@ -278,7 +278,7 @@ def test_a_name_is_the_same_in_every_locale() -> None:
     printed = program(
         """
 import os
-from minirospy.runtime import local
+from minirospy.runtime.transport import local
 host, port = "\\u00fc\\u0431", os.getpid()
 print(local.bind(host, port).getsockname() == f"\\0minirospy-{host}:{port}".encode())
 """,
@@ -381,7 +381,7 @@ def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytes
 TCP_ALONE = """
 import asyncio
 from minirospy import aio
-from minirospy.runtime import local
+from minirospy.runtime.transport import local
 import rospy, std_srvs.srv
 
 local.reach = lambda *address: print("looked for", address)

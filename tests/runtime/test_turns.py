@@ -1,4 +1,4 @@
-"""runtime/turns: long work in short slices, on a clock that the test holds."""
+"""runtime/rpc/turns: long work in short slices, on a clock that the test holds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.rpc.turns import Turns
 from minirospy.steps import ALONE, PAUSE, Need, Steps, finish, is_small
 
 

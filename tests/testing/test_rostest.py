@@ -118,7 +118,7 @@ def test_text_shows_all_and_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_the_master_that_runs(tmp_path: Path, master: str) -> None:
-    from minirospy.runtime.master_proxy import MasterProxy
+    from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     proxy = MasterProxy(master, "/test")
     proxy.set_param("/old", 1)

@@ -12,7 +12,7 @@ from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment, run_folder
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["COMMAND", "get_run_id", "main"]
 

@@ -10,7 +10,7 @@ from minirospy.compat.rosgraph.names import make_caller_id
 from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rosgraph.rosenv import get_master_uri
 from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     from xmlrpc.client import ServerProxy

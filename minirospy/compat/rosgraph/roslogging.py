@@ -23,7 +23,7 @@ def configure_logging(
     from pathlib import Path
 
     from minirospy.compat.rospkg.environment import get_log_dir
-    from minirospy.runtime.log_file import LogFileHandler
+    from minirospy.runtime.master.log_file import LogFileHandler
 
     path = Path(get_log_dir(env)) / (filename or f"{logname}-{os.getpid()}.log")
     try:

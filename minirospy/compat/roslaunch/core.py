@@ -12,7 +12,7 @@ from minirospy.environment import Environment, is_own_host
 from minirospy.launch.command import node_environment
 from minirospy.launch.output import ERROR, Output
 from minirospy.launch.spec import MachineSpec, NodeSpec, TestSpec
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     from xmlrpc.client import MultiCall, ServerProxy

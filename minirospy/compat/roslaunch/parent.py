@@ -19,7 +19,7 @@ from minirospy.compat.roslaunch.pmon import (
 from minirospy.environment import Environment
 from minirospy.launch.process import Timeouts
 from minirospy.launch.runner import RunOptions
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["ROSLaunchParent"]
 

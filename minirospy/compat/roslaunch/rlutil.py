@@ -12,7 +12,7 @@ from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
 from minirospy.launch.load import find_files
 from minirospy.launch.output import Output, warn_of_large_logs
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 
 __all__ = [

@@ -17,9 +17,9 @@ class Master:
 
     def start(self) -> None:
         """Serve from a thread. Raises OSError where the port is taken."""
-        from minirospy.runtime.access import Access
-        from minirospy.runtime.loop import LoopThread
-        from minirospy.runtime.master import Master as Serving
+        from minirospy.runtime.master.master import Master as Serving
+        from minirospy.runtime.transport.access import Access
+        from minirospy.runtime.transport.loop import LoopThread
 
         if self.uri is not None:
             return

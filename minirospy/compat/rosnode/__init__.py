@@ -14,7 +14,7 @@ from minirospy.errors import MasterUnreachableError, MinirospyError, NodeUnreach
 from minirospy.introspect import nodes
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.texts import connections_text, node_text
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = [
     "ID",

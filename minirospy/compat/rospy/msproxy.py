@@ -13,7 +13,7 @@ from typing import Any
 from minirospy.client.params import get_param_cached
 from minirospy.client.session import current_session
 from minirospy.errors import RpcFault, RpcUnreachable
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.client import RpcClient
 
 __all__ = ["MasterProxy", "ServerProxy", "get_master", "xmlrpcapi"]
 

@@ -76,7 +76,7 @@ class Examination:
         from minirospy.introspect.doctor.other_machine import check_listens, check_machine
         from minirospy.introspect.doctor.own_node import DoctorNode, check_own_address, check_way_back
         from minirospy.introspect.graph import Graph
-        from minirospy.runtime.master_proxy import MasterProxy
+        from minirospy.runtime.rpc.master_proxy import MasterProxy
 
         own = DoctorNode(environment)
         try:

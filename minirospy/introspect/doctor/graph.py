@@ -26,7 +26,7 @@ from minirospy.introspect.doctor.reach import (
     trouble_of,
 )
 from minirospy.introspect.graph import Graph, NodeAddress
-from minirospy.runtime.master_proxy import BusConnection, SlaveProxy, SystemState
+from minirospy.runtime.rpc.master_proxy import BusConnection, SlaveProxy, SystemState
 
 __all__ = [
     "Answers",
@@ -319,7 +319,7 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 def _probe_service(graph: Graph, name: str) -> str:
     """Return what is wrong with a service's type; "": nothing. Raise as ServiceClient, and RpcRefused where it has gone."""
     from minirospy.idl.load import service_class
-    from minirospy.runtime.service_client import ServiceClient
+    from minirospy.runtime.node.service_client import ServiceClient
 
     uri = graph.master.lookup_service(name)
     look_up(host_port(uri)[0])

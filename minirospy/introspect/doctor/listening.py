@@ -31,8 +31,8 @@ from minirospy.introspect.doctor.reach import (
     trouble_of,
 )
 from minirospy.introspect.graph import Graph
-from minirospy.runtime.master_proxy import SystemState
-from minirospy.runtime.service_client import ServiceClient
+from minirospy.runtime.node.service_client import ServiceClient
+from minirospy.runtime.rpc.master_proxy import SystemState
 from minirospy.wire.header import Header
 
 __all__ = ["check_listeners", "listen", "listeners"]

@@ -11,7 +11,7 @@ from typing import Any
 from minirospy.errors import MasterUnreachableError, RpcError, RpcFault
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import CONNECT_SECONDS, Fault, MasterPlace, Trouble, trouble_of
-from minirospy.runtime.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.wire.http import serialize_request
 from minirospy.wire.xmlrpc import serialize_call
 

@@ -24,12 +24,12 @@ from minirospy.introspect.doctor.reach import (
     own_address_towards,
     trouble_of,
 )
-from minirospy.runtime.links import OutLink
-from minirospy.runtime.loop import LoopThread
-from minirospy.runtime.master_proxy import SlaveProxy
-from minirospy.runtime.node import Node
-from minirospy.runtime.services import Handler
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.services import Handler
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.rpc.master_proxy import SlaveProxy
+from minirospy.runtime.transport.links import OutLink
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.framing import serialize_frame
 from minirospy.wire.tcpros import InterfaceType
 

@@ -23,7 +23,7 @@ from minirospy.errors import (
     RpcUnreachable,
     WireError,
 )
-from minirospy.runtime.master_proxy import SlaveProxy
+from minirospy.runtime.rpc.master_proxy import SlaveProxy
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 

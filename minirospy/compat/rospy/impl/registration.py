@@ -54,7 +54,7 @@ class TopicManager:
         session = current_session()
         if session.node is None:
             return []
-        from minirospy.runtime.slave import SlaveApi
+        from minirospy.runtime.node.slave import SlaveApi
 
         return list(getattr(SlaveApi(session.node), method)(session.name)[2])
 

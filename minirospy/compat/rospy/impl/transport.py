@@ -11,7 +11,7 @@ DEFAULT_BUFF_SIZE = 65536
 def __getattr__(name: str) -> object:
     # Programs name them in annotations. Imported on use, as asyncio comes with them.
     if name in ("Transport", "DeadTransport"):
-        from minirospy.runtime.links import OutLink
+        from minirospy.runtime.transport.links import OutLink
 
         return OutLink
     raise AttributeError(f"module 'rospy.impl.transport' has no attribute {name!r}")

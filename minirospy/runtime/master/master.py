@@ -23,19 +23,19 @@ from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import MasterApi, Notice, key_of_node, nothing
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
-from minirospy.runtime.access import Access
-from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.notifier import Notifier
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.rpc_server import RpcServer
+from minirospy.runtime.master.notifier import Notifier
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.complaints import Complaints
 from minirospy.steps import Steps, finish
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.journal import unpack
 from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 if TYPE_CHECKING:
-    from minirospy.runtime.journal import Journal
-    from minirospy.runtime.node import Node
+    from minirospy.runtime.master.journal import Journal
+    from minirospy.runtime.node.node import Node
 
 __all__ = ["Master"]
 
@@ -266,7 +266,7 @@ class Master(MasterApi):
 
     async def _open_journal(self) -> dict[str, str]:
         """Recover what is in the journal, and begin to write it; return the nodes to be checked, and their URIs."""
-        from minirospy.runtime.journal import RETRY_SECONDS, Journal, JournalBusyError
+        from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
         journal = self._journal = Journal(
@@ -444,7 +444,7 @@ class Master(MasterApi):
 
 async def _lock(journal: Journal) -> None:
     """Lock the journal, as Journal.lock; wait a moment where it is held. The caller has the port."""
-    from minirospy.runtime.journal import JournalBusyError
+    from minirospy.runtime.master.journal import JournalBusyError
 
     end = time.monotonic() + _LOCK_SECONDS
     while True:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from minirospy.errors import MasterUnreachableError, RpcRefused, RpcUnreachable
-from minirospy.runtime.limits import is_file_limit
-from minirospy.runtime.rpc_client import RpcClient
+from minirospy.runtime.rpc.client import RpcClient
+from minirospy.runtime.transport.limits import is_file_limit
 
 __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_unreachable", "unwrap"]
 

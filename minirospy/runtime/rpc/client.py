@@ -9,8 +9,8 @@ from typing import Any
 
 from minirospy.environment import split_uri
 from minirospy.errors import RpcProtocolError, RpcUnreachable
-from minirospy.runtime import local, sockets
-from minirospy.runtime.limits import explain, is_file_limit
+from minirospy.runtime.transport import local, sockets
+from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
 from minirospy.wire.xmlrpc import parse_response, serialize_call
 

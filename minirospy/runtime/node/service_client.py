@@ -15,7 +15,7 @@ from typing import Any
 
 from minirospy.environment import split_uri
 from minirospy.errors import CallFailed, WireError
-from minirospy.runtime import local, sockets
+from minirospy.runtime.transport import local, sockets
 from minirospy.wire.framing import MAX_FRAME
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 from minirospy.wire.tcpros import check_service, service_client_header

@@ -17,9 +17,9 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from typing import Any
 
 from minirospy.errors import WireError
-from minirospy.runtime import sockets
-from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.limits import explain, is_file_limit
+from minirospy.runtime.transport import sockets
+from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [

@@ -17,12 +17,12 @@ from dataclasses import dataclass, field
 from minirospy.environment import split_uri
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadLimitError, WireError
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
-from minirospy.runtime import local, sockets, tcp
-from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.limits import explain, is_file_limit
-from minirospy.runtime.links import OutLink, ReaderSet, read_frames, watch_frames
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.workers import Workers
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.limits import explain, is_file_limit
+from minirospy.runtime.transport.links import OutLink, ReaderSet, read_frames, watch_frames
+from minirospy.runtime.transport.workers import Workers
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import (

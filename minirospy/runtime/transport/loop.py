@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from minirospy.runtime.limits import naming_thread_limit
+from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 

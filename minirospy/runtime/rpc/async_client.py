@@ -12,10 +12,10 @@ from functools import partial
 from typing import Any
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
-from minirospy.runtime import local, tcp
-from minirospy.runtime.deadlines import Deadlines
-from minirospy.runtime.limits import explain
-from minirospy.runtime.rpc_client import parse_http_uri
+from minirospy.runtime.rpc.client import parse_http_uri
+from minirospy.runtime.transport import local, tcp
+from minirospy.runtime.transport.deadlines import Deadlines
+from minirospy.runtime.transport.limits import explain
 from minirospy.wire.http import (
     MAX_BODY,
     Body,

@@ -4,7 +4,7 @@ Its connections are plain sockets that the loop watches: a master serves thousan
 transport for each would cost more than all that is done with it.
 
 No client delays the others: a short request is answered immediately, a long one (a large body, a large answer, many
-calls in one) in steps, for a few milliseconds in each turn of the loop (``runtime/turns.py``). What clients have the
+calls in one) in steps, for a few milliseconds in each turn of the loop (``runtime/rpc/turns.py``). What clients have the
 server hold in memory is limited for all of them together: requests that are incomplete, and answers that are not read.
 """
 
@@ -23,12 +23,12 @@ from itertools import islice
 from typing import Any
 
 from minirospy.errors import RpcFault, RpcProtocolError
-from minirospy.runtime import local, sockets, tcp
-from minirospy.runtime.access import Access
-from minirospy.runtime.complaints import Complaints
-from minirospy.runtime.deadlines import Deadlines
-from minirospy.runtime.limits import explain
-from minirospy.runtime.turns import Turns
+from minirospy.runtime.rpc.turns import Turns
+from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.deadlines import Deadlines
+from minirospy.runtime.transport.limits import explain
 from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import (
     MAX_BODY,

@@ -1,6 +1,6 @@
 """Services at run time: a server's handler runs in a worker, or on the loop; a client on the loop.
 
-All work on bytes; the client that blocks is in ``runtime/service_client.py``.
+All work on bytes; the client that blocks is in ``runtime/node/service_client.py``.
 Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
@@ -14,8 +14,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from minirospy.errors import CallFailed, ServiceException, ThreadLimitError, WireError
-from minirospy.runtime import local, sockets, tcp
-from minirospy.runtime.service_client import (
+from minirospy.runtime.node.service_client import (
     ANSWER,
     LENGTH,
     PeerEndedError,
@@ -23,7 +22,8 @@ from minirospy.runtime.service_client import (
     checked,
     parse_service_uri,
 )
-from minirospy.runtime.workers import Workers
+from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport.workers import Workers
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import (
     InterfaceType,
@@ -218,7 +218,7 @@ class _Connection:
 
 
 class AsyncServiceClient:
-    """A client on the loop, as that of ``runtime/service_client.py``; made by :meth:`connect`, used by one task at a time."""
+    """A client on the loop, as that of ``service_client.py``; made by :meth:`connect`, used by one task at a time."""
 
     def __init__(self, sock: socket.socket, header: Header) -> None:
         self.header = header

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 
 from minirospy.errors import ThreadLimitError
-from minirospy.runtime.limits import naming_thread_limit
+from minirospy.runtime.transport.limits import naming_thread_limit
 
 __all__ = ["InOrder", "Workers"]
 

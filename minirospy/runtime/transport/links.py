@@ -19,7 +19,7 @@ from itertools import islice
 from typing import Protocol
 
 from minirospy.errors import WireError
-from minirospy.runtime.sockets import (
+from minirospy.runtime.transport.sockets import (
     BUSY_POLL_SECONDS,
     FAMILIES,
     busy_receive,

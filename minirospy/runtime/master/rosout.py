@@ -16,10 +16,10 @@ from typing import Any
 from minirospy.environment import Environment
 from minirospy.errors import DeserializationError, ServiceException
 from minirospy.escape import escaped
-from minirospy.runtime.log_file import LogFile
-from minirospy.runtime.node import Node
-from minirospy.runtime.services import AsyncHandler, LoopServiceServer
-from minirospy.runtime.topics import Publication
+from minirospy.runtime.master.log_file import LogFile
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
+from minirospy.runtime.node.topics import Publication
 from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType

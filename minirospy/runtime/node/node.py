@@ -24,16 +24,16 @@ from minirospy.errors import (
     RpcUnreachable,
     WireError,
 )
-from minirospy.runtime import local, tcp
-from minirospy.runtime.access import Access
-from minirospy.runtime.links import ReaderSet
-from minirospy.runtime.master_proxy import master_unreachable, unwrap
-from minirospy.runtime.rpc_async import AsyncRpcClient
-from minirospy.runtime.rpc_server import RpcServer
-from minirospy.runtime.services import Handler, ServiceServer
-from minirospy.runtime.slave import SlaveApi
-from minirospy.runtime.topics import Deliver, Publication, Subscription
-from minirospy.runtime.workers import InOrder, Workers
+from minirospy.runtime.node.services import Handler, ServiceServer
+from minirospy.runtime.node.slave import SlaveApi
+from minirospy.runtime.node.topics import Deliver, Publication, Subscription
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.rpc.master_proxy import master_unreachable, unwrap
+from minirospy.runtime.rpc.server import RpcServer
+from minirospy.runtime.transport import local, tcp
+from minirospy.runtime.transport.access import Access
+from minirospy.runtime.transport.links import ReaderSet
+from minirospy.runtime.transport.workers import InOrder, Workers
 from minirospy.wire.tcpros import InterfaceType
 
 __all__ = ["Node"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from minirospy.graph.calls import (
     ERROR,
@@ -23,17 +23,48 @@ from minirospy.graph.calls import (
     text,
     uris,
 )
-from minirospy.runtime.local import PROTOCOL
+from minirospy.runtime.transport.local import PROTOCOL
 
 if TYPE_CHECKING:
-    from minirospy.runtime.links import OutLink
-    from minirospy.runtime.node import Node
-    from minirospy.runtime.topics import InLink
+    from minirospy.environment import Environment
+    from minirospy.runtime.node.topics import InLink, Publication, Subscription
+    from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["SlaveApi"]
 
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 """What masters write, rosmaster and ours."""
+
+
+class ServedNode(Protocol):
+    """What the Slave API needs of a node."""
+
+    environment: Environment
+    name: str
+    this_host: str
+    publications: dict[str, Publication]
+    subscriptions: dict[str, Subscription]
+
+    @property
+    def uri(self) -> str:
+        """The URI of its Slave API."""
+
+    @property
+    def tcpros_port(self) -> int:
+        """The port of its topics and services."""
+
+    @property
+    def unix_name(self) -> str:
+        """The name of its Unix socket."""
+
+    def parameter_changed(self, key: str, value: Any) -> None:
+        """Take the new value of a parameter."""
+
+    def publishers_changed(self, topic: str, publishers: list[str]) -> object:
+        """Take the full list of a topic's publishers."""
+
+    def request_shutdown(self, reason: str) -> None:
+        """Begin to shut the node down."""
 
 
 class SlaveApi:
@@ -42,7 +73,7 @@ class SlaveApi:
     Those that only tell may be called from any thread.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: ServedNode) -> None:
         self._node = node
         self.dispatcher = Dispatcher(
             {

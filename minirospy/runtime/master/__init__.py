@@ -1,0 +1,1 @@
+"""The master: its server, its calls to nodes, its journal, and /rosout."""

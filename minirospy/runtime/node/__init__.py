@@ -1,0 +1,1 @@
+"""A node: its Slave API, topics and services."""
