@@ -42,7 +42,7 @@ _STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "righ
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
+    """Run the command; return its exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
@@ -106,7 +106,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """The floor before the scanner from above, the scanner at its lower edge: its two fields, and the person."""
+    """Return the floor before the scanner from above, the scanner at its lower edge: its two fields, and the person."""
     from rich.text import Text
 
     body = Circle(*person)
@@ -139,7 +139,7 @@ def _where(person: Position) -> str:
 
 
 def render(state: BoardState) -> Picture:
-    """The rich renderable of ``state``."""
+    """Return the rich renderable of ``state``."""
     return Picture(state)
 
 
@@ -171,7 +171,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """What draws: over what was drawn before; below it where the terminal's cursor cannot go back (TERM=dumb)."""
+    """Return what draws: over what was drawn before; below it where the terminal's cursor cannot go back (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -221,7 +221,7 @@ class _Keys:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
-        """The key that was typed (an arrow by its name), or "" after a moment."""
+        """Return the key that was typed (an arrow by its name), or "" after a moment."""
         if not self._is_terminal:
             time.sleep(_LOOK_SECONDS)
             return ""

@@ -64,7 +64,7 @@ INTERRUPTED = 130
 
 
 def refuse_bag(command: str) -> NoReturn:
-    """What an option that reads a bag file ends with. Raises MinirospyError: exit status 1."""
+    """Refuse an option that reads a bag file. Raises MinirospyError: exit status 1."""
     raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
@@ -164,7 +164,7 @@ def _heed_interrupts() -> None:
 
 
 def _open_streams() -> None:
-    """Standard streams that are there, and print everything.
+    """Open the standard streams that are missing, and let all of them print everything.
 
     One that was closed (`rostopic list >&-`, a Windows program without a console) would be None; an output that
     cannot encode what a robot says (a pipe in Windows' code page) gets it as escapes.
@@ -182,7 +182,7 @@ def _open_streams() -> None:
 
 
 def warn(what: str, name: str = "") -> None:
-    """One line on stderr, after all that was printed before; that ``name`` is not legal stands there, too."""
+    """Print one line on stderr, after all that was printed before; it also says where ``name`` is not legal."""
     from minirospy.introspect.graph import why_illegal
 
     why = why_illegal(name) if name else ""
@@ -191,13 +191,13 @@ def warn(what: str, name: str = "") -> None:
 
 
 def warn_unpublished(graph: Graph, topic: str) -> None:
-    """What a command that waits for the messages of a topic says, where it does not know it; then the nearest names."""
+    """Warn that a topic is not known to the master, and name similar ones."""
     warn(f"topic [{topic}] does not appear to be published yet", topic)
     hint_near(topic, graph.state().publishers)
 
 
 def hint_near(name: str, known: Iterable[str]) -> None:
-    """A line on stderr, below the warning that ``name`` is waited for: the nearest names, where one is near."""
+    """Print the names similar to ``name`` on stderr, below the warning that it is awaited."""
     near = did_you_mean(name, (each for each in known if each != name))
     if near:
         print(escaped(near.removeprefix("; ")), file=sys.stderr)
@@ -205,7 +205,7 @@ def hint_near(name: str, known: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
-    """The node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
+    """Return the node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
 
     ``arguments``: what a launch file gives it as a node: `__name:=`, `__ns:=`, `__master:=`.
     """

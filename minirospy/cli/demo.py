@@ -82,7 +82,7 @@ def _is_dumb() -> bool:
 
 @contextlib.contextmanager
 def _own_world() -> Iterator[Path]:
-    """A master port and a board of the demo's own, so that it disturbs nobody; a folder for its files."""
+    """Set up a master port and a board of the demo's own, so that it disturbs nobody; a folder for its files."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))

@@ -103,7 +103,7 @@ def _wait_for_signal() -> None:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    # In slices: on Windows a wait without end hears no signal.
+    # In slices: on Windows a wait without a timeout is not interrupted by signals.
     while not stop.wait(0.5):
         pass
 

@@ -39,4 +39,4 @@ def _help() -> str:
     width = max(len(entry.verb) for entry in COMMANDS)
     lines = [f"  minirospy {entry.verb:{width}}  {entry.summary}" for entry in shown]
     title = f"minirospy {minirospy.__version__}: ROS 1 for any computer with Python"
-    return "\n".join([title, "", *lines, "", "`minirospy VERB -h` tells more of each."])
+    return "\n".join([title, "", *lines, "", "`minirospy VERB -h` prints more about each."])

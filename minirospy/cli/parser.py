@@ -11,7 +11,7 @@ import argparse
 import itertools
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.errors import UsageError, did_you_mean
@@ -71,7 +71,8 @@ class Parser(argparse.ArgumentParser):
 
     ``ros_usage`` is ROS's usage text; with it options and positional arguments may alternate, as with optparse, and
     help and errors have optparse's form. ``missing`` and ``surplus`` are ROS's texts about an argument that is missing
-    or one too many; ``about`` is ROS's description.
+    or one too many, ``missing`` perhaps by the argument's name; ``about`` and ``ros_epilog`` are ROS's texts above and
+    below the options.
     """
 
     def __init__(
@@ -80,10 +81,11 @@ class Parser(argparse.ArgumentParser):
         description: str = "",
         ros_usage: str = "",
         *,
-        missing: str = "",
+        missing: str | Mapping[str, str] = "",
         surplus: str = "",
         about: str = "",
-        intermixed: bool = False,
+        ros_epilog: str = "",
+        intermixed: bool | None = None,
         **kwargs: Any,
     ) -> None:
         super().__init__(prog, description=description, **{"formatter_class": _Help, **kwargs})
@@ -91,7 +93,8 @@ class Parser(argparse.ArgumentParser):
         self._missing = missing
         self._surplus = surplus
         self._about = about
-        self._intermixed = intermixed or bool(ros_usage)
+        self._ros_epilog = ros_epilog
+        self._intermixed = bool(ros_usage) if intermixed is None else intermixed
         self.register("action", "accepted", _Accepted)
 
     def add_argument(self, *names: Any, completer: str = "", **kwargs: Any) -> argparse.Action:
@@ -172,12 +175,11 @@ class Parser(argparse.ArgumentParser):
 
         if match := re.match(r"unrecognized arguments: (-\S)", message):
             return f"no such option: {match[1]}"
-        for prefix, text in (
-            ("unrecognized arguments", self._surplus),
-            ("the following arguments are required", self._missing),
-        ):
-            if message.startswith(prefix) and text:
-                return text
+        if self._surplus and message.startswith("unrecognized arguments"):
+            return self._surplus
+        if match := re.match(r"the following arguments are required: (\w+)", message):
+            missing = self._missing if isinstance(self._missing, str) else self._missing.get(match[1], "")
+            return missing or message
         pattern: Pattern[str]
         for pattern, text in (
             (
@@ -207,6 +209,9 @@ class Parser(argparse.ArgumentParser):
         if self._about:
             parts.append(_filled(self._about))
         parts.append(_ros_options("Options:", options))
+
+        if self._ros_epilog:
+            parts.append(_filled(self._ros_epilog))
 
         own = next((group._group_actions for group in self._action_groups if group.title == _OWN_OPTIONS), [])
         if own:

@@ -107,7 +107,7 @@ Command = Callable[..., Result]
 
 
 def without_ros_words(err: str) -> str:
-    """What minirospy adds to stderr: without the usage and the errors in ROS's words, which test_wording.py tests."""
+    """Return what minirospy adds to stderr: without the usage and the errors in ROS's words, which test_wording.py tests."""
     own = re.compile(r"[a-z][\w.-]*( \w+)?: (?!error: )|WARNING: |did you mean ")
     lines = err.splitlines(keepends=True)
     if not any(re.match(r"[a-z][\w.-]*( \w+)?: ERROR: ", line) for line in lines):
@@ -116,7 +116,7 @@ def without_ros_words(err: str) -> str:
 
 
 def own_lines(err: str) -> list[str]:
-    """The lines of an error that are minirospy's own."""
+    """Return the lines of an error that are minirospy's own."""
     return without_ros_words(err).splitlines()
 
 

@@ -14,7 +14,7 @@ Capture = pytest.CaptureFixture[str]
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Sources of a, b and c (a needs c), and a devel folder with parts of a."""
+    """Return sources of a, b and c (a needs c), and a devel folder with parts of a."""
     for name, more in (("a", "<depend>c</depend>"), ("b", ""), ("c", "")):
         folder = tmp_path / "src" / name
         folder.mkdir(parents=True)

@@ -32,7 +32,7 @@ from .conftest import Robot
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A workspace with the package ``my_robot``; the current folder is empty."""
+    """Return a workspace with the package ``my_robot``; the current folder is empty."""
     package = tmp_path / "src" / "my_robot"
     for folder in ("scripts", "launch", "config/deep", "msg", ".git"):
         (package / folder).mkdir(parents=True)
@@ -55,12 +55,12 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A busy machine may answer late."""
+    """Give a busy machine time to answer."""
     monkeypatch.setattr(completers, "LIVE_SECONDS", 30.0)
 
 
 def tab(line: str) -> list[str]:
-    """What is offered where ``line`` ends."""
+    """Return what is offered where ``line`` ends."""
     words = line.split(" ")
     return candidates(len(words) - 1, words)
 

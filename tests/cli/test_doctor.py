@@ -43,7 +43,7 @@ def closed_port() -> int:
 
 
 def lines(out: str, check: str) -> list[str]:
-    """What was said of a check."""
+    """Return what was printed about a check."""
     return [line for line in out.splitlines() if f" {check}: " in line]
 
 

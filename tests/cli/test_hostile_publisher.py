@@ -80,7 +80,7 @@ def _field(text: str) -> bytes:
 
 @pytest.fixture
 def hostile(master: str, request: pytest.FixtureRequest) -> Iterator[HostilePublisher]:
-    """A publisher of /evil with the header and messages of the parameter; the master holds a harmless type."""
+    """Return a publisher of /evil with the header and messages of the parameter; the master holds a harmless type."""
     header, messages = request.param
     publisher = HostilePublisher(header, messages)
     proxy = MasterProxy(master, "/evil_node")
@@ -93,7 +93,7 @@ def hostile(master: str, request: pytest.FixtureRequest) -> Iterator[HostilePubl
 
 
 def attack(type_: str, definition: str = "int32 a\n") -> tuple[dict[str, str], list[bytes]]:
-    """The parameter of ``hostile``."""
+    """Return the parameter of ``hostile``."""
     header = {"type": type_, "md5sum": "0" * 32, "message_definition": definition, "callerid": "/evil_node"}
     return header, [bytes(4)] * 5
 

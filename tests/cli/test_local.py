@@ -70,7 +70,7 @@ def listening(process: psutil.Process) -> set[str]:
 
 @pytest.fixture
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
-    """The variables that a day in the laboratory leaves in ~/.bashrc."""
+    """Return the variables that a day in the laboratory leaves in ~/.bashrc."""
     monkeypatch.delenv("ROS_HOSTNAME")
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     monkeypatch.setenv("ROS_IP", "192.0.2.7")

@@ -141,7 +141,7 @@ GRAPH = [name for name, row in ROWS.items() if row.asks]
 
 
 def scripts() -> dict[str, tuple[str, str]]:
-    """The commands that are installed -> module and function."""
+    """Return the commands that are installed -> module and function."""
     section = PYPROJECT.read_text(encoding="utf-8").partition("[project.scripts]")[2].partition("\n[")[0]
     return {
         name: (module, function)
@@ -186,7 +186,7 @@ def run(line: str, **streams: Any) -> Result:
 
 
 def one_line(result: Result, line: str) -> str:
-    """The command's own line on stderr, without its start; only ROS's usage and error may stand before it."""
+    """Return the command's own line on stderr, without its start; only ROS's usage and error may stand before it."""
     name = line.split(maxsplit=1)[0]
     match = re.fullmatch(rf"{name}: ERROR: ([^\n]*)\n", without_ros_words(result.err))
     assert match, (line, result)
@@ -194,7 +194,7 @@ def one_line(result: Result, line: str) -> str:
 
 
 def verbs(name: str) -> list[str]:
-    """The verbs of a command, by its help."""
+    """Return the verbs of a command, by its help."""
     return re.findall(rf"^\t{name} (\S+)\t", run(f"{name} -h").out, re.M)
 
 
@@ -210,7 +210,7 @@ def lines() -> list[str]:
 
 @pytest.fixture
 def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """The robot, with loggers and a parameter; and /ghost, whose services and topics are registered, and nothing else."""
+    """Return the robot, with loggers and a parameter; of /ghost only the services and topics are registered."""
     loggers = GetLoggersResponse()
     loggers.loggers.append(importlib.import_module("roscpp.msg").Logger("rosout", "info"))
     answer = io.BytesIO()
@@ -238,7 +238,7 @@ def _no_such_host(*_: object, **__: object) -> None:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calls to a master or node that says nothing end soon."""
+    """Let calls to a master or node that does not answer time out soon."""
     monkeypatch.setattr(master_proxy, "RpcClient", lambda uri, *_, **__: RpcClient(uri, 0.05))
 
 

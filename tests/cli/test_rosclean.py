@@ -15,7 +15,7 @@ from .conftest import Command
 
 @pytest.fixture
 def logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A log folder of 3 MB: `old` (2 MB, with `latest` pointing there) and `new` (1 MB)."""
+    """Return a log folder of 3 MB: `old` (2 MB, with `latest` pointing there) and `new` (1 MB)."""
     home = tmp_path / "home"
     folder = home / "log"
     for name, megabytes, changed in (("old", 2, 1_000_000_000), ("new", 1, 1_700_000_000)):

@@ -30,7 +30,7 @@ while not rospy.is_shutdown():
 
 @pytest.fixture
 def talker(master: str) -> Iterator[subprocess.Popen[str]]:
-    """The node /talker, which logs what it reads: an error where it begins with an exclamation mark."""
+    """Return the node /talker, which logs what it reads: an error where it begins with an exclamation mark."""
     process = subprocess.Popen(
         [sys.executable, "-c", _NODE],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=dict(os.environ),

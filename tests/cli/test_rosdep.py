@@ -12,7 +12,7 @@ from minirospy.cli.ros.rosdep import main
 
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with two packages, of which one needs the other, and more."""
+    """Return a folder with two packages, of which one needs the other, and more."""
     needs = {
         "lamp": "<depend>rospy</depend><depend>std_msgs</depend><buildtool_depend>catkin</buildtool_depend>"
         "<exec_depend>python3-yaml</exec_depend><exec_depend>python3-no-such-thing</exec_depend>",

@@ -23,7 +23,7 @@ Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
 @pytest.fixture
 def ghost(master: str) -> str:
-    """The URI of /ghost, which is registered and does not answer."""
+    """Return the URI of /ghost, which is registered and does not answer."""
     uri = f"http://localhost:{free_port()}/"
     proxy = MasterProxy(master, "/ghost")
     proxy.register_publisher("/boo", "std_msgs/Bool", uri)

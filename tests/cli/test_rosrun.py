@@ -40,7 +40,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def rosrun_(*words: str, stdin: str = "", **environ: str) -> tuple[int, str, str]:
-    """The exit status of the command, and what it and the program print."""
+    """Return the exit status of the command, and what it and the program print."""
     done = subprocess.run(
         [str(BIN / "rosrun"), *words],
         input=stdin, capture_output=True, text=True, timeout=30, check=False, env={**os.environ, **environ},

@@ -36,7 +36,7 @@ def launched(file: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> int:
-    """A free port, which ROS_MASTER_URI names."""
+    """Return a free port, which ROS_MASTER_URI names."""
     number = free_port()
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{number}")
     return number
@@ -44,7 +44,7 @@ def port(monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package of plain scripts."""
+    """Return a package of plain scripts."""
     folder = tmp_path / "pkg"
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
@@ -80,7 +80,7 @@ def start(running: list[subprocess.Popen[str]], *command: str) -> subprocess.Pop
 
 
 def read_until(process: subprocess.Popen[str], word: str) -> str:
-    """What is printed up to the line that has ``word``."""
+    """Return what is printed up to the line that has ``word``."""
     assert process.stdout
     said = ""
     for line in process.stdout:

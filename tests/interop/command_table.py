@@ -230,20 +230,19 @@ rosmsg-proto
 
 HELP = """
 rostopic bw -h
-rostopic delay -h
+rostopic delay -h ## ours names its own argument
 rostopic echo -h
 rostopic find -h
 rostopic hz -h
 rostopic info -h
 rostopic list -h
 rostopic pub -h
-rostopic type -h
+rostopic type -h ## ours names its own argument
 rosnode ping -h
 rosnode list -h
 rosnode info -h
 rosnode machine -h
 rosnode kill -h
-rosnode cleanup -h
 rosservice args -h
 rosservice call -h
 rosservice find -h
@@ -272,11 +271,11 @@ roslaunch -h
 roscore -h
 roslaunch-deps -h
 roslaunch-logs -h
-rosgraph -h
-roswtf -h
-rosrun -h
+rosgraph -h ## ours has an option
+roswtf -h ## another program: minirospy doctor
+rosrun -h ## help of our own
 rosunit -h
-rosversion -h
+rosversion -h ## help of our own
 """
 """Ours prints ROS's help, then what it has besides."""
 
@@ -349,11 +348,11 @@ roscore --nonsense
 roslaunch-deps
 roslaunch-deps --nonsense
 roslaunch-logs --nonsense
-rosrun
-rosrun nope nope
+rosrun ## a usage error: exit 2
+rosrun nope nope ## what does not exist: exit 1
 rosversion nope
-rosgraph x
-rosgraph --nonsense
+rosgraph x ## a usage error: exit 2
+rosgraph --nonsense ## a usage error: exit 2
 rosunit
 """
 
@@ -543,7 +542,12 @@ rosparam set /a 1
 rosparam load values.yaml
 """
 
-OTHER_WORDS: set[str] = set()
+OTHER_WORDS = {
+    "roslaunch nope nope.launch",
+    "roslaunch nope.launch",
+    "rosnode ping",
+    "rosrun nope nope",
+}
 """Lines whose error has ROS's paths or Python's texts in it, or is about something that is not an error here."""
 
 _STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")

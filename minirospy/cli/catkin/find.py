@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """The prefixes of the workspaces that are sourced, the nearest first; None for minirospy's own packages."""
+    """Return the prefixes of the workspaces that are sourced, the nearest first; None for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

@@ -69,7 +69,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
-    """The exit status. Raises MinirospyError at Ctrl-C, when the test has ended its nodes."""
+    """Return the exit status. Raises MinirospyError at Ctrl-C, when the test has ended its nodes."""
     with interrupt_noted() as interrupted, subprocess.Popen(command, env=environment, cwd=folder) as popen:
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
@@ -86,7 +86,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """What CMake's targets are called that run a package's tests, or one of them, in :func:`_flat`'s form."""
+    """Return what CMake's targets are called that run a package's tests, or one of them, in :func:`_flat`'s form."""
     if test is None:
         return [_flat(plan.name)]
     kinds = {"pytest": ("nosetests", "pytests")}.get(test.kind, (test.kind,))
@@ -94,7 +94,7 @@ def _targets(plan: Plan, test: Test | None) -> list[str]:
 
 
 def _flat(name: str) -> str:
-    """A name with one sign between its words: CMake's targets have no slashes."""
+    """Return a name with one sign between its words: CMake's targets have no slashes."""
     return re.sub(r"\W", "_", name)
 
 
@@ -127,7 +127,7 @@ _COMMANDS = {"pytest": _pytest, "rostest": _rostest, "roslaunch-check": _launch_
 
 
 def _environment(workspace: Workspace) -> dict[str, str]:
-    """That of the shell, with the workspace as its setup file would put it in front."""
+    """Return the environment of the shell, with the workspace as its setup file would put it in front."""
 
     def before(variable: str, path: Path) -> str:
         return os.pathsep.join(filter(None, [str(path), os.environ.get(variable, "")]))

@@ -38,7 +38,7 @@ class Counts(NamedTuple):
         return bool(self.errors or self.failures)
 
     def plus(self, other: Counts) -> Counts:
-        """The counts of both."""
+        """Return the counts of both."""
         return Counts(*(mine + theirs for mine, theirs in zip(self, other, strict=True)))
 
 
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_counts(file: Path) -> Counts:
-    """What a file counts, all its suites together. Raises ValueError, with why it is no file of results."""
+    """Return what a file counts, all its suites together. Raises ValueError, with why it is no file of results."""
     try:
         root = ElementTree.fromstring(file.read_bytes())
         if root.tag not in ("testsuite", "testsuites"):

@@ -68,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> list[str]:
-    """What can stand at ``words[index]``, as the shell is to insert it; if so asked, never more than one line."""
+    """Return the candidates for ``words[index]``, as the shell is to insert it; if so asked, never more than one line."""
     if not 0 < index <= len(words):
         return []
     word = _unquoted(words[index] if index < len(words) else "")
@@ -167,7 +167,7 @@ def _completer(name: str) -> Completer:
 
 
 def _unquoted(word: str) -> _Word:
-    """A word without its quotes; $NAME outside of single ones stands for its value."""
+    """Return a word without its quotes; $NAME outside of single ones is replaced by its value."""
     text = ""
     quote = ""
     at = read = 0
@@ -198,7 +198,7 @@ def _at_home(text: str) -> str:
 def _quoted(text: str, word: _Word) -> str:
     """``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
     if word.quote:
-        # A folder's quotes stay open: what lies in it comes next.
+        # A folder's quotes stay open: what is in it comes next.
         end = "" if text.endswith("/") else word.quote
         return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
     if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):

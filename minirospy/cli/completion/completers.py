@@ -49,7 +49,7 @@ class Place(NamedTuple):
 
 
 class Text(str):
-    """A candidate to be changed where it stands: better to read in quotes than with a backslash at each blank."""
+    """A candidate to be edited in place: better to read in quotes than with a backslash at each blank."""
 
     __slots__ = ()
 
@@ -58,7 +58,7 @@ Completer = Callable[[Place], Iterable[str]]
 
 
 def nothing(_: Place) -> Iterable[str]:
-    """A number, an expression, a name that is new: nobody but the person knows it."""
+    """Return nothing: a number, an expression, a name that is new."""
     return ()
 
 
@@ -77,7 +77,7 @@ def package_names(_: Place) -> Iterable[str]:
 
 
 def build_targets(place: Place) -> Iterable[str]:
-    """What catkin_make makes."""
+    """Return what catkin_make makes."""
     names = _packages().names()
     tests = [f"run_tests_{name}" for name in names] if place.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
@@ -110,7 +110,7 @@ _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
 def package_file(place: Place) -> Iterable[str]:
-    """A package, then the name of a file anywhere in it, or its path."""
+    """Return a package, then the name of a file anywhere in it, or its path."""
     if not place.given:
         return _packages().names()
     if len(place.given) > 1:
@@ -119,18 +119,18 @@ def package_file(place: Place) -> Iterable[str]:
 
 
 def package_path(place: Place) -> Iterable[str]:
-    """The path of a file in the package that is given."""
+    """Return the path of a file in the package that is given."""
     root = _packages().find(place.given[0])
     return [name.removeprefix("./") for name in _below(root, ".", "./" + place.word)]
 
 
 def package_file_and_target(place: Place) -> Iterable[str]:
-    """A package, a file of it, and where to."""
+    """Return a package, a file of it, and where to."""
     return files(place) if len(place.given) > 1 else package_file(place)
 
 
 def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
-    """The names of all files in a package, hidden ones and compiled ones left out."""
+    """Return the names of all files in a package, hidden ones and compiled ones left out."""
     found: set[str] = set()
     for _, inner, names in os.walk(root):
         inner[:] = [name for name in inner if not name.startswith(".") and name != "__pycache__"]
@@ -139,7 +139,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """What lies in the folder that ``word`` is in; ``shown`` stands for ``root`` at its beginning."""
+    """Return what is in the folder that ``word`` is in; ``shown`` represents ``root`` at its start."""
     head, _, begun = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -188,14 +188,14 @@ def rosrun_words(place: Place) -> Iterable[str]:
 
 
 def rospack_words(place: Place) -> Iterable[str]:
-    """A verb of rospack, its options, a package."""
+    """Return a verb of rospack, its options, a package."""
     from minirospy.cli.ros.rospack import _VERBS
 
     return _pack_words(place, _VERBS)
 
 
 def rosstack_words(place: Place) -> Iterable[str]:
-    """A verb of rosstack, its options, a stack."""
+    """Return a verb of rosstack, its options, a stack."""
     from minirospy.cli.ros.rospack import _STACK_VERBS
 
     return _pack_words(place, _STACK_VERBS)
@@ -220,7 +220,7 @@ def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 
 
 def launch_words(place: Place) -> Iterable[str]:
-    """A package and a launch file of it, or a path of one; then ``arg:=`` of what the file declares."""
+    """Return a package and a launch file of it, or a path of one; then ``arg:=`` of what the file declares."""
     if ":=" not in place.word:
         if not place.given:
             yield from _packages().names()
@@ -264,7 +264,7 @@ def launch_nodes(place: Place) -> Iterable[str]:
     if not place.given:
         return []
     file = _launch_file(place)
-    # A value that is not typed yet is no fault, and faults (told to the list) hide no node.
+    # A value that is not typed yet is no fault, and faults (collected in the list) hide no node.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.runnables()), place.word)
@@ -274,7 +274,7 @@ def launch_nodes(place: Place) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """What the master, and the nodes, answer; nothing where that takes longer than a TAB may."""
+    """Return what the master, and the nodes, answer; nothing where that takes longer than a TAB may."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -323,7 +323,7 @@ def nodes(place: Place) -> Iterable[str]:
 
 
 def machines(_: Place) -> Iterable[str]:
-    """The hosts that nodes run on."""
+    """Return the hosts that nodes run on."""
     from minirospy.introspect.graph import node_host
     from minirospy.introspect.nodes import list_nodes
 
@@ -459,7 +459,7 @@ def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
 
 
 def _fields(type_: str, path: str) -> list[str]:
-    """The fields of a message type's field ``path``."""
+    """Return the fields of a message type's field ``path``."""
     catalogue = _catalogue()
     spec = catalogue.message(type_)
     for step in filter(None, path.split("/")):
@@ -475,7 +475,7 @@ def _fields(type_: str, path: str) -> list[str]:
 
 
 def on_one_line(text: str) -> str:
-    """A message's text on one line, as YAML allows it too."""
+    """Return a message's text on one line, as YAML allows it too."""
     if not isinstance(text, Text) or "\n" not in text:
         return text
     import yaml
@@ -508,7 +508,7 @@ def pins(place: Place) -> Iterable[str]:
 
 
 def shells(_: Place) -> Iterable[str]:
-    """What `minirospy shell` has something for."""
+    """Return what `minirospy shell` has something for."""
     from minirospy.workspace.setup_files import SHELLS
 
     return SHELLS

@@ -88,7 +88,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
 
 def action_class(type_: str) -> type[Any]:
-    """The class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+    """Return the class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
     Raises NotFoundError.
     """
@@ -103,7 +103,7 @@ def action_class(type_: str) -> type[Any]:
 
 
 def read_answer(question: str) -> str:
-    """A line from the terminal; at the end of the input each answer is empty."""
+    """Return a line from the terminal; at the end of the input each answer is empty."""
     try:
         return input(question)
     except EOFError:
@@ -117,7 +117,7 @@ def _complain(error: Exception) -> None:
 
 
 def _found_type(action: str, timeout: float | None) -> str:
-    """The type of the action that is served at ``action``. Raises ROSException after ``timeout`` seconds."""
+    """Return the type of the action that is served at ``action``. Raises ROSException after ``timeout`` seconds."""
     from minirospy.introspect.graph import Graph
 
     waiting = threading.Event()
@@ -138,7 +138,7 @@ def _found_type(action: str, timeout: float | None) -> str:
 
 
 class _Progress:
-    """A goal under way: tells of its state and feedback, cancels at Ctrl-C."""
+    """A goal under way: prints its state and feedback, cancels at Ctrl-C."""
 
     def __init__(self, client: Any, goal: Any) -> None:
         self._client = client

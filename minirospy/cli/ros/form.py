@@ -21,7 +21,7 @@ class Field(NamedTuple):
 
 
 def fields(message: Any, prefix: str = "") -> Iterator[Field]:
-    """The fields of a message and of those in it; an array, a time and a duration are one field each."""
+    """Return the fields of a message and of those in it; an array, a time and a duration are one field each."""
     for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
         value = getattr(message, name)
         if hasattr(value, "_slot_types"):
@@ -40,7 +40,7 @@ def ask_for(
 
     Of the message's own fields those in ``known`` are not asked for.
 
-    ``ask(question)`` gives the answer. ``complain(error)`` is told of one that does not fit: then the question
+    ``ask(question)`` gives the answer. ``complain(error)`` is called for one that does not fit: then the question
     is asked again; it may raise instead.
     """
     for field in list(fields(message)):
@@ -62,7 +62,7 @@ def ask_for(
 
 
 def flow(value: Any) -> str:
-    """A value on one line, as YAML."""
+    """Return a value on one line, as YAML."""
     if isinstance(value, bool):
         return str(value)
     if isinstance(value, bytes | list | tuple):
@@ -80,7 +80,7 @@ def _question(field: Field) -> str:
 
 
 def _value(field: Field, answer: str) -> Any:
-    """An answer's value; a string needs no quotes."""
+    """Return an answer's value; a string needs no quotes."""
     if field.type == "string" and answer[0] not in "'\"":
         return answer
     return parse_value(answer)

@@ -91,6 +91,7 @@ def _parser(name: str) -> Parser:
         "Starts the ROS master, the parameter server and the /rosout node.",
         f"{name} [options]",
         about="roscore will start up a ROS Master, a ROS Parameter Server and a rosout logging node",
+        ros_epilog="See http://wiki.ros.org/roscore",
     )
     add = parser.add_argument
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")

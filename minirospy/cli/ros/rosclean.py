@@ -79,7 +79,7 @@ def _purge_oldest(logs: _Logs, megabytes: int, *, yes: bool) -> None:
 
 
 def _places() -> list[_Logs]:
-    """The folders of logs that there are."""
+    """Return the folders of logs that there are."""
     from minirospy.workspace.folders import log_dir, ros_home
 
     places = (
@@ -150,7 +150,7 @@ def disk_usage(folder: Path) -> int:
 
 
 def human_size(size: float) -> str:
-    """A size as `du -h` prints it: 4.0K, 11M; rounded up."""
+    """Return a size as `du -h` prints it: 4.0K, 11M; rounded up."""
     if size < 1024:
         return f"{size:.0f}"
     for unit in "KMGT":

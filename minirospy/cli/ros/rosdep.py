@@ -125,7 +125,7 @@ def _missing(
 
 
 def _module(key: str) -> tuple[str, str] | None:
-    """The module and the name on PyPI that a key stands for; None where it is no key of Python."""
+    """Return the module and the name on PyPI that a key represents; None where it is not a key of Python."""
     match = _PYTHON_KEY.match(key)
     if match is None:
         return None
@@ -142,7 +142,7 @@ def _is_installed(key: str) -> bool:
 
 
 def _says(keys: dict[str, list[str]]) -> Iterator[str]:
-    """A line for each key that is not installed: who asks for it, and what to do."""
+    """Return a line for each key that is not installed: who asks for it, and what to do."""
     for key, packages in keys.items():
         module = _module(key)
         how = (

@@ -268,7 +268,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """The nodes of ``names`` that there are; of each other one it is said that it is not."""
+    """Return the nodes of ``names`` that there are; of each other one it is said that it is not."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

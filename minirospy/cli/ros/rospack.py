@@ -48,7 +48,7 @@ class _Line(NamedTuple):
 
 
 class _Verb(NamedTuple):
-    """``usage`` follows the name in the help; ``summary`` is what `rospack help VERB` tells."""
+    """``usage`` follows the name in the help; ``summary`` is what `rospack help VERB` prints."""
 
     body: Callable[[_Line, Dependencies], None]
     usage: str
@@ -66,12 +66,12 @@ class _Tool(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command; its exit status is 1 where rospack's is."""
+    """Run the command; return 1 where rospack does."""
     return _run(_Tool("rospack", "package", _VERBS), argv)
 
 
 def rosstack(argv: Sequence[str] | None = None) -> int:
-    """The command rosstack; its exit status is 1 where rosstack's is."""
+    """Run the command rosstack; return 1 where rosstack does."""
     return _run(_Tool("rosstack", "stack", _STACK_VERBS), argv)
 
 
@@ -141,7 +141,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """The verb of a line. Raises where the line does not suit it."""
+    """Return the verb of a line. Raises where the line does not suit it."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
@@ -164,7 +164,7 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 
 
 def _package(line: _Line, *others: str, said: str = "package") -> str:
-    """The package that is meant. ``others`` are options that must be there too."""
+    """Return the package that is meant. ``others`` are options that must be there too."""
     package = line.package or _package_here()
     if not package or not all(line.options.get(name) for name in others):
         raise _RospackError(f"no {said} given")
@@ -172,7 +172,7 @@ def _package(line: _Line, *others: str, said: str = "package") -> str:
 
 
 def _package_here() -> str:
-    """The package that the current folder is or lies in."""
+    """Return the package that the current folder is, or is in."""
     here = Path.cwd()
     return next(filter(None, map(package_name, (here, *here.parents))), "")
 
@@ -273,7 +273,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """The values of an attribute in the exports of a package and of all that it needs, each once."""
+    """Return the values of an attribute in the exports of a package and of all that it needs, each once."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:
@@ -305,7 +305,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """The compiler's or linker's words in <cpp> exports, of those that ``keep`` chooses, without ``prefix``."""
+    """Return the compiler's or linker's words in <cpp> exports, of those that ``keep`` chooses, without ``prefix``."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

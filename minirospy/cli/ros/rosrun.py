@@ -26,7 +26,7 @@ PROGRAM is a file's name, wherever in PACKAGE it lies, or its path from there.
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command: the exit status is the program's, or as in minirospy.cli.command where it cannot be run."""
+    """Run the command; return the program's exit status, or as in minirospy.cli.command where it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
     # What the program ignores is for it to say.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
@@ -65,7 +65,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """What is said where the program is missing, or the package. Raises NotFoundError where neither is known."""
+    """Return what to print where the program is missing, or the package. Raises NotFoundError where neither is known."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -87,7 +87,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """The program that the person at the terminal chooses of several of one name."""
+    """Return the program that the person at the terminal chooses of several of one name."""
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):

@@ -138,9 +138,10 @@ def _rostest(
 
 def _rosunit_parser() -> Parser:
     parser = Parser(
-        prog="rosunit",
-        usage="rosunit [options] FILE [arguments of the test ...]",
-        description="Runs a unit test's file, and reads the results that it writes.",
+        "rosunit",
+        "Runs a unit test's file, and reads the results that it writes.",
+        "rosunit [options] <file> [test args...]",
+        intermixed=False,
         epilog="Exit status: 0 all passed, 1 the file could not be run or wrote no results, 2 a test failed.",
     )
     add = parser.add_argument
@@ -151,12 +152,13 @@ def _rosunit_parser() -> Parser:
         completer="files",
     )
     add("arguments", nargs=argparse.REMAINDER, help="what the file is given", completer="files")
-    add("-t", "--text", action="store_true", help="print everything, write no files of results")
-    add("--time-limit", type=float, default=60.0, metavar="SECONDS", help="default: 60")
-    add("--name", help="the test's name in the results (default: the file's)", completer="nothing")
+    add("-t", "--text", action="store_true", help="Run with stdout output instead of XML output")
+    add("--time-limit", type=float, default=60.0, help="Set time limit for test")
+    add("--name", metavar="TEST_NAME", help="Test name", completer="nothing")
     add(
         "--package",
-        help="the package in the results (default: the one around the file)",
+        metavar="PACKAGE_NAME",
+        help="Package name (optional)",
         completer="package_names",
     )
     return parser
@@ -210,7 +212,7 @@ def _base(folder: str | None) -> Path:
 
 
 def _file(what: list[str], packages: Packages) -> Path:
-    """The launch file that the command line names. Raises MinirospyError."""
+    """Return the launch file that the command line names. Raises MinirospyError."""
     if len(what) == 1:
         if Path(what[0]).is_file():
             return Path(what[0]).resolve()
@@ -227,7 +229,7 @@ def _file(what: list[str], packages: Packages) -> Path:
 
 
 def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
-    """The package that a file lies in, and its folder. Raises MinirospyError."""
+    """Return the package that a file is in, and its folder. Raises MinirospyError."""
     for folder in file.resolve().parents:
         name = package_name(folder)
         if name:

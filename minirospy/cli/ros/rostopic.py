@@ -188,7 +188,13 @@ def _echo_parser() -> Parser:
     )
     _add_bag(parser, "echo messages from .bag file")
     add("-p", dest="plot", action="store_true", help="echo in a plotting friendly format")
-    add("-w", dest="width", type=int, metavar="NUM_WIDTH", help="fixed width for numeric values")
+    add(
+        "-w",
+        dest="width",
+        type=_integer("NUM_WIDTH"),
+        metavar="NUM_WIDTH",
+        help="fixed width for numeric values",
+    )
     add(
         "--filter",
         metavar="FILTER-EXPRESSION",
@@ -200,7 +206,7 @@ def _echo_parser() -> Parser:
     add("--noarr", action="store_true", help="exclude arrays")
     add("-c", "--clear", action="store_true", help="clear screen before printing next message")
     add("-a", "--all", action="store_true", help="display all message in bag, only valid with -b option")
-    add("-n", dest="count", type=int, metavar="COUNT", help="number of messages to echo")
+    add("-n", dest="count", type=_integer("COUNT"), metavar="COUNT", help="number of messages to echo")
     add("--offset", action="store_true", help="display time as offsets from current time (in seconds)")
     return parser
 
@@ -429,7 +435,7 @@ def _pub_parser() -> Parser:
         "rostopic pub",
         "Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
         "rostopic pub /topic type [args...]",
-        missing="/topic must be specified",
+        missing={"topic": "/topic must be specified", "type": "topic type must be specified"},
         epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
         "Without arguments, messages are read from standard input, with --- between them.",
     )
@@ -524,19 +530,24 @@ def _add_window(parser: Parser, default: int) -> None:
     parser.add_argument(
         "-w",
         "--window",
-        type=_window,
+        type=_integer("window size"),
         default=default,
         help="window size, in # of messages, for calculating rate",
     )
 
 
-def _window(text: str) -> int:
-    import argparse
+def _integer(name: str) -> Callable[[str], int]:
+    """Return what reads an integer; ``name`` is what ROS calls it in an error."""
 
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError("window size must be an integer") from None
+    def read(text: str) -> int:
+        import argparse
+
+        try:
+            return int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{name} must be an integer") from None
+
+    return read
 
 
 def _add_tcp_nodelay(parser: Parser) -> None:

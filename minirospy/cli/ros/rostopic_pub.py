@@ -52,7 +52,7 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
         values = next(all_values)
-        # Before the node is there, so that a typing error shows at once.
+        # Before the node is there, so that a typing error shows immediately.
         message = fill_message(cls, values)
         state = graph.state()
         awaited = topic in state.subscribers

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import UsageError
+from minirospy.errors import NotFoundError, UsageError
 from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
@@ -47,7 +47,12 @@ def _rosversion(package: str | None, skip_newline: bool, distro: bool, all: bool
         folders = Packages().folders()
         text = "\n".join(f"{name}: {read_manifest(folders[name]).version}" for name in sorted(folders))
     else:
-        text = read_manifest(Packages().find(str(package))).version
+        try:
+            folder = Packages().find(str(package))
+        except NotFoundError:
+            print(f"Cannot locate [{package}]", flush=True)
+            raise
+        text = read_manifest(folder).version
     sys.stdout.write(text if skip_newline else text + "\n")
 
 
