@@ -84,6 +84,8 @@ def test_open_text_empties_or_appends(tmp_path: Path) -> None:
             assert os.get_blocking(file.fileno())
             file.write(text)
     assert path.read_text() == "short and more"
+    private_files.open_text(path, "w").close()
+    assert path.read_text() == ""
 
 
 def test_read_file_reads_what_has_another_name_too(tmp_path: Path, mine: Path) -> None:

@@ -7,6 +7,7 @@ import logging
 import os
 import stat
 import sys
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -296,6 +297,33 @@ def test_large_values_are_rewritten_in_parts(
     assert sum(1 for _ in steps[0]) > 10
     found = records(path)
     assert found == [["boot", boot_id()], *state]
+    assert max(len(str(record)) for record in parse_journal(path.read_bytes()).records) < 500_000
+
+
+def test_rewrite_in_steps_writes_two_hundred_records_at_a_time(
+    stepping: Journal, state: list[list[Any]], steps: list[Steps[None]]
+) -> None:
+    state += [["set", f"/{number}", number] for number in range(399)]
+    # The head, two times two hundred, and nothing else.
+    assert [each for each in steps[0] if each is None] == [None] * 4
+
+
+def test_close_while_the_new_file_is_synced_gives_it_up(
+    stepping: Journal, path: Path, steps: list[Steps[None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_sync = threading.Event()
+
+    def fsync(file: int) -> None:
+        assert may_sync.wait(60)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    while next(steps[0]) is not PAUSE:
+        pass
+    before = path.read_bytes()
+    stepping.close()
+    may_sync.set()
+    finish(steps[0])
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("step", ["write", "fsync", "replace"])
@@ -349,6 +377,11 @@ def test_disk_that_fails_for_the_new_file_alone_ends_the_rewrite(
     finish(running)
     assert records(path)[-1] == ["set", "/q", 1]
     assert stepping.size == path.stat().st_size
+    # Tried again only when the journal has doubled.
+    stepping.append("set", "/p", "x" * (MIB // 2))
+    assert len(steps) == 1
+    stepping.append("set", "/p", "x" * MIB)
+    assert len(steps) == 2
 
 
 def test_disk_that_fails_ends_the_rewrite_in_steps(
