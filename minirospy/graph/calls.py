@@ -7,7 +7,7 @@ http://wiki.ros.org/ROS/Slave_API; the texts that refuse an argument are those o
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy import names
 from minirospy.errors import MinirospyError, RpcFault
@@ -40,7 +40,7 @@ __all__ = [
 SUCCESS, FAILURE, ERROR = 1, 0, -1
 """Status codes of an answer."""
 
-Answer = list[Any]
+Answer = list[object]
 """``[status code, text, value]``."""
 
 _MAX_CHARACTERS = 4096
@@ -55,14 +55,14 @@ class Parameter(NamedTuple):
     """A parameter of a method: ``read(value, name, caller_id)`` returns the argument or raises CallRefused."""
 
     name: str
-    read: Callable[[Any, str, str], Any]
+    read: Callable[[object, str, str], object]
 
 
 class Method(NamedTuple):
     """A method: what is called with the caller_id and the arguments, and the value of an answer that refuses."""
 
     function: Callable[..., Answer | Steps[Answer]]
-    refused: Any
+    refused: object
     parameters: tuple[Parameter, ...] = ()
     optional: int = 0
     """How many of the last parameters may be left out."""
@@ -83,7 +83,7 @@ class Dispatcher:
         self._unknown = unknown
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
-    def dispatch(self, name: str, args: Sequence[Any]) -> Any:
+    def dispatch(self, name: str, args: Sequence[object]) -> object:
         """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
         method = self.methods.get(name)
         if method is None:
@@ -112,13 +112,13 @@ class Dispatcher:
             return [ERROR, str(refusal), method.refused]
         return answer if isinstance(answer, list) else self._finish(answer, method.refused)
 
-    def _finish(self, steps: Steps[Answer], refused: Any) -> Steps[Answer]:
+    def _finish(self, steps: Steps[Answer], refused: object) -> Steps[Answer]:
         try:
             return (yield from steps)
         except self._refusals as refusal:
             return [ERROR, str(refusal), refused]
 
-    def _dispatch_system(self, name: str, args: Sequence[Any]) -> Any:
+    def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
         """Call what XML-RPC servers have: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
         if name == "system.listMethods":
             return sorted(self.methods)
@@ -128,14 +128,14 @@ class Dispatcher:
             return self._call_many(args[0])
         raise RpcFault(1, self._unknown.format(name[:_MAX_CHARACTERS]))
 
-    def _call_many(self, calls: list[Any]) -> Steps[list[Any]]:
+    def _call_many(self, calls: list[object]) -> Steps[list[object]]:
         answers = []
         for call in calls:
             answers.append((yield from self._call_one_of_many(call)))
             yield None
         return answers
 
-    def _call_one_of_many(self, call: Any) -> Steps[Any]:
+    def _call_one_of_many(self, call: object) -> Steps[object]:
         match call:
             case {"methodName": "system.multicall"}:
                 return _fault("system.multicall inside itself")
@@ -149,33 +149,33 @@ class Dispatcher:
                 return _fault("a call is a struct of methodName and params")
 
 
-def _fault(text: str) -> dict[str, Any]:
+def _fault(text: str) -> dict[str, object]:
     return {"faultCode": 1, "faultString": text}
 
 
 # --- the types of parameters
 
 
-def anything(value: Any, name: str, caller_id: str) -> Any:
+def anything(value: object, name: str, caller_id: str) -> object:
     """Return any value."""
     return value
 
 
-def some(value: Any, name: str, caller_id: str) -> Any:
+def some(value: object, name: str, caller_id: str) -> object:
     """Return any value that is not empty."""
     if not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be specified and non-empty")
     return value
 
 
-def text(value: Any, name: str, caller_id: str) -> str:
+def text(value: object, name: str, caller_id: str) -> str:
     """Return a text that is not empty."""
     if not isinstance(value, str) or not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be a non-empty string")
     return value
 
 
-def global_name(value: Any, name: str, caller_id: str) -> str:
+def global_name(value: object, name: str, caller_id: str) -> str:
     """Return the name of a topic or a service, resolved as the caller sees it."""
     resolved = node_name(value, name, caller_id)
     if resolved == "/":
@@ -183,7 +183,7 @@ def global_name(value: Any, name: str, caller_id: str) -> str:
     return resolved
 
 
-def node_name(value: Any, name: str, caller_id: str) -> str:
+def node_name(value: object, name: str, caller_id: str) -> str:
     """Return the name of a node, resolved as the caller sees it."""
     found = _short_text(value, name)
     # rosmaster lets in much that is no legal name: many a robot's topics have a dash.
@@ -192,19 +192,19 @@ def node_name(value: Any, name: str, caller_id: str) -> str:
     return _resolve(found, caller_id)
 
 
-def parameter_key(value: Any, name: str, caller_id: str) -> str:
+def parameter_key(value: object, name: str, caller_id: str) -> str:
     """Return the name of a parameter, resolved as the caller sees it; rosmaster lets any characters in."""
     return _resolve(plain_key(value, name, caller_id), caller_id)
 
 
-def plain_key(value: Any, name: str, caller_id: str) -> str:
+def plain_key(value: object, name: str, caller_id: str) -> str:
     """Return the name of a parameter as it is given."""
     if not isinstance(some(value, name, caller_id), str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return _short_text(value, name)
 
 
-def type_name(value: Any, name: str, caller_id: str) -> str:
+def type_name(value: object, name: str, caller_id: str) -> str:
     """Return a type ``pkg/Name``, or ``*``."""
     found = _short_text(value, name)
     if found != "*" and (found.count("/") != 1 or has_controls(found)):
@@ -212,7 +212,7 @@ def type_name(value: Any, name: str, caller_id: str) -> str:
     return found
 
 
-def api_uri(value: Any, name: str, caller_id: str) -> str:
+def api_uri(value: object, name: str, caller_id: str) -> str:
     """Return the URI of a node's API or of a service."""
     if not isinstance(value, str) or not value:
         raise CallRefused(f"ERROR: parameter [{name}] is not an XMLRPC URI")
@@ -225,14 +225,14 @@ def api_uri(value: Any, name: str, caller_id: str) -> str:
     return found
 
 
-def subgraph(value: Any, name: str, caller_id: str) -> str:
+def subgraph(value: object, name: str, caller_id: str) -> str:
     """Return a namespace, resolved as the caller sees it; "" is the whole graph."""
     if not isinstance(value, str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return names.resolve(_short_text(value, name), caller_id) if value else ""
 
 
-def uris(value: Any, name: str, caller_id: str) -> list[str]:
+def uris(value: object, name: str, caller_id: str) -> list[str]:
     """Return a list of URIs."""
     if not isinstance(value, list):
         raise CallRefused(f"ERROR: param [{name}] must be a list")
@@ -241,7 +241,7 @@ def uris(value: Any, name: str, caller_id: str) -> list[str]:
     return value
 
 
-def _short_text(value: Any, name: str) -> str:
+def _short_text(value: object, name: str) -> str:
     if not isinstance(value, str) or not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be a non-empty string")
     if len(value) > _MAX_CHARACTERS:
@@ -255,6 +255,6 @@ def _resolve(name: str, caller_id: str) -> str:
     return names.resolve(name, caller_id)
 
 
-def parameters(**readers: Callable[[Any, str, str], Any]) -> tuple[Parameter, ...]:
+def parameters(**readers: Callable[[object, str, str], object]) -> tuple[Parameter, ...]:
     """Return the parameters of a method, by their names."""
     return tuple(Parameter(name, read) for name, read in readers.items())

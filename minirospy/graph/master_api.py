@@ -65,7 +65,7 @@ class MasterApi(ABC):
         """Gets a line for each registration."""
         self.note: Callable[..., object] = nothing
         """Receives each change, as it is written to the journal."""
-        self.store: Callable[[Any], Steps[int]] = _store_nothing
+        self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal, and returns the number that a change refers to it by."""
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)
@@ -138,7 +138,7 @@ class MasterApi(ABC):
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
         """How this master is: minirospy's own, for `minirospy master --status`."""
 
-    def dispatch(self, method: str, args: Sequence[Any]) -> Any:
+    def dispatch(self, method: str, args: Sequence[object]) -> object:
         """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
@@ -177,7 +177,7 @@ class MasterApi(ABC):
 
     def collect_system_state(self) -> Steps[Answer]:
         """Return the same in steps."""
-        state: list[list[list[Any]]] = []
+        state: list[list[list[object]]] = []
         registry = self.registry
         for rows in (registry.publisher_rows(), registry.subscriber_rows(), registry.service_rows()):
             table: list[list[Any]] = []
@@ -265,7 +265,7 @@ class MasterApi(ABC):
         except KeyError:
             return [ERROR, f"Parameter [{name}] is not set", 0]
 
-    def set_param(self, caller_id: str, name: str, value: Any) -> Answer | Steps[Answer]:
+    def set_param(self, caller_id: str, name: str, value: object) -> Answer | Steps[Answer]:
         """Set a parameter."""
         if not is_small(value):
             return self._set_large(caller_id, name, value)
@@ -275,7 +275,7 @@ class MasterApi(ABC):
         steps = self._set(caller_id, name, value, weight)
         return self._run(steps, self.parameters.count_subscriptions())
 
-    def _set_large(self, caller_id: str, name: str, value: Any) -> Steps[Answer]:
+    def _set_large(self, caller_id: str, name: str, value: object) -> Steps[Answer]:
         # One at a time: the value is in the tree, or it is freed, before the next one comes.
         yield ALONE
         weight = yield from _weigh(name, value)
@@ -284,7 +284,7 @@ class MasterApi(ABC):
         return (yield from self._set(caller_id, name, value, weight, number))
 
     def _set(
-        self, caller_id: str, name: str, value: Any, weight: int, number: int | None = None
+        self, caller_id: str, name: str, value: object, weight: int, number: int | None = None
     ) -> Steps[Answer]:
         try:
             updates = self.parameters.set(name, value, caller_id, weight)
@@ -382,14 +382,14 @@ class MasterApi(ABC):
         return [SUCCESS, f"[{caller_id}] is not a known provider of [{topic}]", 0]
 
 
-def _weigh(name: str, value: Any) -> Steps[int]:
+def _weigh(name: str, value: object) -> Steps[int]:
     try:
         return (yield from weigh_in_steps(name, value))
     except ValueError as error:
         raise CallRefused(f"Error: invalid arguments: {error}") from error
 
 
-def _store_nothing(_: Any) -> Steps[int]:
+def _store_nothing(_: object) -> Steps[int]:
     yield None
     return 0
 

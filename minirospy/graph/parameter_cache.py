@@ -8,7 +8,7 @@ Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, Final
+from typing import Final
 
 __all__ = ["NOT_SET", "ParameterCache"]
 
@@ -28,7 +28,7 @@ class ParameterCache:
     """
 
     def __init__(self) -> None:
-        self._values: dict[str, Any] = {}
+        self._values: dict[str, object] = {}
         self._changes = 0
 
     @property
@@ -36,11 +36,11 @@ class ParameterCache:
         """How many changes there were: to be read before the master is asked, and given to :meth:`store`."""
         return self._changes
 
-    def get(self, key: str) -> Any:
+    def get(self, key: str) -> object:
         """What was stored for ``key`` and has not changed since. Raises LookupError."""
         return self._values[key]
 
-    def store(self, key: str, value: Any, changes: int) -> None:
+    def store(self, key: str, value: object, changes: int) -> None:
         """Keep the master's answer, unless there was a change since it was asked."""
         if changes == self._changes:
             self._values[key] = value

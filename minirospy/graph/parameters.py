@@ -69,7 +69,7 @@ class ParameterTree:
     """
 
     def __init__(self, most: int = MOST_BYTES) -> None:
-        self._root: dict[str, Any] = {}
+        self._root: dict[str, object] = {}
         # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
@@ -328,7 +328,7 @@ def weigh_in_steps(key: str, value: Any) -> Steps[int]:
     return weight
 
 
-def _weigh_names(table: dict[str, Any]) -> Steps[int]:
+def _weigh_names(table: dict[str, object]) -> Steps[int]:
     weight = 0
     for number, name in enumerate(table):
         weight += sys.getsizeof(name)

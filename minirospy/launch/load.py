@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy import names
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, nearest
@@ -53,7 +53,7 @@ class _Scope:
     namespace: str = "/"
     remaps: tuple[tuple[str, str], ...] = ()
     env: tuple[tuple[str, str], ...] = ()
-    private: tuple[tuple[str, Any], ...] = ()
+    private: tuple[tuple[str, object], ...] = ()
 
 
 @dataclass
@@ -457,7 +457,7 @@ class _File:
         self._spec.commands.append(ParameterCommand(name, file))
         return scope
 
-    def _set(self, tag: Tag, name: str, value: Any) -> None:
+    def _set(self, tag: Tag, name: str, value: object) -> None:
         name = names.canonicalize(name)
         upper = name
         while upper := upper.rpartition("/")[0]:

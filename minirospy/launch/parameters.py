@@ -9,7 +9,6 @@ import shlex
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from minirospy import names
 from minirospy.errors import ValueTextError
@@ -23,7 +22,7 @@ __all__ = ["param_value", "rosparam_values"]
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
-def param_value(tag: Tag) -> Any:
+def param_value(tag: Tag) -> object:
     """Return the value of a ``<param>``. Raises LaunchError."""
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
@@ -48,7 +47,7 @@ def param_value(tag: Tag) -> Any:
     return value
 
 
-def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, Any]]:
+def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, object]]:
     """Return each single parameter that a ``<rosparam>`` loads, and its value. Raises LaunchError."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from minirospy.errors import LaunchError
 
@@ -119,7 +118,7 @@ class LaunchSpec:
 
     nodes: list[NodeSpec] = field(default_factory=list)
     tests: list[TestSpec] = field(default_factory=list)
-    params: dict[str, Any] = field(default_factory=dict)
+    params: dict[str, object] = field(default_factory=dict)
     clear: list[str] = field(default_factory=list)
     commands: list[ParameterCommand] = field(default_factory=list)
     files: list[str] = field(default_factory=list)

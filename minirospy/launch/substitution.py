@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from minirospy import names
 from minirospy.workspace.packages import Packages
@@ -108,7 +107,7 @@ class Substitution:
         """Return the text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
         if "__" in expression:
             raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
-        functions: dict[str, Any] = {
+        functions: dict[str, object] = {
             "arg": lambda name: convert(self._arg(name), "auto"),
             "env": self._env,
             "optenv": self._optenv,
@@ -128,20 +127,20 @@ class Substitution:
             raise SubstitutionError(f"[{expression}] cannot be evaluated: {why}") from None
 
 
-class _Names(dict[str, Any]):
+class _Names(dict[str, object]):
     """The names of an expression: Python's, those of ``math``, then the args as values."""
 
-    def __init__(self, substitution: Substitution, known: dict[str, Any]) -> None:
+    def __init__(self, substitution: Substitution, known: dict[str, object]) -> None:
         super().__init__(known)
         self._substitution = substitution
 
-    def __missing__(self, name: str) -> Any:
+    def __missing__(self, name: str) -> object:
         if name not in self._substitution.args and name not in self._substitution.unset:
             raise KeyError(name)
         return convert(self._substitution._arg(name), "auto")
 
 
-def convert(text: str, type_: str) -> Any:
+def convert(text: str, type_: str) -> object:
     """Return a parameter's text as a value of ``type_``: str, int, double, bool, yaml, or auto. Raises ValueError."""
     kind = type_.lower()
     if kind in ("", "auto"):
@@ -169,7 +168,7 @@ def convert(text: str, type_: str) -> Any:
     raise ValueError(f"Unknown type '{type_}': there are str, int, double, bool, yaml and auto")
 
 
-def _guess(text: str) -> Any:
+def _guess(text: str) -> object:
     try:
         if "." in text:
             return float(text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from minirospy.launch.spec import NodeSpec
 
@@ -12,7 +11,7 @@ __all__ = ["summary"]
 _LONGEST = 20
 
 
-def summary(nodes: Iterable[NodeSpec], params: Mapping[str, Any], clear: Iterable[str]) -> str:
+def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iterable[str]) -> str:
     """Return the text between SUMMARY and the first process."""
     lines = ["", "SUMMARY", "========", ""]
     cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
@@ -29,7 +28,7 @@ def summary(nodes: Iterable[NodeSpec], params: Mapping[str, Any], clear: Iterabl
     return "\n".join([*lines, ""])
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     text = str(value).strip()
     if "\n" in text:
         return "<...>"

@@ -102,7 +102,7 @@ def _taken(packer: Any) -> bytes:
     return data
 
 
-def unpack(data: bytes) -> Any:
+def unpack(data: bytes) -> object:
     """Return the value that :func:`pack_in_steps` has packed. Raises ValueError."""
     try:
         return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
@@ -114,7 +114,7 @@ def parse_journal(data: bytes) -> Recovered:
     """The records in ``data``, up to the first that is not whole."""
     if not data.startswith(HEAD):
         return Recovered([], 0, "it does not begin as a journal" if data else "it is empty")
-    records: list[list[Any]] = []
+    records: list[list[object]] = []
     at = len(HEAD)
     while at < len(data):
         if len(data) - at < _FRAME.size:
@@ -131,7 +131,7 @@ def parse_journal(data: bytes) -> Recovered:
     return Recovered(records, at, "")
 
 
-def _encode_other(value: Any) -> Any:
+def _encode_other(value: object) -> object:
     if isinstance(value, datetime.datetime):
         return msgpack.ExtType(_DATE, value.isoformat().encode())
     if isinstance(value, DateTime):
@@ -139,7 +139,7 @@ def _encode_other(value: Any) -> Any:
     raise TypeError(f"a journal holds no {type(value).__name__}")
 
 
-def _decode_other(code: int, data: bytes) -> Any:
+def _decode_other(code: int, data: bytes) -> object:
     if code == _DATE:
         return datetime.datetime.fromisoformat(data.decode())
     if code == _DATE_TEXT:
@@ -147,10 +147,10 @@ def _decode_other(code: int, data: bytes) -> Any:
     raise ValueError(f"unknown type {code}")
 
 
-_pack: Callable[[Any], bytes] = msgpack.Packer(default=_encode_other, strict_types=True).pack
+_pack: Callable[[object], bytes] = msgpack.Packer(default=_encode_other, strict_types=True).pack
 
 
-def _unpack(body: bytes) -> Any:
+def _unpack(body: bytes) -> object:
     try:
         return msgpack.unpackb(body, ext_hook=_decode_other, strict_map_key=False)
     except (ValueError, msgpack.UnpackException, TypeError):

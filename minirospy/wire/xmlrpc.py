@@ -385,7 +385,7 @@ def _read_bool(text: str) -> bool:
     return text.strip() == "1"
 
 
-def _read_date(text: str) -> Any:
+def _read_date(text: str) -> object:
     import datetime
 
     try:
@@ -400,7 +400,7 @@ def _read_base64(text: str) -> bytes:
     return base64.b64decode(text)
 
 
-_SCALARS: dict[str, Callable[[str], Any]] = {
+_SCALARS: dict[str, Callable[[str], object]] = {
     "int": int,
     "i4": int,
     "i8": int,
@@ -426,13 +426,13 @@ class Reader:
 
         self.root = ""
         self.method: str | None = None
-        self.params: list[Any] = []
+        self.params: list[object] = []
         self.is_fault = False
         self._errors = (expat.ExpatError, ValueError, LookupError)
         self._text: list[str] = []
-        self._containers: list[list[Any] | dict[str, Any]] = []
+        self._containers: list[list[object] | dict[str, object]] = []
         self._names: list[str] = []
-        self._values: list[list[Any]] = []
+        self._values: list[list[object]] = []
         self._depth = 0
         self._left = _MAX_ELEMENTS
         self._tag = ""

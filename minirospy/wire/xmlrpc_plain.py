@@ -30,7 +30,7 @@ class _Patterns(NamedTuple):
     token: re.Pattern[str]
 
 
-def read_plain(body: bytes | bytearray) -> tuple[str | None, list[Any]] | None:
+def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
     """The method of the call in ``body`` (None: it is an answer), and the parameters; None where it is not plain."""
     try:
         text = body.decode("ascii")
@@ -48,7 +48,7 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[Any]] | None:
     return None if params is None else (head[1], params)
 
 
-def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[Any] | None:
+def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
     """The values that the tokens make up; None where they do not fit each other. Raises ValueError."""
     if tokens and tokens[-1][4] not in {"", "</param>"}:
         # The token of what was not expected is always the last one.
@@ -100,7 +100,7 @@ def _refuse(_: object) -> None:
     raise ValueError("a value in a struct, outside its members")
 
 
-_NUMBERS: dict[str, Callable[[str], Any]] = {
+_NUMBERS: dict[str, Callable[[str], object]] = {
     "<value><in": int,
     "<value><i4": int,
     "<value><bo": "1".__eq__,
