@@ -60,7 +60,7 @@ class Row(NamedTuple):
     answered: bool
 
     def shown(self) -> str:
-        """The row for people."""
+        """Return the row for people."""
         worst = f"{self.worst * 1000:9.1f} ms" if self.answered else "   NO ANSWER"
         return f"{self.attack:{_WIDTH}}  {self.before:6.1f}  {self.height:6.1f}  {self.after:6.1f}  {self.lines:5}  {worst}"
 
@@ -130,12 +130,12 @@ def half_request(port: int, peers: int) -> Iterator[None]:
 
 
 def huge_length(port: int, peers: int) -> Iterator[None]:
-    """A connection header of 2 GiB, as its length says."""
+    """Send the length of a connection header: 2 GiB."""
     yield from _hold(port, peers, b"\xff\xff\xff\x7f" + bytes(10000))
 
 
 def huge_request(port: int, peers: int) -> Iterator[None]:
-    """A good handshake for a service, then a request of 1 GiB, as its length says, of which little comes."""
+    """Do a good handshake for a service, then send the length of a request, 1 GiB, and little of it."""
     header = _header(callerid="/bad", service="/flag", md5sum="*", persistent="1")
     yield from _hold(port, min(peers, 150), header + struct.pack("<I", 2**30 - 1) + bytes(10000))
 
@@ -159,7 +159,7 @@ XMLRPC = (silent, garbage, half_request, slow_readers)
 
 
 def bad_publisher(master: str, frames: bytes) -> Callable[[int, int], Iterator[None]]:
-    """An attack by a publisher of /scan, which sends ``frames`` again and again to whoever connects."""
+    """Return an attack by a publisher of /scan that sends ``frames`` again and again to each subscriber."""
 
     def bad_frames(_: int, __: int) -> Iterator[None]:
         from xmlrpc.server import SimpleXMLRPCServer
@@ -238,7 +238,7 @@ def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, as
 
 
 def ask_node(api: str, service: str) -> None:
-    """A call of its Slave API and one of its service. Raises OSError where there is no good answer."""
+    """Call the node's Slave API and its service once. Raises OSError where there is no good answer."""
     with ServerProxy(api) as proxy:
         proxy.getPid("/good")
     with _connect(port_of(service)) as sock:
@@ -248,12 +248,12 @@ def ask_node(api: str, service: str) -> None:
 
 
 def port_of(uri: str) -> int:
-    """The port in the URI of a node or a service."""
+    """Return the port in the URI of a node or a service."""
     return int(uri.rstrip("/").rsplit(":", 1)[1])
 
 
 def main() -> int:
-    """The benchmark; its exit status."""
+    """Run the benchmark; return the exit status."""
     parser = argparse.ArgumentParser(description="Bad peers against a node and a master.")
     parser.add_argument("--peers", type=int, default=1000, help="connections of each attack (default: 1000)")
     parser.add_argument("--json", action="store_true", help="print a JSON object for each row")

@@ -63,7 +63,7 @@ class Meter:
 
 @contextmanager
 def started(*command: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that ends with the block."""
+    """Run a process that ends with the block."""
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     try:
         yield process
@@ -73,7 +73,7 @@ def started(*command: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def measure_yardsticks(meter: Meter) -> None:
-    """What plain sockets cost."""
+    """Measure plain sockets."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         with started(sys.executable, __file__, "echo", str(port)) as peer:
@@ -106,7 +106,7 @@ def echo(port: str) -> None:
 
 
 def peer() -> None:
-    """The node at the other end."""
+    """Run the node at the other end."""
     import rospy
     from sensor_msgs.msg import Image
     from std_msgs.msg import UInt64
@@ -122,7 +122,7 @@ def peer() -> None:
 
 
 def measure_ours(meter: Meter, others: list[psutil.Process]) -> None:
-    """The cases."""
+    """Measure the cases."""
     import rospy
     from sensor_msgs.msg import Image
     from std_msgs.msg import UInt64

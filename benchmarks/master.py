@@ -96,7 +96,7 @@ class Client:
 
 
 def measure(command: list[str], sizes: list[int], dummy: Dummy) -> dict[str, float]:
-    """The figures of one master."""
+    """Return the measurements of one master."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as home:
@@ -160,7 +160,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
 
 
 def _dead_subscribers(port: int) -> dict[str, float]:
-    """The delay until a live subscriber is told, beside fifty that never answer."""
+    """Return the delay until a live subscriber is notified, with fifty more that never answer."""
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         dead = f"http://127.0.0.1:{silent.getsockname()[1]}/"
         told, live = threading.Event(), Dummy()

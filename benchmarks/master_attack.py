@@ -166,22 +166,22 @@ def wide_characters(target: Target) -> None:
 
 
 def huge_tag(target: Target) -> None:
-    """A tag name of 60 MiB."""
+    """Send a tag name of 60 MiB."""
     target.repeat(post(b"<methodCall><" + b"x" * HUGE))
 
 
 def huge_comment(target: Target) -> None:
-    """An XML comment of 60 MiB, full of what ends a tag."""
+    """Send an XML comment of 60 MiB, full of what ends a tag."""
     target.repeat(post(b"<methodCall><!-- " + b"> " * (HUGE // 2)))
 
 
 def many_calls(target: Target) -> None:
-    """A multicall of 60,000 calls."""
+    """Send a multicall of 60,000 calls."""
     target.repeat(multicall("getPid", ["/bad"], 60_000))
 
 
 def many_sets(target: Target) -> None:
-    """A multicall of 20,000 setParam."""
+    """Send a multicall of 20,000 setParam."""
     calls = [
         {"methodName": "setParam", "params": ["/bad", f"/attack/many/p{number}", number]}
         for number in range(20_000)
@@ -209,14 +209,14 @@ def huge_base64(target: Target) -> None:
 
 
 def huge_number(target: Target) -> None:
-    """An integer of a million digits, and a double of ten million."""
+    """Send an integer of a million digits, and a double of ten million."""
     while not target.is_over:
         target.exchange(valued(b"<int>" + b"9" * 1_000_000 + b"</int>"))
         target.exchange(valued(b"<double>" + b"9" * 10_000_000 + b"</double>"))
 
 
 def deep(target: Target) -> None:
-    """A million arrays inside each other."""
+    """Send a million arrays inside each other."""
     target.repeat(valued(b"<array><data><value>" * 1_000_000))
 
 
@@ -270,7 +270,7 @@ def endless_head(target: Target) -> None:
 
 
 def small_chunks(target: Target) -> None:
-    """A body of ten million chunks of one byte."""
+    """Send a body of ten million chunks of one byte."""
     head = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
     target.repeat(head + b"1\r\nx\r\n" * 10_000_000)
 
@@ -298,7 +298,7 @@ def system_states(target: Target) -> None:
 
 
 def new_addresses(target: Target) -> None:
-    """A node of 20,000 topics that registers again and again from another address."""
+    """Register a node of 20,000 topics again and again from another address."""
     calls = [
         {"methodName": "registerPublisher", "params": ["/bad", f"/attack/n{n}", "a/B", "http://127.0.0.1:9/"]}
         for n in range(20_000)
@@ -313,7 +313,7 @@ def new_addresses(target: Target) -> None:
 
 
 def topic_subscribers(target: Target) -> None:
-    """A topic of 20,000 subscribers at a dead address, and a publisher that comes and goes."""
+    """Register 20,000 subscribers at a dead address, and a publisher that comes and goes."""
     calls = [
         {
             "methodName": "registerSubscriber",
@@ -542,7 +542,7 @@ class Row(NamedTuple):
 
 @contextlib.contextmanager
 def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """A master with its journal, at a free port."""
+    """Run a master with its journal, at a free port."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     environ = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))}

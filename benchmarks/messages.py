@@ -45,7 +45,7 @@ def samples():
 
 
 def seconds(step):
-    """The time that one step takes: the best of five batches."""
+    """Return the time that one step takes: the best of five batches."""
     count = 1
     while True:
         begun = time.perf_counter()
@@ -65,7 +65,7 @@ def seconds(step):
 
 
 def worker():
-    """The times of this process's messages, in microseconds."""
+    """Return the times of this process's messages, in microseconds."""
     figures = {}
     for name, message in samples().items():
         buffer, data_class = io.BytesIO(), type(message)

@@ -72,7 +72,7 @@ class Peers:
                 process.stdout.close()
 
     def start(self, role: str, **options: object) -> Worker:
-        """A worker that has not said anything yet."""
+        """Start a worker, and return before it prints anything."""
         process = subprocess.Popen(
             [self._python, str(WORKER), role, *(f"{name}={value}" for name, value in options.items())],
             env=self._environment,
@@ -90,7 +90,7 @@ class Worker(NamedTuple):
     process: subprocess.Popen[str]
 
     def said(self) -> dict[str, Any]:
-        """The next result that it prints."""
+        """Return the next result that it prints."""
         assert self.process.stdout
         for line in self.process.stdout:
             if line.startswith("{"):
@@ -131,7 +131,7 @@ def measure_round_trip(stack: str) -> Figures:
 
 
 def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str], Figures]:
-    """A measurement of one kind of message to so many listeners."""
+    """Measure one kind of message, to this many listeners."""
     name = f"{kind} to {listeners}" if listeners > 1 else kind
 
     def measure(stack: str) -> Figures:
@@ -226,7 +226,7 @@ def table(medians: dict[str, dict[str, float]]) -> str:
 
 
 def plot(medians: dict[str, dict[str, float]]) -> str:
-    """The ratios as bars, in SVG: rospy is 1."""
+    """Return the ratios as bars, in SVG: rospy is 1."""
     bars = [
         (name, ratio(name, value, medians["rospy"][name]))
         for name, value in medians["minirospy"].items()

@@ -74,7 +74,7 @@ class Churn:
         happens()
 
     def join(self) -> None:
-        """A node starts; perhaps one of its name is there already."""
+        """Start a node; there may be one of its name already."""
         name = f"/robot{self._random.randrange(NAMES)}"
         # Never where it was before: a new process has a new port, here a new path.
         uri = f"http://127.0.0.1:{self._random.choice(self._slaves).port}/{self._random.randrange(10**9)}/"
@@ -89,7 +89,7 @@ class Churn:
             self.leave()
 
     def leave(self) -> None:
-        """A node ends as it should."""
+        """Shut a node down as it should be."""
         if not self._live:
             return
         name = self._random.choice(list(self._live))
@@ -107,7 +107,7 @@ class Churn:
         self.calls += 24
 
     def vanish(self) -> None:
-        """A node is killed: its registrations stay."""
+        """Kill a node: its registrations stay."""
         if self._live:
             self._live.popitem()
 
@@ -127,7 +127,7 @@ class Churn:
         self.call("getParamNames", "/tool")
 
     def hang_up(self) -> None:
-        """A client goes in the middle of a request."""
+        """Disconnect in the middle of a request."""
         with socket.create_connection(("127.0.0.1", self._port)) as sock:
             sock.sendall(b"POST / HTTP/1.1\r\nContent-Length: 100\r\n\r\n<methodCall>")
 

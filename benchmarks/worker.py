@@ -64,7 +64,7 @@ def message_of(kind):
 
 
 def reader_of(kind):
-    """What a callback does with a message."""
+    """Do what a callback does with a message."""
     if kind == "small":
         return lambda message: message.data
     if kind == "scan":
@@ -73,7 +73,7 @@ def reader_of(kind):
 
 
 def talk(options):
-    """Publishes one kind of message: as fast as it can, or ``hz`` times a second."""
+    """Publish one kind of message: as fast as possible, or ``hz`` times a second."""
     import rospy
 
     rospy.init_node("bench_talker")
@@ -100,7 +100,7 @@ def talk(options):
 
 
 def listen(options):
-    """Counts what comes, and how late."""
+    """Count what arrives, and how late."""
     import rospy
 
     rospy.init_node("bench_listener_" + options["id"])
@@ -133,7 +133,7 @@ def listen(options):
 
 
 def echo(_options):
-    """Sends each ping back."""
+    """Send each ping back."""
     import rospy
     from std_msgs.msg import UInt64
 

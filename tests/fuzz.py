@@ -183,7 +183,7 @@ def with_mutations(minutes: float) -> int:
 
 
 def mutated(rng: random.Random, sources: list[bytes]) -> bytes:
-    """A request with some accidents."""
+    """Return a request with some mutations."""
 
     def cut(data: bytes) -> bytes:
         at = rng.randrange(len(data) + 1)

@@ -52,7 +52,7 @@ def run(main: Main) -> None:
 
 @pytest.fixture
 def graph(master: str) -> Iterator[MasterProxy]:
-    """The master, asked from the test's own thread."""
+    """Return a proxy of the master, for the test's own thread."""
     proxy = MasterProxy(master, "/test")
     yield proxy
     proxy.close()

@@ -58,7 +58,7 @@ def imports(path: Path, *, for_types: bool = True) -> set[str]:
 
 
 def graph_of_imports(room: str) -> dict[str, set[str]]:
-    """The modules of a room that each of its modules imports, imports inside functions included, those for types alone not."""
+    """Return the modules of a room that each of its modules imports, functions included, types alone excluded."""
     files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
     modules = {module_name(path): path for path in files}
     found = {module: imports(path, for_types=False) for module, path in modules.items()}

@@ -32,7 +32,7 @@ print(Packages().find_executable("rpi_feros", "led_actuator.py")[1])
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel of this checkout, built as pip builds it, from files under version control alone."""
+    """Build the wheel of this checkout as pip does, from files under version control alone."""
     source = tmp_path_factory.mktemp("source") / "minirospy"
     # What was generated in the checkout stays behind: the build itself must make it.
     left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
@@ -109,7 +109,7 @@ def test_it_works_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
 
 
 def _libraries(folder: Path) -> str:
-    """A folder with minirospy's dependencies, and nothing else of the environment."""
+    """Return a folder with minirospy's dependencies, and nothing else of the environment."""
     libraries = folder / "libraries"
     libraries.mkdir()
     for name in ("yaml", "msgpack", "psutil", "rich"):

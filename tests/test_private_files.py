@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users of Window
 
 @pytest.fixture
 def mine(tmp_path: Path) -> Path:
-    """A file of the user in another folder."""
+    """Return a file of the user in another folder."""
     path = tmp_path / "mine"
     path.write_text("precious")
     return path

@@ -44,7 +44,7 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
 
 
 async def until_person_is(board: Board, wanted: object) -> None:
-    """The news of a move reaches each board on its own connection."""
+    """Wait for the move on each board: each has its own connection."""
     while board.person != wanted:
         await asyncio.sleep(0.005)
 

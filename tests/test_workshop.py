@@ -49,7 +49,7 @@ def board() -> Iterator[Board]:
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Starts `python ARGUMENTS`, as a student does."""
+    """Start `python ARGUMENTS`, as a student does."""
     running: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str | Path) -> subprocess.Popen[str]:

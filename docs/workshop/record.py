@@ -91,7 +91,7 @@ class Step:
 
 
 def steps(page: Path) -> list[Step]:
-    """What a page asks for, in its order."""
+    """Return the steps of a page, in its order."""
     found: list[Step] = []
     lines = iter(enumerate(page.read_text(encoding="utf-8").splitlines(), 1))
     before = ""
@@ -113,7 +113,7 @@ def steps(page: Path) -> list[Step]:
 
 
 def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
-    """The steps of a ```console block that begins in this line."""
+    """Return the steps of a ```console block that starts in this line."""
     terminal = 1
     open_steps: list[Step] = []
     for at, line in enumerate(block, number + 1):
@@ -140,7 +140,7 @@ def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
 
 
 def pattern(answer: tuple[str, ...], *, skip: bool) -> str:
-    """The regular expression of an answer as a page shows it; `skip`: other lines may come first."""
+    """Return the regular expression of an answer as a page shows it; `skip`: other lines may come first."""
     parts = ["(?:.*\n)*?"] if skip else []
     for line in answer:
         if line == "...":
@@ -181,7 +181,7 @@ class Terminal:
         """A program runs, as the page tells it."""
 
     def read(self) -> None:
-        """Takes what lies ready."""
+        """Read what has arrived."""
         try:
             data = os.read(self.fd, 65536)
         except OSError:  # on Linux that is how a terminal ends
@@ -195,7 +195,7 @@ class Terminal:
         self.is_busy = True
 
     def printed(self) -> tuple[str, bool]:
-        """What was printed since the last prompt, and whether the next one has come."""
+        """Return what was printed since the last prompt, and whether the next one has come."""
         text, prompt, _ = self._bytes.decode(errors="replace").partition(self._prompt)
         text = CONTROL.sub("", REDRAWN.sub("\n", text))
         return text + ("\n" if prompt and text and not text.endswith("\n") else ""), bool(prompt)
@@ -207,7 +207,7 @@ class Terminal:
         self.skips = self.is_busy = False
 
     def close(self) -> None:
-        """Ends the shell and what runs in it."""
+        """End the shell and what runs in it."""
         left = psutil.Process(self._bash.pid).children(recursive=True)
         for process in left:
             with contextlib.suppress(psutil.NoSuchProcess):
@@ -241,7 +241,7 @@ class Player:
         self._terminals: dict[int, Terminal] = {}
 
     def play(self, page: Path) -> None:
-        """Does what the page says. Raises CourseError where the answer is another one."""
+        """Do what the page says. Raises CourseError where the answer is another one."""
         self.record.append(f"\n===== {page.name} =====\n")
         try:
             for step in steps(page):
@@ -289,7 +289,7 @@ class Player:
         self.record.append(f"{step.shown}\n{printed}" + ("...\n" if step.answer[-1:] == ("...",) else ""))
 
     def _wait(self, step: Step, deadline: float) -> str:
-        """What the step printed, once it is what the page shows."""
+        """Return what the step printed, once it is what the page shows."""
         terminal = self._terminals[step.terminal]
         leaves = step.answer[-1:] == ("...",)
         expected = pattern(
@@ -316,7 +316,7 @@ class Player:
                 raise self._error(step, f"has printed in {PATIENCE:.0f} s only", text)
 
     def _read(self, deadline: float) -> bool:
-        """Waits until a terminal prints something."""
+        """Wait until a terminal prints something."""
         by_fd = {terminal.fd: terminal for terminal in self._terminals.values()}
         ready, _, _ = select.select(list(by_fd), [], [], max(0.0, deadline - time.monotonic()))
         for fd in ready:

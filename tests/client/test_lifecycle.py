@@ -28,7 +28,7 @@ GUARD = 45.0
 
 
 def read_line(process: subprocess.Popen[str]) -> str:
-    """A line that a program prints. What came with it would be lost to communicate(), so nothing else is read."""
+    """Return a line that a program prints. What came with it would be lost to communicate(), so nothing else is read."""
     assert process.stdout
     line = b""
     while not line.endswith(b"\n") and (byte := os.read(process.stdout.fileno(), 1)):
@@ -37,7 +37,7 @@ def read_line(process: subprocess.Popen[str]) -> str:
 
 
 def start(script: str, *arguments: str) -> subprocess.Popen[str]:
-    """A program that has said "ready"."""
+    """Return a program that has said "ready"."""
     process = subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", script, *arguments],
         stdout=subprocess.PIPE,
@@ -51,7 +51,7 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:
-    """A program's exit status, what it says after the signal, and how long it takes."""
+    """Return a program's exit status, what it says after the signal, and how long it takes."""
     process = start(script)
     # Its input stays open: a program that reads it is to end by the signal.
     open_input, process.stdin = process.stdin, None

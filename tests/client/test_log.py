@@ -13,7 +13,7 @@ pytestmark = pytest.mark.usefixtures("master")
 
 
 def run(program: str, *arguments: str, **environment: str) -> tuple[str, str]:
-    """The stdout and stderr of a program that ends well, without the times in its lines."""
+    """Return the stdout and stderr of a program that ends well, without the times in its lines."""
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments],
         env={**os.environ, "ROSCONSOLE_FORMAT": "[${severity}] ${message}", **environment},

@@ -15,7 +15,7 @@ from minirospy.runtime.transport.loop import LoopThread
 
 @pytest.fixture
 def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
-    """A master of the test's own, whose tables it can look into."""
+    """Return a master of the test's own, whose tables it can look into."""
     loop = LoopThread("test-master")
 
     async def start() -> Master:
@@ -33,7 +33,7 @@ def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
 
 
 def run(program: str) -> list[str]:
-    """The lines of a program that ends well."""
+    """Return the lines of a program that ends well."""
     done = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True,

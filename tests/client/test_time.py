@@ -11,7 +11,7 @@ pytestmark = pytest.mark.usefixtures("master")
 
 
 def run(program: str) -> list[str]:
-    """The lines of a program that ends well, and soon."""
+    """Return the lines of a program that ends well, and soon."""
     done = subprocess.run(
         [sys.executable, "-c", "import rospy, threading\n" + program],
         capture_output=True,

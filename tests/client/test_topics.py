@@ -53,7 +53,7 @@ def start(master: str) -> Iterator[Start]:
 
 
 def finished(program: subprocess.Popen[str]) -> tuple[str, str]:
-    """What a program printed on stdout and on stderr; it ends by itself, with status 0."""
+    """Return what a program printed on stdout and on stderr; it ends by itself, with status 0."""
     output, errors = program.communicate(timeout=30)
     assert program.returncode == 0, errors
     return output, errors

@@ -21,7 +21,7 @@ class Stamped:
 
 
 def reports(counter: TopicStatisticsCounter, hertz: float, seconds: float) -> list[Report]:
-    """The reports on a publisher of so many messages a second."""
+    """Return the reports on a publisher of so many messages a second."""
     times = [int(number / hertz * SECOND) + SECOND for number in range(int(hertz * seconds) + 1)]
     return [report for now in times if (report := counter.count(String(), TALKER, 7, now))]
 

@@ -1,4 +1,6 @@
-"""Write golden.json: what real genpy says of every type in msgs/. Run it with real ROS 1's Python:
+"""Write golden.json: what real genpy makes of every type in msgs/.
+
+Run it with real ROS 1's Python:
 
 /usr/bin/python3 tests/idl/make_golden.py
 

@@ -631,7 +631,7 @@ def compare(
 
 
 def unexpected(rows: Iterable[Row]) -> str:
-    """The rows that differ without a reason, or have a reason and do not differ."""
+    """Return the rows that differ without a reason, or have a reason and do not differ."""
     return "\n".join(
         f"$ {row.typed}   ({row.why or 'no reason known'})\n--- real {row.real}\n--- ours {row.ours}"
         for row in rows
@@ -645,7 +645,7 @@ def other_words(rows: Iterable[Row]) -> set[str]:
 
 
 def page(sections: dict[str, list[Row]]) -> str:
-    """The table as Markdown."""
+    """Return the table as Markdown."""
     rows = [row for section in sections.values() for row in section]
     equal = sum(row.equal for row in rows)
     worded = [row for row in rows if row.has_ros_words]
@@ -670,7 +670,7 @@ def page(sections: dict[str, list[Row]]) -> str:
 
 
 def verdicts(text: str) -> set[tuple[str, bool]]:
-    """What a page says of each line that was typed: whether it is equal."""
+    """Return what a page has for each command line: whether it is equal."""
     rows = re.findall(r"^\| `(.*)` \| .*? \| (equal|\*\*)", text, re.MULTILINE)
     return {(typed, verdict == "equal") for typed, verdict in rows}
 

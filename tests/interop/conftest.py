@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def environment(uri: str, stack: str) -> dict[str, str]:
-    """The process environment for one of STACKS: each finds its own programs and modules first."""
+    """Return the process environment for one of STACKS: each finds its own programs and modules first."""
     path = str(OUR_BIN) if stack == "ours" else str(REAL_BIN)
     return {**os.environ, "ROS_MASTER_URI": uri, "PATH": path + os.pathsep + os.environ["PATH"]}
 
@@ -83,7 +83,7 @@ def answers(uri: str) -> bool:
 
 @contextmanager
 def running_master(stack: str) -> Iterator[str]:
-    """The URI of a fresh master of ``stack``."""
+    """Return the URI of a fresh master of ``stack``."""
     port = free_port()
     uri = f"http://localhost:{port}"
     commands = {
@@ -106,14 +106,14 @@ def running_master(stack: str) -> Iterator[str]:
 
 @pytest.fixture(params=["ours", "rospy"], ids=["our master", "real master"])
 def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
-    """The URI of a fresh master, ours and the real one in turn."""
+    """Return the URI of a fresh master, ours and the real one in turn."""
     with running_master(request.param) as uri:
         yield uri
 
 
 @pytest.fixture
 def real_master() -> Iterator[str]:
-    """The URI of a fresh rosmaster."""
+    """Return the URI of a fresh rosmaster."""
     with running_master("rospy") as uri:
         yield uri
 

@@ -55,7 +55,7 @@ def compile_below(root, target):
 
 
 def load(name, kinds=("msg", "srv")):
-    """The class of ``pkg/Name``: made at run time, or a module's; the parts of a service are found in srv."""
+    """Return the class of ``pkg/Name``: made at run time, or a module's; the parts of a service are found in srv."""
     package, short = name.split("/")
     if name in LOADED:
         return LOADED[name]
@@ -73,7 +73,7 @@ def load(name, kinds=("msg", "srv")):
 
 
 def element(type_, value):
-    """A field's value; what is no plain value of its type stays as it is."""
+    """Return a field's value; what is no plain value of its type stays as it is."""
     if type_ in TIMES and isinstance(value, tuple):
         made = TIMES[type_]()
         made.secs, made.nsecs = value
@@ -84,7 +84,7 @@ def element(type_, value):
 
 
 def build(name, value):
-    """A message from a dictionary of its fields."""
+    """Return a message from a dictionary of its fields."""
     data_class = load(name)
     message = data_class()
     types = dict(zip(data_class.__slots__, data_class._slot_types, strict=True))
@@ -102,7 +102,7 @@ def packed(message):
 
 
 def described(data_class):
-    """What must be equal of two classes of one type."""
+    """Return what must be equal of two classes of one type."""
     if hasattr(data_class, "_request_class"):
         return {"type": data_class._type, "md5sum": data_class._md5sum}
     return {
@@ -124,7 +124,7 @@ def described(data_class):
 
 
 def describe(argument):
-    """What each type's class says, of the modules of these kinds ("msg", "srv")."""
+    """Return the facts of each type's class, of the modules of these kinds ("msg", "srv")."""
     names, kinds = argument
     return {name: described(load(name, kinds)) for name in names}
 
@@ -138,19 +138,19 @@ def dynamic(argument):
 
 
 def exchange(argument):
-    """A value's bytes, and what comes of other bytes: themselves again, and the text."""
+    """Return a value's bytes, and what comes of other bytes: themselves again, and the text."""
     name, value, data = argument
     again = load(name)().deserialize(data)
     return packed(build(name, value)), packed(again), genpy.message.strify_message(again)
 
 
 def serialize(argument):
-    """A value's bytes."""
+    """Return a value's bytes."""
     return packed(build(*argument))
 
 
 def text(argument):
-    """A value as text, with the options of strify_message."""
+    """Return a value as text, with the options of strify_message."""
     name, value, options = argument
     if "time_offset" in options:
         options["time_offset"] = genpy.Time(*options["time_offset"])
@@ -161,7 +161,7 @@ def text(argument):
 
 
 def fill(argument):
-    """The bytes of a message that was filled from YAML."""
+    """Return the bytes of a message that was filled from YAML."""
     name, source, words = argument
     message = load(name)()
     keys = {word: genpy.Time(*value) for word, value in words.items()}

@@ -43,7 +43,7 @@ for line in sys.stdin:
 
 @pytest.fixture
 def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
-    """The peer's process under real rospy; it ends with the test."""
+    """Start the peer under real rospy; it ends with the test."""
     environment = {**os.environ, "ROS_MASTER_URI": any_master}
     program = subprocess.Popen(
         ["/usr/bin/python3", "-c", PEER],

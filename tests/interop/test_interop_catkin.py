@@ -212,7 +212,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
 
 @pytest.fixture(scope="module")
 def trees(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """The tree as real catkin_make built it, and as ours did."""
+    """Return the tree as real catkin_make built it, and as ours did."""
     if not Path("/usr/bin/catkin_make").exists():
         pytest.fail("real catkin_make is not installed: tests/interop/install_ros.sh")
     real, ours = (tmp_path_factory.mktemp(name) for name in ("real", "ours"))
@@ -249,7 +249,7 @@ NOT_COMPARED = (
 
 
 def files(folder: Path) -> dict[str, bool]:
-    """The files below a folder that programs of Python need, and whether they are executable."""
+    """Return the files below a folder that programs of Python need, and whether they are executable."""
     return {
         path.relative_to(folder).as_posix(): os.access(path, os.X_OK)
         for path in sorted(folder.rglob("*"))

@@ -42,7 +42,7 @@ _LINES = (
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package with a program and two launch files; the current folder has two files."""
+    """Return a package with a program and two launch files; the current folder has two files."""
     package = tmp_path / "src" / "my_robot"
     for name, text in {
         "scripts/talker.py": "#!/usr/bin/env python3\n",
@@ -63,7 +63,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def uri(workspace: None) -> Iterator[str]:
-    """The URI of a master, where /robot publishes, serves and has parameters."""
+    """Return the URI of a master, where /robot publishes, serves and has parameters."""
     with running_master("ours") as uri:
         node = start([REAL_PYTHON, "-c", _NODE], uri, "rospy")
         try:

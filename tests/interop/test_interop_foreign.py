@@ -34,7 +34,7 @@ SCAN = {"frame": "zażółć", "ranges": [0.5, 1.5, 2.5], "range_max": 40.5}
 
 @pytest.fixture(scope="session")
 def modules() -> Path:
-    """The folder node_modules with both clients."""
+    """Return the folder node_modules with both clients."""
     npm = shutil.which("npm")
     if not npm or not shutil.which("node"):
         pytest.skip(
@@ -80,12 +80,12 @@ class Peer:
         return cls(process)
 
     async def line(self) -> str:
-        """The next line."""
+        """Return the next line."""
         assert self._process.stdout
         return (await asyncio.wait_for(self._process.stdout.readline(), 40)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
-        """What it says, now or before, of ``what``."""
+        """Return what it prints, now or before, about ``what``."""
         while not self.said.get(what):
             line = await self.line()
             assert line, f"it ended without {what}: {self.said}"
@@ -118,20 +118,20 @@ def scan() -> LaserScan:
 
 
 async def offer(node: Node) -> None:
-    """What a foreign node finds of ours."""
+    """Check what a foreign node finds of ours."""
     await (await node.advertise("/ours/scan", LaserScan, latch=True)).publish(scan())
     await node.set_param("/ours/param", {"list": [1, "two", 3.5], "flag": True})
 
 
 async def check_scan(node: Node) -> None:
-    """The foreign node's scan has come as it was sent."""
+    """Check that the foreign node's scan has arrived as it was sent."""
     got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=40)
     assert (got.header.frame_id, list(got.ranges), got.range_max) == tuple(SCAN.values())
     assert got.header.stamp == Time(1234567890, 987654321)
 
 
 async def check_beats(node: Node, peer: Peer) -> None:
-    """A stream of ours arrives whole and in order."""
+    """Check that a stream of ours arrives whole and in order."""
     beats = await node.advertise("/ours/beat", Int32, queue_size=0)
     await beats.wait_for_subscribers(timeout=40)
     for number in range(100):

@@ -64,7 +64,7 @@ class Peer:
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def ask(self, command: str, argument: Any) -> Any:
-        """The answer of one of genpy_peer's commands. Raises RealError."""
+        """Return the answer of one of genpy_peer's commands. Raises RealError."""
         assert self._program.stdin
         assert self._program.stdout
         request = pickle.dumps((command, argument))
@@ -113,13 +113,13 @@ class Ours:
         self._classes: dict[str, Any] = {}
 
     def load(self, name: str) -> Any:
-        """The class of ``pkg/Name``, made of its spec."""
+        """Return the class of ``pkg/Name``, made of its spec."""
         if name not in self._classes:
             self._classes[name] = class_from_text(name, full_text(self.lookup(name), self.lookup))
         return self._classes[name]
 
     def build(self, name: str, value: Plain) -> Any:
-        """A message from a dictionary of its fields."""
+        """Return a message from a dictionary of its fields."""
         data_class = self.load(name)
         message = data_class()
         types = dict(zip(data_class.__slots__, data_class._slot_types, strict=True))
@@ -162,7 +162,7 @@ def packed(message: Any) -> bytes:
 
 
 def described(data_class: Any) -> dict[str, Any]:
-    """What must be equal of two classes of one type; as in genpy_peer.py."""
+    """Return what must be equal of two classes of one type; as in genpy_peer.py."""
     return {
         "type": data_class._type,
         "md5sum": data_class._md5sum,
@@ -372,7 +372,7 @@ def test_options_of_the_text(real: Callable[[str], Peer], options: dict[str, Any
 
 
 def text_of(main: str, **others: str) -> str:
-    """A full text of odd_msgs/Odd, with other messages of odd_msgs."""
+    """Return a full text of odd_msgs/Odd, with other messages of odd_msgs."""
     parts = [main, *(f"MSG: {name.replace('__', '/')}\n{text}" for name, text in others.items())]
     return f"\n{SEPARATOR}\n".join(parts)
 
@@ -689,7 +689,7 @@ def test_wrong_values_that_only_ours_names(
 
 
 def plain_value(spec: MessageSpec, lookup: Lookup) -> Plain:
-    """A value with something in every field."""
+    """Return a value with something in every field."""
     one = {"string": "ab", "time": (1, 2), "duration": (1, 2), "bool": True, "float32": 1.5, "float64": 1.5}
     value: Plain = {}
     for name, type_ in spec.fields:

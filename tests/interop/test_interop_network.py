@@ -50,7 +50,7 @@ class Network:
         sh(f"ip -n {self.names[machine]} {command}")
 
     def build(self) -> None:
-        """Raises CalledProcessError where this is not permitted."""
+        """Make the machines. Raises CalledProcessError where this is not permitted."""
         for name in self.names.values():
             sh(f"ip netns add {name}")
         for machine, at, address, address6 in (("alpha", "va", ALPHA, ALPHA6), ("beta", "vb", BETA, BETA6)):
@@ -116,7 +116,7 @@ class Network:
         return self.start(machine, words, **variables)
 
     def doctor(self, machine: str, *others: str, **variables: str) -> list[str]:
-        """What `minirospy doctor` says there."""
+        """Return what `minirospy doctor` prints there."""
         words = [str(OUR_BIN / "minirospy"), "doctor", *others]
         return self.start(machine, words, **variables).lines_until_end(20)
 
@@ -127,7 +127,7 @@ class Network:
 
     @contextmanager
     def firewall(self, rule: str) -> Iterator[None]:
-        """The router drops what a rule of `ip rule` names: `to ADDRESS ipproto tcp dport 1-5`."""
+        """Have the router drop what a rule of `ip rule` names: `to ADDRESS ipproto tcp dport 1-5`."""
         self.ip("router", f"rule add {rule} blackhole")
         try:
             yield
@@ -153,7 +153,7 @@ class Program:
         self._reader.start()
 
     def wait_for(self, text: str, timeout: float = 40.0) -> str:
-        """The next line with ``text`` in it."""
+        """Return the next line with ``text`` in it."""
         end = time.monotonic() + timeout
         while True:
             try:
@@ -199,7 +199,7 @@ class Program:
 
 @pytest.fixture(scope="module")
 def built() -> Iterator[Network]:
-    """The machines; where they cannot be made, the tests say so and are skipped."""
+    """Return the machines; where they cannot be made, the tests are skipped with the reason."""
     network = Network()
     why: object = "there is no `ip` (apt-get install iproute2)" if shutil.which("ip") is None else ""
     try:
@@ -216,14 +216,14 @@ def built() -> Iterator[Network]:
 
 @pytest.fixture
 def network(built: Network) -> Iterator[Network]:
-    """The machines, without programs."""
+    """Return the machines, without programs."""
     built.running = ExitStack()
     yield built
     built.running.close()
 
 
 def start_master(network: Network, machine: str = "alpha", stack: str = "ours", **variables: str) -> Program:
-    """A master there, which is running when this returns."""
+    """Start a master there, and return when it runs."""
     if stack == "ours":
         master = network.start(
             machine, [str(OUR_BIN / "roscore"), "-p", str(PORT), "--no-journal"], **variables

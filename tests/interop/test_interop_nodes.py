@@ -13,7 +13,7 @@ PAIRS = [("ours", "rospy"), ("rospy", "ours"), ("ours", "roscpp"), ("roscpp", "o
 
 
 def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
-    """What a peer prints before its line "ready"."""
+    """Return what a peer prints before its line "ready"."""
     assert program.stdout
     lines = []
     for line in program.stdout:

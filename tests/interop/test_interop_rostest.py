@@ -48,7 +48,7 @@ class Ran:
         )
 
     def end(self) -> tuple[int, str]:
-        """The exit status, and what was printed, without what no two runs have in common."""
+        """Return the exit status, and what was printed, without what no two runs have in common."""
         if not self._popen.stdout.closed:  # type: ignore[union-attr]
             self._out = self._popen.communicate(timeout=120)[0].replace(str(self.home), "HOME")
         return self._popen.returncode, self._out
@@ -78,7 +78,7 @@ def both(tmp_path: Path, *command: str) -> tuple[Ran, Ran]:
 
 
 def summary(text: str) -> list[str]:
-    """The lines that say how it went: without tracebacks, and the files of the log."""
+    """Return the lines that say how it went: without tracebacks, and the files of the log."""
     wanted = re.compile(r"\[Testcase:|\[\w+\]-|\[[\w./-]+\]\[|SUMMARY|.*\* |ERROR: The following")
     return [line.rstrip("-") for line in text.splitlines() if wanted.match(line)]
 

@@ -24,7 +24,7 @@ rospy.spin()
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package with programs, and a log folder."""
+    """Return a package with programs, and a log folder."""
     package = tmp_path / "src" / "my"
     for name, text in {
         "scripts/status": '#!/bin/sh\necho "$@"\nexit 7\n',
@@ -47,7 +47,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tuple[int, str]:
-    """The exit status of a command, and what it prints on standard output."""
+    """Return the exit status of a command, and what it prints on standard output."""
     done = subprocess.run(
         [str(path / program), *words], input=stdin, capture_output=True, text=True, timeout=30, check=False,
         env={**os.environ, "PYTHONWARNINGS": "ignore"},
@@ -56,7 +56,7 @@ def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tup
 
 
 def both(program: str, *words: str, stdin: str = "") -> tuple[tuple[int, str], tuple[int, str]]:
-    """The same from ours and from the real one."""
+    """Return the same from ours and from the real one."""
     ours, real = (run(program, *words, stdin=stdin, path=path) for path in (OUR_BIN, REAL_BIN))
     return ours, real
 
@@ -124,7 +124,7 @@ def test_rosclean(workspace: Path) -> None:
 
 @pytest.fixture
 def talker(real_master: str) -> Iterator[str]:
-    """A node of real rospy."""
+    """Start a node of real rospy."""
     with subprocess.Popen(
         [REAL_PYTHON, "-c", _NODE], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
         env={**os.environ, "ROS_MASTER_URI": real_master, "PYTHONWARNINGS": "ignore"},

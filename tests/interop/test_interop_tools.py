@@ -61,7 +61,7 @@ rostopic echo -n1 -p /scan
 
 @pytest.fixture
 def scene(request: pytest.FixtureRequest, any_master: str) -> Iterator[str]:
-    """The URI of a master with the scene on it, a node of the stack that the test's parameter says."""
+    """Return the URI of a master with the scene on it, a node of the stack that the test's parameter says."""
     python = "/usr/bin/python3" if request.param == "rospy" else sys.executable
     program = subprocess.Popen(
         [python, str(HERE / "scene.py")], env=_environment(any_master), stdout=subprocess.PIPE, text=True
@@ -175,7 +175,7 @@ def _start(uri: str, tools: Path, words: list[str]) -> subprocess.Popen[str]:
 
 
 def _run(uri: str, tools: Path, line: str) -> str:
-    """What a tool prints on standard output."""
+    """Return what a tool prints on standard output."""
     return _start(uri, tools, shlex.split(line)).communicate(timeout=30)[0]
 
 

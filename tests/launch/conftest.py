@@ -33,7 +33,7 @@ sys.exit(int(sys.argv[1]))
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of package ``pkg``: wait.py waits, stop.py ends with the status in its first argument."""
+    """Return the folder of package ``pkg``: wait.py waits, stop.py ends with the status in its first argument."""
     folder = tmp_path / "pkg"
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
@@ -50,7 +50,7 @@ class Running:
         self.process = process
 
     def read_until(self, *words: str) -> str:
-        """What is printed until all of ``words`` were."""
+        """Return what is printed until all of ``words`` were."""
         assert self.process.stdout
         said = ""
         for line in self.process.stdout:
@@ -70,7 +70,7 @@ Start = Callable[..., Running]
 
 @pytest.fixture
 def start(package: Path) -> Iterator[Start]:
-    """Starts roslaunch on the text of a launch file, with options."""
+    """Start roslaunch on the text of a launch file, with options."""
     running: list[Running] = []
 
     def start(text: str, *options: str) -> Running:

@@ -13,7 +13,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 @pytest.fixture
 def files(package: Path) -> Path:
-    """A file that includes one of another package, which runs nodes of two."""
+    """Return a file that includes one of another package, which runs nodes of two."""
     other = package.parent / "other"
     other.mkdir()
     (other / "package.xml").write_text("<package><name>other</name><run_depend>pkg</run_depend></package>")

@@ -172,7 +172,7 @@ def test_rosparam_commands_come_before_the_parameters(start: Start, master: str,
 
 @pytest.fixture
 def ssh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An ssh that runs here what it is to run there, and writes down how it was called."""
+    """Return an ssh that runs here what it is to run there, and writes down how it was called."""
     folder = tmp_path / "bin"
     folder.mkdir()
     said = tmp_path / "ssh-said"

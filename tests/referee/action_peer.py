@@ -28,7 +28,7 @@ def name_of(status):
 
 
 def mask(text):
-    """A text without the times in it."""
+    """Return a text without the times in it."""
     text = _STAMP.sub("stamp: <stamp>", _ID.sub(r"\1-\2-<stamp>", text))
     return re.sub(r"<bound method (\S+) of .*?>>", r"\1", text)
 
@@ -48,14 +48,14 @@ class Story:
         logger.setLevel(level)
 
     def say(self, *values):
-        """A callback tells of its call."""
+        """Return a callback that prints its call."""
         with self._changed:
             self._lines.append(" ".join(map(str, values)))
             self._said += 1
             self._changed.notify_all()
 
     def log(self, *values):
-        """A line of the log."""
+        """Print a line of the log."""
         with self._changed:
             self._lines.append(" ".join(map(str, values)))
             self._changed.notify_all()

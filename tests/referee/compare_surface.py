@@ -210,7 +210,7 @@ Description = dict[str, dict[str, Any]]
 
 
 def describe() -> Description:
-    """Module -> name -> its home module and what it is, for the rospy of this interpreter."""
+    """Return module -> name -> its home module and what it is, for the rospy of this interpreter."""
     return {
         module: {
             name: value
@@ -222,7 +222,7 @@ def describe() -> Description:
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """What there is to compare of a value; None of one that is not rospy's own."""
+    """Return what there is to compare of a value; None of one that is not rospy's own."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
@@ -262,7 +262,7 @@ def shown_default(default: Any) -> str:
 
 
 def compare(real: Any, ours: Any) -> str:
-    """same; wider: every call that real rospy takes, ours takes too; differs."""
+    """Return one of: same; wider (ours takes every call that real rospy takes); differs."""
     if real == ours or real is None:
         return "same"
     if not isinstance(real, list) or not isinstance(ours, list):
@@ -277,7 +277,7 @@ def compare(real: Any, ours: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """A signature as it is written."""
+    """Return a signature as it is written."""
     if not isinstance(value, list):
         return "" if value is None else str(value)
     stars = {"VAR_POSITIONAL": "*", "VAR_KEYWORD": "**"}
@@ -330,7 +330,7 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
 
 
 def page(title: str, modules: list[str], real: Description, ours: Description) -> str:
-    """A page's text."""
+    """Return a page's text."""
     tables, counts = [], Counter[str]()
     for module in modules:
         rows = rows_of(module, real[module], ours[module])

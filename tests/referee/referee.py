@@ -83,7 +83,7 @@ class Other:
         )
 
     def read(self) -> str:
-        """The next line that it prints."""
+        """Return the next line that it prints."""
         assert self.process.stdout
         return self.process.stdout.readline().rstrip("\n")
 
@@ -106,7 +106,7 @@ class Other:
 
 
 def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
-    """What ``look()`` finds, at the first of ten looks where all of it is true.
+    """Return what ``look()`` finds, at the first of ten looks where all of it is true.
 
     For what takes a certain time: on a machine that stands still now and then it takes longer, but not ten times.
     """

@@ -13,7 +13,7 @@ CASES = sorted(path.stem for path in (HERE / "cases").glob("*.py"))
 
 
 def run_case(name: str, python: str, uri: str, home: Path) -> str:
-    """What a case prints on stdout, and its exit status as the last line. Its stderr is shown where it fails."""
+    """Return what a case prints on stdout, and its exit status as the last line. Its stderr is shown where it fails."""
     environment = {
         key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))
     }
@@ -40,7 +40,7 @@ def run_case(name: str, python: str, uri: str, home: Path) -> str:
 
 
 def differences(said: str, expected: str) -> str:
-    """The lines in which two outputs differ, whatever the Python; nothing where they are the same."""
+    """Return the lines in which two outputs differ, whatever the Python; nothing where they are the same."""
     lines, others = (_as_every_python(text).splitlines() for text in (said, expected))
     return "\n".join(difflib.unified_diff(others, lines, "expected", "said", lineterm="", n=1))
 

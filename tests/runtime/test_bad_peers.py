@@ -33,7 +33,7 @@ def bad_peers() -> ModuleType:
 
 @pytest.fixture
 def victim(master: str, bad_peers: ModuleType) -> Iterator[tuple[object, str, str]]:
-    """The node, and where its XML-RPC API and its services are."""
+    """Return the node, and where its XML-RPC API and its services are."""
     node = bad_peers.Victim([sys.executable, "-c", bad_peers.NODE], dict(os.environ), "ready")
     with ServerProxy(master) as proxy:
         api, service = proxy.lookupNode("/test", "/victim"), proxy.lookupService("/test", "/flag")

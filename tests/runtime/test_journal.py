@@ -84,7 +84,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def state() -> list[list[Any]]:
-    """The records of the present state."""
+    """Return the records of the present state."""
     return [["set", "/", {"a": 1}]]
 
 
@@ -251,13 +251,13 @@ def test_large_journal_is_rewritten_at_four_times_what_it_holds(
 
 @pytest.fixture
 def steps() -> list[Steps[None]]:
-    """The work that a journal hands over to be done in steps."""
+    """Return the work that a journal hands over to be done in steps."""
     return []
 
 
 @pytest.fixture
 def stepping(path: Path, state: list[list[Any]], clock: Clock, steps: list[Steps[None]]) -> Iterator[Journal]:
-    """A journal that has grown so much that it is to be rewritten."""
+    """Return a journal that has grown so much that it is to be rewritten."""
     journal = Journal(path, lambda: iter(list(state)), clock, steps.append)
     journal.start()
     journal.append("set", "/p", "x" * MIB)

@@ -45,7 +45,7 @@ def loop() -> Iterator[LoopThread]:
 def subscriber(
     loop: LoopThread, publication: Publication
 ) -> Iterator[tuple[Callable[[], None], socket.socket]]:
-    """A function that has a subscriber join, and the socket that it reads."""
+    """Return a function that has a subscriber join, and the socket that it reads."""
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     fields = {"callerid": "/s", "topic": "/t", "type": STRING.name, "md5sum": STRING.md5sum}

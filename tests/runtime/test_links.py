@@ -257,7 +257,7 @@ def test_a_reader_that_looked_in_vain_or_waited_for_the_interpreter_falls_asleep
 
 
 def image(array: bytes) -> LargeFrame:
-    """A message that ends with a byte array, as its class writes it."""
+    """Return a message that ends with a byte array, as its class writes it."""
     pieces = Pieces()
     pieces.write(b"head")
     pieces.write(struct.pack("<BI", 7, len(array)))

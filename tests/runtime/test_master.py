@@ -36,7 +36,7 @@ def referee() -> Any:
 
 
 def plain(value: Any) -> Any:
-    """An answer as JSON can hold it."""
+    """Return an answer as JSON can hold it."""
     match value:
         case Binary():
             return {"binary": value.data.hex()}
@@ -50,7 +50,7 @@ def plain(value: Any) -> Any:
 
 
 def answers(uri: str) -> list[Any]:
-    """The answer to each call; what differs by process is blanked."""
+    """Return the answer to each call; what differs by process is blanked."""
     found: list[Any] = []
     with ServerProxy(uri) as proxy:
         for method, *args in referee().CALLS:
@@ -65,7 +65,7 @@ def answers(uri: str) -> list[Any]:
 
 
 def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]]:
-    """What the nodes of SCENE are told after each call, sorted; ``expected`` says for how many to wait."""
+    """Return what the nodes of SCENE are told after each call, sorted; ``expected`` says for how many to wait."""
     nodes = [Slave(), Slave()]
     found: list[list[Any]] = []
 

@@ -172,7 +172,7 @@ def result_of(answer: Any) -> Any:
 
 
 def exchange(uri: str, data: bytes) -> bytes:
-    """What the master answers until it hangs up, or until the answer is whole."""
+    """Return what the master answers until it hangs up, or until the answer is whole."""
     port = int(uri.rsplit(":", 1)[1])
     with socket.create_connection(("127.0.0.1", port), 20) as sock:
         sock.sendall(data)

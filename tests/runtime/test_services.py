@@ -172,7 +172,7 @@ Serve = Callable[[bytes], str]
 
 @pytest.fixture
 def liar() -> Iterator[Serve]:
-    """A server that answers a connection with given bytes and hangs up; its URI."""
+    """Return a server that answers a connection with given bytes and hangs up; its URI."""
     threads: list[threading.Thread] = []
 
     def serve(answer: bytes) -> str:

@@ -94,7 +94,7 @@ def test_localhost_is_ipv4_or_ipv6() -> None:
 
 
 async def serve(received: list[dict[str, str]]) -> tcp.Listener:
-    """A listener that keeps the headers that it receives, and answers each."""
+    """Return a listener that keeps the headers that it receives, and answers each."""
 
     async def accept(sock: socket.socket, _address: str) -> None:
         received.append(await tcp.receive_header(sock))
@@ -107,7 +107,7 @@ async def serve(received: list[dict[str, str]]) -> tcp.Listener:
 
 
 async def greet(port: int) -> dict[str, str]:
-    """What a good client is answered."""
+    """Return what a good client is answered."""
     sock = await tcp.connect("127.0.0.1", port)
     try:
         await tcp.send_header(sock, {"callerid": "/good"})

@@ -32,7 +32,7 @@ LARGE = 60_000_000
 
 @pytest.fixture(autouse=True)
 def _tcp_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Connections are counted here, and none of them comes by a Unix socket."""
+    """Connect by TCP alone: connections are counted here."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", "tcp")
 
 
@@ -57,7 +57,7 @@ def call(text: str) -> bytes:
 
 @contextlib.asynccontextmanager
 async def served() -> AsyncIterator[tuple[RpcServer, socket.socket]]:
-    """A server whose every answer is large, and the socket of a client."""
+    """Return a server whose every answer is large, and the socket of a client."""
 
     def answer(method: str, args: Sequence[Any]) -> str:
         return "x" * LARGE

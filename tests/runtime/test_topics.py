@@ -135,7 +135,7 @@ async def subscribe_to(
     node: Node,
     deliver: Callable[[memoryview, Header], None],
 ) -> Subscription:
-    """A subscription that the master told of one publisher, which ``foreign`` plays."""
+    """Return a subscription that the master told of one publisher, which ``foreign`` plays."""
     subscription = node.make_subscription("/t", STRING, deliver)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
@@ -346,7 +346,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
 
 
 async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
-    """A connection that has sent a subscriber's header for /t and received the answer, and reads no more."""
+    """Return a connection that has sent a subscriber's header for /t and received the answer, and reads no more."""
     sock = await tcp.connect("127.0.0.1", node.tcpros_port)
     fields = {"topic": "/t", "md5sum": STRING.md5sum, "type": STRING.name, "callerid": "/raw", **changes}
     await tcp.send_header(sock, fields)
@@ -497,7 +497,7 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
 
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
-    """What a node asks its master comes late, where the method's name begins so, and is not taken back."""
+    """Return what a node asks its master comes late, where the method's name begins so, and is not taken back."""
     ask = node.master
 
     async def ask_late(method: str, *args: Any) -> Any:

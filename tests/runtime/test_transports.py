@@ -227,7 +227,7 @@ OWN = f"test-{os.getpid()}"
 
 
 def program(text: str, **environment: str) -> str:
-    """What a program prints."""
+    """Return what a program prints."""
     return subprocess.run(
         [sys.executable, "-c", text],
         env={**os.environ, **environment},
@@ -520,7 +520,7 @@ def test_the_environment_names_a_transport_that_there_is() -> None:
 
 
 def _received_before_the_header(sock: socket.socket) -> bytes:
-    """What a client of "/s" sends behind its header before it gets one, within a moment or the request's length."""
+    """Return what a client of "/s" sends behind its header before it gets one, within a moment or the request's length."""
     header = serialize_header(service_client_header("/s", "*", "/c"))
     got = b""
     sock.settimeout(0.2)

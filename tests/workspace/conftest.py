@@ -68,5 +68,5 @@ class Scene:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
-    """An empty workspace, in a folder whose name has a blank."""
+    """Return an empty workspace, in a folder whose name has a blank."""
     return Scene(tmp_path / "my ws")

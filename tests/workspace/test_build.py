@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def python(scene: Scene, code: str) -> str:
-    """What a program prints that sees the workspace."""
+    """Return what a program prints that sees the workspace."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "PYTHONPATH": str(scene.modules)},

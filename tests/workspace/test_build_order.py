@@ -12,7 +12,7 @@ from minirospy.workspace.manifest import Manifest, parse_manifest
 
 
 def manifest(name: str, *tags: str) -> Manifest:
-    """A package.xml of format 2; a tag is like ``exec:other`` for ``<exec_depend>other</exec_depend>``."""
+    """Return a package.xml of format 2; a tag is like ``exec:other`` for ``<exec_depend>other</exec_depend>``."""
     needs = [
         (f"{kind}_depend".strip("_"), other)
         for kind, _, other in (tag.partition(":") for tag in tags)

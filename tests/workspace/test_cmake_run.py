@@ -19,7 +19,7 @@ def run(folder: Path, text: str, **variables: str) -> list[Command]:
 
 
 def said(folder: Path, text: str, **variables: str) -> list[str]:
-    """The arguments of each `f(...)` that is run, in one text."""
+    """Return the arguments of each `f(...)` that is run, in one text."""
     return [" ".join(each.arguments) for each in run(folder, text, **variables) if each.name == "f"]
 
 

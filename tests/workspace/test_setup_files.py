@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells of Unix"
 
 
 def run(shell: str, script: str, home: Path, **variables: str) -> str:
-    """What a shell prints; it must be silent on stderr."""
+    """Return what a shell prints; it must be silent on stderr."""
     program = shutil.which(shell)
     if program is None:
         pytest.skip(f"no {shell} here")
@@ -43,7 +43,7 @@ def run(shell: str, script: str, home: Path, **variables: str) -> str:
 
 
 def variables(shell: str, script: str, home: Path, **given: str) -> dict[str, str]:
-    """The variables after a script."""
+    """Return the variables after a script."""
     said = run(shell, f"{script}\nenv", home, **given)
     found = dict(line.split("=", 1) for line in said.splitlines() if "=" in line)
     return {name: found[name] for name in NAMES if name in found}

@@ -287,7 +287,7 @@ def test_the_stack_has_no_such_number(shell: Shell) -> None:
 
 
 def bash_tab(bash: Shell, line: str, words: list[str] | None = None, at: int | None = None) -> list[str]:
-    """What bash is given for a TAB at the end of ``line``, or ``at``; ``words``: as bash takes it apart."""
+    """Return what bash is given for a TAB at the end of ``line``, or ``at``; ``words``: as bash takes it apart."""
     words = line.split(" ") if words is None else words
     current = len(words if at is None else line[:at].split(" ")) - 1
     done = bash.run(

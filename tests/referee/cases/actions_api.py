@@ -34,7 +34,7 @@ for module, names in MODULES.items():
 
 
 def parameters(function):
-    """The parameters without their types."""
+    """Return the parameters without their types."""
     return [
         (p.name, p.kind.name)
         + ((repr(p.default),) if p.default is not p.empty and not callable(p.default) else ())

@@ -11,7 +11,7 @@ VALUES = (None, "", "a", "/a", "~a", "a b", "-a:=b", "~a:=b", 5, b"/a")
 
 
 def result(function, *arguments):
-    """What a call gives, or the type of what it raises; what is false is False."""
+    """Return what a call gives, or the type of what it raises; what is false is False."""
     try:
         return repr(function(*arguments) or False)
     except (TypeError, AttributeError):

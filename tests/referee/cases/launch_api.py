@@ -60,7 +60,7 @@ def tell(*values):
 
 
 def waits(count):
-    """That `count` programs more are at work."""
+    """Wait until `count` programs more are at work."""
     seen = eventually(lambda: os.path.isfile(MARK) and os.path.getsize(MARK) == count)
     os.unlink(MARK)
     return seen

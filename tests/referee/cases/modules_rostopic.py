@@ -15,7 +15,7 @@ from std_msgs.msg import Bool, Float32, Header, String
 
 
 def printed(label, call):
-    """A measured number differs each time."""
+    """Mask a measured number, which differs each time."""
     printed_exactly(label, call, (r"\d+\.\d+(e-\d+)?", "<n>"))
 
 

@@ -20,7 +20,7 @@ def field(text):
 
 
 def good():
-    """What a good subscriber receives."""
+    """Return what a good subscriber receives."""
     with socket.create_connection((host, port), 10) as sock:
         body = b"".join(
             field(t) for t in (b"topic=/told", b"md5sum=" + String._md5sum.encode(), b"callerid=/raw")

@@ -32,7 +32,7 @@ def receive(sock, count):
 
 
 def answer(sock):
-    """The fields of a header that comes."""
+    """Return the fields of a header that comes."""
     body = receive(sock, struct.unpack("<I", receive(sock, 4))[0])
     fields = {}
     while body:

@@ -47,7 +47,7 @@ class Listener(rospy.SubscribeListener):
 
 
 def show_heard():
-    """What the listener has heard, which is told in a thread of its own."""
+    """Return what the listener has received, in a thread of its own."""
     eventually(lambda: heard)
     show(*heard.pop())
 

@@ -20,7 +20,7 @@ sys.stdin.read()
 
 
 def listener(topic):
-    """A node that prints what it hears on a topic."""
+    """Start a node that prints what it receives on a topic."""
     other = Other(LISTENER, topic)
     assert other.read() == "ready"
     return other

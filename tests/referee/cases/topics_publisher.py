@@ -20,7 +20,7 @@ def warned(label, call):
 
 
 def made(*args, **kwds):
-    """A Publisher, as what of it can be shown."""
+    """Return a Publisher, as what of it can be shown."""
     publisher = rospy.Publisher(*args, **kwds)
     shown = (publisher.name, publisher.resolved_name, publisher.type, publisher.md5sum, publisher.reg_type)
     publisher.unregister()

@@ -62,7 +62,7 @@ def wrong():
 
 
 def kind(call):
-    """The type of what a call raises; the texts are those of Python's struct module."""
+    """Return the type of what a call raises; the texts are those of Python's struct module."""
     try:
         call()
     except Exception as error:  # noqa: BLE001

@@ -32,7 +32,7 @@ def found_in(report):
 
 
 def whole():
-    """The first report of each topic about a whole window, in which the machine did not stand still."""
+    """Return the first report of each topic about a whole window, in which the machine did not stand still."""
     return {report.topic: report for report in reversed(reports) if all(found_in(report))}
 
 
