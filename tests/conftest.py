@@ -1,4 +1,4 @@
-"""What every test stands on: an environment of its own, so that no test meets another or the user's ROS."""
+"""The environment of every test, which keeps it apart from other tests and from the user's ROS."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ settings.load_profile("minirospy")
 
 
 def pytest_configure() -> None:
-    """What a shell runs in the background ignores SIGINT, as `nohup` ignores SIGHUP; the tests' processes must not."""
+    """Undo that a shell has background jobs ignore SIGINT, and `nohup` SIGHUP: the tests' processes must not."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
@@ -31,7 +31,7 @@ def pytest_configure() -> None:
 
 
 def free_port() -> int:
-    """A port that nobody listens on, for a server that another process starts, or that comes back.
+    """Return a port without a listener, for a server that another process starts, or that comes back.
 
     It is none of those that systems deal out by themselves (from 32768 or 49152 on): such a one may go to any
     connection of another test before it is used.
@@ -80,7 +80,7 @@ def _own_environment(
 
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The URI of a master of the test's own, which ROS_MASTER_URI names while the test runs."""
+    """Run a master; return its URI, which ROS_MASTER_URI has while the test runs."""
     from minirospy.runtime.master.master import Master
     from minirospy.runtime.transport.loop import LoopThread
 
@@ -103,7 +103,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 @pytest.fixture
 def interrupted_processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
-    """The processes that are started from now on; as each begins, this one gets a Ctrl-C."""
+    """Return the processes that are started from now on; as each starts, this one gets a Ctrl-C."""
     begun: list[subprocess.Popen[bytes]] = []
 
     class Interrupted(subprocess.Popen):  # type: ignore[type-arg]

@@ -640,7 +640,7 @@ def unexpected(rows: Iterable[Row]) -> str:
 
 
 def other_words(rows: Iterable[Row]) -> set[str]:
-    """What was typed where ROS has words for an error that ours does not print first."""
+    """Return what was typed where ROS has words for an error that ours does not print first."""
     return {row.typed for row in rows if row.has_ros_words and not row.same_words}
 
 
