@@ -44,7 +44,7 @@ def written(records: list[list[Any]]) -> bytes:
 
 
 def framed(body: bytes) -> bytes:
-    """A record with this body, which need not be one."""
+    """Return a record with this body, which need not be one."""
     return struct.pack("<II", len(body), zlib.crc32(body)) + body
 
 
