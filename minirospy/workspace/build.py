@@ -228,11 +228,13 @@ class _Builder:
         warnings = self._check_needs(plan) + plan.warnings
         stamp = self._stamps / f"{plan.name}.json"
         setup = read_python_setup(plan.folder) if plan.has_setup else None
+
         relays = {**_relays(setup, self._workspace.devel), **_programs(plan, setup, self._workspace.devel)}
         changed = [path for path, text in relays.items() if write_if_changed(path, text)]
         for path in changed:
             if path.suffix != ".py" or path.read_bytes().startswith(b"#!"):
                 path.chmod(0o755)
+
         outputs = list(relays)
         if plan.definitions:
             before = _read_stamp(stamp)
@@ -247,12 +249,13 @@ class _Builder:
             modules = self._compile(plan, bool(setup and plan.name in setup.packages))
             changed += [path for path, text in modules.items() if write_if_changed(path, text)]
             outputs += modules
+
         outside = sorted(self._closure(plan.message_depends) - self._plans.keys())
         self._finish(stamp, outputs, outside)
         return Report(plan, _counts(plan, setup), bool(changed), warnings)
 
     def remove_gone(self) -> None:
-        """Take away what packages left behind that are not in the workspace any more."""
+        """Remove the outputs of packages that are not in the workspace any more."""
         for stamp in self._stamps.glob("*.json"):
             if stamp.stem not in self._plans:
                 self._remove(_read_stamp(stamp).get("outputs", []))

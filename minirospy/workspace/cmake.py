@@ -90,10 +90,12 @@ def _commands(text: str, where: str) -> Iterator[Node]:
     name, start = "", 0
     words: list[Word] = []
     depth = 0
+
     for match, line in _tokens(text, where):
         kind = match.lastgroup
         if match["blank"] or match["comment"]:
             continue
+
         if match["open"]:
             if not depth and not name:
                 raise BuildError(where, line, "a bracket without a command before it")
@@ -115,6 +117,7 @@ def _commands(text: str, where: str) -> Iterator[Node]:
             raise BuildError(where, line, f"[{_shown(name or match[0])}] is not followed by ( ... )")
         else:
             name, start = match["word"], line
+
     if depth or name:
         raise BuildError(where, start, f"{name}( is not closed")
 

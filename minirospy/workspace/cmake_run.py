@@ -69,6 +69,7 @@ class _Run:
         self._known = known
         self._macros = macros
         self._depth = depth
+
         self._readers: dict[str, Callable[[Node, list[str], Path], Iterator[Command]]] = {
             "if": self._if,
             "foreach": self._foreach,
@@ -79,6 +80,7 @@ class _Run:
             "add_subdirectory": self._subdirectory,
             **dict.fromkeys(("return", "break", "continue"), self._leave),
         }
+
         self._setters: dict[str, Callable[[list[str]], None]] = {
             "project": self._project,
             "set": self._set,
@@ -286,6 +288,7 @@ class _Run:
         """Run ``file(GLOB NAME pattern ...)``, ``GLOB_RECURSE``."""
         if len(arguments) < 2 or arguments[0] not in ("GLOB", "GLOB_RECURSE"):
             return
+
         words = [word for word in arguments[2:] if word != "CONFIGURE_DEPENDS"]
         base = None
         for flag in ("LIST_DIRECTORIES", "RELATIVE"):
@@ -293,6 +296,7 @@ class _Run:
                 index = words.index(flag)
                 base = self._folder / "".join(words[index + 1 : index + 2]) if flag == "RELATIVE" else base
                 del words[index : index + 2]
+
         found: list[Path] = []
         for pattern in words:
             path = self._folder / pattern
@@ -304,6 +308,7 @@ class _Run:
             elif top == self._folder:
                 # With an unset variable, `${UNSET}/*` is the whole disk.
                 found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
+
         names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
@@ -418,20 +423,25 @@ class _Condition:
     def _one(self) -> bool:
         if self._took("NOT"):
             return not self._one()
+
         if self._took("("):
             result = self._any()
             if not self._took(")"):
                 raise ValueError("a bracket is not closed")
             return result
+
         for name, test in self._tests.items():
             if self._next + 1 < len(self._words) and self._took(name):
                 return test(self._word().text)
+
         left = self._word()
         for name, compare in _COMPARE.items():
             if self._took(name):
                 return compare(self._value(left), self._value(self._word()))
+
         if self._took("IN_LIST"):
             return self._value(left) in _items(self._known.get(self._word().text, ""))
+
         if _TRUE.match(left.text) or _FALSE.match(left.text):
             # These words mean themselves, whatever a variable of that name holds.
             return bool(_TRUE.match(left.text))

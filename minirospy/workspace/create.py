@@ -33,31 +33,37 @@ class NewPackage(NamedTuple):
 
 
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
-    """Make the package's folder below ``parent``; the files and folders made. Raises UsageError."""
+    """Make the package's folder below ``parent``; return the files and folders made. Raises UsageError."""
     if not _NAME.match(package.name):
         raise UsageError(
             f"[{package.name}] is not a name for a package: lower-case letters, digits and underscores, a letter first"
         )
+
     for depend in package.depends:
         if not _NAME.match(depend):
             raise UsageError(f"[{depend}] is not the name of a package to depend on")
+
     if not re.match(r"^\d+\.\d+\.\d+$", package.version):
         raise UsageError(f"[{package.version}] is not a version: three numbers, as in 0.1.0")
+
     folder = parent / package.name
     if (folder / "package.xml").exists() or (folder / "CMakeLists.txt").exists():
         raise UsageError(f"{folder} is a package already")
+
     made = [folder / "package.xml", folder / "CMakeLists.txt"]
     folder.mkdir(parents=True, exist_ok=True)
     made[0].write_text(_package_xml(package), encoding="utf-8")
     made[1].write_text(
         _META.format(name=package.name) if package.meta else _cmake_lists(package), encoding="utf-8"
     )
+
     if package.meta:
         return made
     if "roscpp" in package.depends:
         # Where C++ headers go, as ROS lays it out.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
+
     for path in made[2:]:
         path.mkdir(parents=True, exist_ok=True)
     return made

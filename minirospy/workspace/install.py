@@ -40,10 +40,12 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
         if path in plan.not_installed:
             continue
         yield share / path.suffix[1:] / path.name, (path, False)
+
     built = workspace.devel / DIST_PACKAGES / plan.name
     if plan.definitions:
         for path in _files(built):
             yield modules / plan.name / path.relative_to(built), (path, False)
+
     if plan.has_setup:
         setup = read_python_setup(plan.folder)
         for name, folder in setup.packages.items():
@@ -53,6 +55,7 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
             yield modules / f"{name}.py", (path, False)
         for path in setup.scripts:
             yield workspace.install / "bin" / path.name, (path, True)
+
     for rule in plan.installs:
         yield from _rule(workspace, plan, rule)
 

@@ -143,6 +143,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         # It becomes the name of folders and modules.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
+
     file = folder / "CMakeLists.txt"
     collector = _Collector(folder, manifest)
     if manifest.build_type != "catkin":
@@ -150,13 +151,16 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         return collector.plan()
     for problem in manifest.problems:
         collector.warn(manifest.path, *problem)
+
     if not file.is_file():
         raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt")
+
     try:
         for command in run_cmake(file, {**_variables(folder, manifest.name), **(variables or {})}):
             collector.read(command)
     except RecursionError:
         raise BuildError(str(file), 1, "is nested too deeply") from None
+
     collector.check()
     return collector.plan()
 
@@ -167,6 +171,7 @@ class _Collector:
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self._folder = folder
         self._manifest = manifest
+
         self._definitions: dict[Path, Command] = {}
         self._not_installed: set[Path] = set()
         self._message_depends: list[str] | None = None
@@ -177,6 +182,7 @@ class _Collector:
         self._installs: list[Install] = []
         self._tests: list[Test] = []
         self._warnings: list[str] = []
+
         self._readers: dict[str, Callable[[Command], None]] = {
             "project": self._project,
             "find_package": self._find_package,
@@ -264,12 +270,14 @@ class _Collector:
     def _add_files(self, command: Command) -> None:
         if self._message_depends is not None:
             raise _error(command, f"{command.name}() must be called before generate_messages()")
+
         kind = _FOLDERS[command.name]
         given = keyword_arguments(command.arguments, _FILES_WORDS)
         place = next(iter(given.get("DIRECTORY", [])), kind)
         folder = command.folder / place
         there = {path.name: path for path in sorted(folder.glob(f"*.{kind}")) if path.is_file()}
         names = [*given[""], *given.get("FILES", [])]
+
         if given[""]:
             self._refused(command, f"FILES must come before {given[''][0]}")
         if not _GENERATORS & {name for name, _ in self._needs}:
@@ -277,10 +285,12 @@ class _Collector:
                 command,
                 "find_package(catkin REQUIRED COMPONENTS message_generation) must be called before it",
             )
+
         if not names and "FILES" not in given:
             names = list(there)
         if not folder.is_dir() and (names or "FILES" not in given):
             raise _error(command, f"{command.name}: there is no folder [{place}]")
+
         for name in names:
             path = folder / name
             if path.suffix != f".{kind}":
@@ -293,6 +303,7 @@ class _Collector:
                     command,
                     f"{command.name}: [{name}] is not the name of a type: letters, digits, underscores, a letter first",
                 )
+
             self._definitions[path] = command
             if "NOINSTALL" in given:
                 self._not_installed.add(path)
@@ -404,10 +415,13 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 def _variables(folder: Path, name: str) -> dict[str, str]:
     """Return what catkin and CMake set before a package's file is read. Destinations are below the install folder."""
     source = folder.as_posix()
+
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}
     package = {f"CATKIN_PACKAGE_{kind}_DESTINATION": f"{place}/{name}" for kind, place in places.items()}
     everywhere = {f"CATKIN_GLOBAL_{kind}_DESTINATION": place for kind, place in places.items()}
+
     system = {"win32": "Windows", "darwin": "Darwin"}.get(sys.platform, "Linux")
+
     return {
         **{f"ENV{{{key}}}": value for key, value in {**VARIABLES, **os.environ}.items()},
         **package,

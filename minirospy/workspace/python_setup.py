@@ -74,6 +74,7 @@ def _run(file: Path) -> Mapping[str, object]:
     """Run a setup.py and return the arguments of its ``setup()``. Raises BuildError."""
     given: dict[str, object] = {}
     why = ""
+
     with _stand_ins(given, file.parent):
         try:
             code = compile(file.read_bytes(), str(file), "exec")
@@ -91,6 +92,7 @@ def _run(file: Path) -> Mapping[str, object]:
             raise BuildError(
                 str(file), (lines or [0])[-1] or 0, f"{type(error).__name__}: {error}"
             ) from error
+
     if not given:
         raise BuildError(str(file), 0, f"setup() was not called{why}")
     return given

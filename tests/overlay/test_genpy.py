@@ -36,7 +36,7 @@ def test_submodules_are_there_after_import_genpy() -> None:
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "True True\n"
 
 
-def test_what_generated_modules_need() -> None:
+def test_generated_modules_find_their_imports() -> None:
     assert genpy.struct_I.pack(1) == b"\1\0\0\0"
     assert genpy.message.struct_I is genpy.struct_I
     assert issubclass(genpy.SerializationError, genpy.MessageException)

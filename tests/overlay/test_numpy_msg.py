@@ -52,7 +52,7 @@ def wire(message: Any) -> bytes:
         (PointCloud(channels=[ChannelFloat32("a", [1.0])]), "channels.0.values", "float32"),
     ],
 )
-def test_what_is_received_is_of_numpy(message: Any, path: str, dtype: str) -> None:
+def test_received_arrays_are_numpy_arrays(message: Any, path: str, dtype: str) -> None:
     received = numpy_msg(type(message))().deserialize(wire(message))
     plain = type(message)().deserialize(wire(message))
     values, expected = received, plain
@@ -66,7 +66,7 @@ def test_what_is_received_is_of_numpy(message: Any, path: str, dtype: str) -> No
     assert wire(received) == wire(message)
 
 
-def test_what_is_no_array_of_numbers_stays() -> None:
+def test_fields_other_than_arrays_of_numbers_stay() -> None:
     assert numpy_msg(UInt8MultiArray)().deserialize(wire(UInt8MultiArray(data=b"abc"))).data == b"abc"
     assert numpy_msg(Image)().deserialize(wire(Image(data=b"abc"))).data == b"abc"
     assert numpy_msg(JointState)().deserialize(wire(JointState(name=["a"]))).name == ["a"]
@@ -174,7 +174,7 @@ for message in sorted(heard, key=lambda each: type(each).__name__):
 
 
 def test_between_nodes(master: str) -> None:
-    """The listing of the wiki's tutorial: a node publishes an array, and hears it."""
+    """The listing of the wiki's tutorial: a node publishes an array, and receives it."""
     out = subprocess.run(
         [sys.executable, "-c", NODE], capture_output=True, text=True, timeout=30, check=False
     )

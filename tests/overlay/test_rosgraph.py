@@ -23,11 +23,11 @@ def test_myargv_has_the_rule_of_rospy() -> None:
 
 
 def test_the_graph_as_edges(master: str) -> None:
-    asked = rosgraph.Master("/talker")
-    asked.registerPublisher("/chat", "std_msgs/Bool", "http://localhost:1")
-    asked.registerPublisher("/alone", "std_msgs/Bool", "http://localhost:1")
+    client = rosgraph.Master("/talker")
+    client.registerPublisher("/chat", "std_msgs/Bool", "http://localhost:1")
+    client.registerPublisher("/alone", "std_msgs/Bool", "http://localhost:1")
     rosgraph.Master("/listener").registerSubscriber("/chat", "std_msgs/Bool", "http://localhost:2")
-    asked.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
+    client.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
     graph = rosgraph.impl.graph.Graph()
     assert graph.update()
     assert not graph.update()
@@ -89,12 +89,12 @@ def test_a_server_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ended == ["enough"]
 
 
-def test_a_port_that_is_taken_is_told_to_who_asked() -> None:
-    told = threading.Event()
+def test_a_port_in_use_is_reported_to_the_caller() -> None:
+    notified = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        rosgraph.xmlrpc.XmlRpcNode(port, None, on_run_error=lambda error: told.set()).start()
-        assert told.wait(30)
+        rosgraph.xmlrpc.XmlRpcNode(port, None, on_run_error=lambda error: notified.set()).start()
+        assert notified.wait(30)
 
 
 def test_connection_headers_over_a_socket() -> None:

@@ -39,7 +39,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_load_manifest_finds_the_sources_of_a_package_and_of_what_it_needs(package: Path) -> None:
+def test_load_manifest_finds_sources_of_a_package_and_its_dependencies(package: Path) -> None:
     before = list(sys.path)
     roslib.load_manifest("beginner_tutorials")
     assert [each for each in sys.path if each not in before] == [
@@ -72,7 +72,7 @@ def test_load_manifest_in_a_script(package: Path, monkeypatch: pytest.MonkeyPatc
     assert subprocess.check_output([sys.executable, script], text=True) == "42\n"
 
 
-def test_load_manifest_of_what_can_be_imported_or_is_not_there(package: Path) -> None:
+def test_load_manifest_of_importable_and_missing_packages(package: Path) -> None:
     before = list(sys.path)
     roslib.load_manifest("std_msgs")
     roslib.load_manifest("rospy")

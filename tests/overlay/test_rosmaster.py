@@ -17,9 +17,9 @@ def test_a_master_in_the_program() -> None:
     try:
         assert master.ok()
         assert master.uri is not None
-        asked = rosgraph.Master("/tester", master.uri)
-        asked.setParam("/a", 5)
-        assert asked.getParam("/a") == 5
+        client = rosgraph.Master("/tester", master.uri)
+        client.setParam("/a", 5)
+        assert client.getParam("/a") == 5
         with pytest.raises(OSError, match="in use"):
             rosmaster.master.Master(master.port).start()
         uri = master.uri

@@ -46,7 +46,7 @@ def test_packages(rospack: rospkg.RosPack, tree: Path) -> None:
     assert rospack.stack_of("a") is None
 
 
-def test_what_is_not_there(rospack: rospkg.RosPack, tree: Path) -> None:
+def test_missing_names_raise(rospack: rospkg.RosPack, tree: Path) -> None:
     for ask in (
         rospack.get_path,
         rospack.get_manifest,
@@ -131,7 +131,7 @@ def test_where_things_are_kept() -> None:
     assert rospkg.distro.current_distro_codename({}) == "noetic"
 
 
-def test_what_the_user_keeps(rospack: rospkg.RosPack) -> None:
+def test_custom_cache_stores_values(rospack: rospkg.RosPack) -> None:
     assert rospack.get_custom_cache("k", 1) == 1
     rospack.set_custom_cache("k", 2)
     assert rospack.get_custom_cache("k") == 2

@@ -48,7 +48,7 @@ def test_every_label_is_there(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL)
 def test_nothing_before_a_redirection_is_taken_for_its_number(name: str) -> None:
-    # `echo in C:\ws2>&2` writes `in C:\ws` to wherever 2 goes: what may end in a digit stands behind.
+    # `echo in C:\ws2>&2` writes `in C:\ws` to wherever 2 goes: so text that may end in a digit comes last.
     for line in ALL[name].splitlines():
         assert not re.search(r"[%\w]>&2", line), line
 
@@ -59,7 +59,7 @@ def test_the_own_folder_has_no_backslash_at_its_end() -> None:
     assert 'in ("%~dp0.") do call :minirospy_workspace put "%%~fP"' in FILES["setup.bat"]
 
 
-def test_what_is_below_comes_first_and_the_local_file_leaves_it_out() -> None:
+def test_extended_workspaces_come_first_and_the_local_file_omits_them() -> None:
     below = 'call :minirospy_workspace put "C:\\base\\devel"'
     text = FILES["setup.bat"]
     assert text.index(below) < text.index("%~dp0.")

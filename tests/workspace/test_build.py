@@ -115,7 +115,7 @@ def test_a_change_in_the_workspace_below_is_seen(scene: Scene) -> None:
     assert made() == "1 message"
 
 
-def test_what_is_gone_from_the_sources_goes_from_devel(scene: Scene) -> None:
+def test_outputs_of_deleted_sources_are_removed(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n", "msg/Old.msg": "int8 x\n"})
     scene.messages("old_msgs", {"msg/A.msg": "int8 x\n"})
     scene.build()
@@ -382,7 +382,7 @@ def test_two_packages_of_one_name(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("name", ["my pkg", "../evil"])
-def test_a_name_that_is_none(scene: Scene, name: str) -> None:
+def test_an_invalid_name_is_an_error(scene: Scene, name: str) -> None:
     folder = scene.package("p")
     (folder / "package.xml").write_text(f"<package>\n<name>{name}</name></package>")
     assert str(mistakes(scene)).startswith(f"{folder / 'package.xml'}:2: '{name}' is not a package name")
@@ -398,7 +398,7 @@ def test_a_link_that_leads_back(scene: Scene) -> None:
     assert [plan.name for plan in read_plans(scene.source)] == ["p"]
 
 
-def test_notes_of_a_build_that_are_none(scene: Scene) -> None:
+def test_an_invalid_build_record_is_ignored(scene: Scene) -> None:
     scene.messages("p", {"msg/A.msg": "\ufeffint8 a\n"})
     scene.build()
     (scene.root / "build" / "minirospy" / "p.json").write_text('{"outputs": 3}')
@@ -483,7 +483,7 @@ def test_options_of_dynamic_reconfigure_are_left_out(scene: Scene) -> None:
     assert warning.startswith(f"{folder / 'CMakeLists.txt'}:3: [cfg/Lamp.cfg] is not built")
 
 
-def test_what_catkin_would_refuse_in_package_xml(scene: Scene) -> None:
+def test_package_xml_that_catkin_would_refuse_is_a_warning(scene: Scene) -> None:
     folder = scene.package("p")
     (folder / "package.xml").write_text(
         '<package format="2"><name>p</name>\n<run_depend>a</run_depend></package>'
@@ -507,8 +507,10 @@ def test_what_catkin_would_refuse_in_package_xml(scene: Scene) -> None:
         ("{add}\ngenerate_messages()", 3, "COMPONENTS message_generation) must be called before it"),
     ],
 )  # fmt: skip
-def test_what_catkin_would_refuse_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> None:
-    """It builds here, and the author hears of it before a robot with real ROS refuses it."""
+def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
+    scene: Scene, cmake: str, line: int, text: str
+) -> None:
+    """It builds here, and warns the author before a robot with real ROS refuses it."""
     parts = {
         "find": "find_package(catkin REQUIRED COMPONENTS message_generation)",
         "add": "add_message_files(FILES A.msg)",
@@ -742,10 +744,8 @@ def test_install(scene: Scene) -> None:
     )
 
 
-def test_what_is_not_there_is_missed_by_install_alone(
-    scene: Scene, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """As in CMake: a package whose install rules name files that are gone builds."""
+def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    """As in CMake: a package whose install rules name files that do not exist builds."""
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1

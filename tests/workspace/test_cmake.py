@@ -40,7 +40,7 @@ def test_nested_brackets_are_words() -> None:
     assert read("if(A AND (B OR C))\nendif()") == [("if", ("A", "AND", "(", "B", "OR", "C", ")"), 1)]
 
 
-def test_what_stands_in_what() -> None:
+def test_nested_commands() -> None:
     (condition, last) = parse_cmake(
         "if(A)\n f()\n foreach(x a)\n  g()\n endforeach(x)\nelse()\nENDIF(A)\nh()", "f"
     )

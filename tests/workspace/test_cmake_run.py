@@ -60,7 +60,7 @@ def test_a_variable_in_the_name_of_another(tmp_path: Path) -> None:
         ("get_filename_component(X some/file.tar.gz DIRECTORY)", "some"),
     ],
 )
-def test_what_sets_a_variable(tmp_path: Path, text: str, value: str) -> None:
+def test_commands_that_set_a_variable(tmp_path: Path, text: str, value: str) -> None:
     assert said(tmp_path, f"{text}\nf(${{X}})", GIVEN="yes") == [value]
 
 

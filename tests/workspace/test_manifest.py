@@ -128,7 +128,7 @@ def test_conditions(condition: str, holds: bool) -> None:
         "1<2and 2<3",
     ],
 )
-def test_what_is_no_condition(condition: str) -> None:
+def test_an_invalid_condition_is_an_error(condition: str) -> None:
     with pytest.raises(ValueError, match=r"is expected|is missing"):
         evaluate_condition(condition, {})
     with pytest.raises(ManifestError, match=r"package\.xml:2: condition '.*' of <depend>: "):
@@ -151,7 +151,7 @@ def test_exports_of_a_metapackage() -> None:
         ("<?xml version='1.0' encoding='no-such'?><package/>", "p.xml:1: not XML: unknown encoding"),
     ],
 )
-def test_what_is_no_manifest(text: str, why: str) -> None:
+def test_an_invalid_manifest_is_an_error(text: str, why: str) -> None:
     with pytest.raises(ManifestError, match=re.escape(why)):
         parse_manifest(text.encode(), Path("p.xml"))
 
@@ -168,7 +168,7 @@ def test_what_is_no_manifest(text: str, why: str) -> None:
         (' format="2"', "<maintainer>Bob</maintainer>", "package.xml:2: maintainer 'Bob' has no email"),
     ],
 )  # fmt: skip
-def test_what_catkin_refuses_is_read_and_told(format: str, body: str, why: str) -> None:
+def test_problems_that_catkin_refuses_are_recorded(format: str, body: str, why: str) -> None:
     manifest = parse(body, format)
     assert manifest.name == "robot"
     assert why in f"package.xml:{manifest.problems[0].line}: {manifest.problems[0].text}"

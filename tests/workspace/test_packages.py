@@ -23,7 +23,7 @@ def packages(*roots: Path) -> Packages:
     return Packages(Environment.read({"ROS_PACKAGE_PATH": os.pathsep.join(map(str, roots))}))
 
 
-def test_what_minirospy_brings_along() -> None:
+def test_built_in_packages_are_found() -> None:
     found = packages()
     assert {"std_msgs", "rpi_feros", "rpi_feros_bringup", "rpi_msgs"} <= set(found.names())
     assert (found.find("std_msgs") / "msg" / "Bool.msg").is_file()
@@ -40,13 +40,13 @@ def test_a_workspace_hides_ours(tmp_path: Path) -> None:
     assert packages(tmp_path).folders()["rpi_feros"] == folder
 
 
-def test_the_first_folder_wins_also_where_its_package_lies_deeper(tmp_path: Path) -> None:
+def test_the_first_folder_wins_even_with_a_deeper_package(tmp_path: Path) -> None:
     deep = make_package(tmp_path / "one" / "group" / "pkg", "pkg")
     make_package(tmp_path / "two" / "pkg", "pkg")
     assert packages(tmp_path / "one", tmp_path / "two").find("pkg") == deep
 
 
-def test_what_is_ignored(tmp_path: Path) -> None:
+def test_ignored_folders_are_not_searched(tmp_path: Path) -> None:
     make_package(tmp_path / "off" / "a", "a")
     (tmp_path / "off" / "CATKIN_IGNORE").touch()
     make_package(tmp_path / ".hidden" / "b", "b")
@@ -78,7 +78,7 @@ def test_programs(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no executable bit")
-def test_what_is_not_executable_is_said_outright(tmp_path: Path) -> None:
+def test_a_program_that_is_not_executable_is_reported(tmp_path: Path) -> None:
     folder = make_package(tmp_path / "pkg", "pkg")
     program = folder / "run.sh"
     program.write_text("#!/bin/sh\n")

@@ -12,7 +12,7 @@ from minirospy.workspace.manifest import read_manifest
 
 ROOT = Path(__file__).parents[2] / "minirospy"
 FOLDERS = sorted(path.parent for path in (ROOT / "ros_packages").glob("*/package.xml"))
-# Packages of Python alone, which are no packages of ROS.
+# Packages of Python alone, not of ROS.
 NO_PACKAGES = {"RPi", "rospkg"}
 
 
@@ -23,7 +23,7 @@ def test_each_is_in_order(folder: Path) -> None:
     assert manifest.problems == ()
 
 
-def test_what_can_be_imported_can_be_found() -> None:
+def test_importable_packages_are_found() -> None:
     known = set(rospkg.RosPack().list())
     overlay = {path.name for path in (ROOT / "overlay").iterdir() if (path / "__init__.py").is_file()}
     assert overlay - NO_PACKAGES <= known

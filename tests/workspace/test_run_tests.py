@@ -55,7 +55,7 @@ def write(scene: Scene) -> None:
     scene.package("q", "catkin_add_nosetests(test)", "", {"test/test_q.py": "def test_q():\n    pass\n"})
 
 
-def test_what_a_plan_names(scene: Scene) -> None:
+def test_a_plan_has_what_the_files_name(scene: Scene) -> None:
     write(scene)
     plan = read_plan(scene.source / "p")
     assert plan.tests == (
@@ -119,7 +119,7 @@ def test_launch_files_are_checked(scene: Scene, capfd: pytest.CaptureFixture[str
     assert (scene.root / "build" / "test_results" / "p" / "roslaunch-check_launch.xml").is_file()
 
 
-def test_what_cannot_be_run(
+def test_commands_that_cannot_be_run_are_errors(
     scene: Scene, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     scene.package("p", "add_rostest(test/no.test)")
@@ -133,11 +133,11 @@ def test_what_cannot_be_run(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal")
 def test_ctrl_c_lets_a_test_end_its_nodes(scene: Scene, tmp_path: Path) -> None:
-    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    started, ended = tmp_path / "started", tmp_path / "ended"
     text = f"""import pathlib, time
 def test_slow():
     try:
-        pathlib.Path({str(begun)!r}).touch()
+        pathlib.Path({str(started)!r}).touch()
         time.sleep(60)
     finally:
         time.sleep(0.5)
@@ -156,7 +156,7 @@ def test_slow():
         start_new_session=True,
     )
     end = time.monotonic() + 30
-    while not begun.exists() and popen.poll() is None and time.monotonic() < end:
+    while not started.exists() and popen.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
     os.killpg(popen.pid, signal.SIGINT)
     _, err = popen.communicate(timeout=30)

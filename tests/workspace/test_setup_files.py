@@ -108,7 +108,7 @@ def test_run_instead_of_sourced(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize(("shell", "ending"), SHELLS)
-def test_what_was_set_before_stays(scene: Scene, shell: str, ending: str) -> None:
+def test_variables_set_before_stay(scene: Scene, shell: str, ending: str) -> None:
     scene.build()
     given = {"PYTHONPATH": "/a:/b c", "ROS_MASTER_URI": "http://robot:1", "ROS_PACKAGE_PATH": "/x"}
     found = variables(shell, f". '{scene.devel}/setup.{ending}'", scene.root, **given)

@@ -157,7 +157,7 @@ def test_roscd_to_an_unknown_package_names_the_nearest(shell: Shell) -> None:
     assert done.err.startswith("roscd: ERROR: package 'my_robt' not found; did you mean my_robot")
 
 
-def test_roscd_to_what_is_no_folder(shell: Shell) -> None:
+def test_roscd_to_a_missing_folder_is_an_error(shell: Shell) -> None:
     done = shell.run("roscd my_robot/nothing")
     assert (done.status, done.err) == (1, f"roscd: ERROR: there is no folder {shell.package}/nothing\n")
 
@@ -218,7 +218,7 @@ def test_rosed(shell: Shell) -> None:
     assert (done.status, done.err) == (1, f"rosed: ERROR: {expected_complaint}\n")
 
 
-def test_rosed_asks_which_of_many(shell: Shell) -> None:
+def test_rosed_offers_a_choice_of_many_files(shell: Shell) -> None:
     done = shell.run("rosed my_robot talker.py", stdin="x\n2\n")
     assert done.out[-1].endswith(f"EDIT {shell.package}/scripts/talker.py")
     assert "You have chosen a non-unique filename" in done.err
@@ -429,7 +429,7 @@ def test_fish_tab(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
 def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
-    """A shell at a terminal: a TAB is typed, what stands on the line is read."""
+    """A shell at a terminal: types TAB and reads the line."""
     import pty
     import select
 
@@ -437,7 +437,7 @@ def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
         pytest.skip(f"{name} is not installed")
     make_workspace(tmp_path)
     bare = {"bash": ["--norc", "--noprofile"], "zsh": ["-f"], "fish": ["--no-config"]}[name]
-    # Fish asks that the terminal is its session's own.
+    # Fish requires a terminal that belongs to its session.
     own = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
     keyboard, terminal = pty.openpty()
     shell = subprocess.Popen(

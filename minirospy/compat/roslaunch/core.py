@@ -192,6 +192,7 @@ class Node:
             raise ValueError("cwd must be one of 'ROS_HOME', 'node'")
         if required and respawn:
             raise ValueError("respawn and required cannot both be set to true")
+
         self.package = package
         self.type = node_type
         self.name = name or None
@@ -200,8 +201,10 @@ class Node:
         self.args = args
         self.respawn = respawn
         self.respawn_delay = respawn_delay
+
         self.machine: Machine | None = None
         self.process_name: str | None = None
+
         self.remap_args = [list(pair) for pair in remap_args or ()]
         self.env_args = [tuple(pair) for pair in env_args or ()]
         self.output = output

@@ -50,6 +50,7 @@ class ROSLaunchParent:
     ) -> None:
         if sigint_timeout <= 0 or sigterm_timeout <= 0:
             raise RLException("sigint_timeout and sigterm_timeout must be positive numbers")
+
         self.logger = logging.getLogger("roslaunch.parent")
         self.run_id = run_id
         self.roslaunch_files = roslaunch_files
@@ -58,11 +59,13 @@ class ROSLaunchParent:
         self.port = port
         self.local_only = local_only
         self.process_listeners = process_listeners
+
         self.verbose = verbose
         self.force_screen = force_screen
         self.force_log = force_log
         self.force_required = force_required
         self.show_summary = show_summary
+
         self.config: ROSLaunchConfig | None = None
         self.runner: ROSLaunchRunner | None = None
         self.pm: ProcessMonitor | None = None
@@ -71,9 +74,9 @@ class ROSLaunchParent:
         self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything; it comes back when all was started. Raises RLException.
+        """Start everything, and return when all nodes were started. Raises RLException.
 
-        Where ``auto_terminate`` is not set, it does not end with the last node.
+        Without ``auto_terminate`` it does not end with the last node.
         """
         if self.runner is not None:
             raise RLException("this roslaunch instance has been started before: make another one")

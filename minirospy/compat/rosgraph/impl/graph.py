@@ -152,16 +152,21 @@ class Graph:
         """Query the master, unless the last query is recent. Return whether the graph has changed."""
         if time.time() - self.last_master_refresh < self.master_stale:
             return False
+
         publishers, subscribers, services = self.master.getSystemState()
         self.last_master_refresh = time.time()
+
         before = (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
+
         sending, hearing = self._side(publishers), self._side(subscribers)
         providers = {node for _, nodes in services for node in nodes if in_namespace(node, self.node_ns)}
         self.srvs = {name for name, _ in services}
+
         self.nn_nodes = {
             node for side in (sending, hearing) for nodes in side.values() for node in nodes
         } | providers
         self.nt_nodes = {topic_node(topic) for topic in {*sending, *hearing}}
+
         self.nn_edges = EdgeList(
             Edge(start, end, topic)
             for topic, nodes in sending.items()
