@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
@@ -189,9 +189,11 @@ def _rosparam_cmd_get_dump(cmd: str, argv: Sequence[str]) -> None:
 _rosparam_cmd_set_load = _rosparam_cmd_get_dump
 
 
-def _fullusage() -> None:
-    """Print the commands, and exit with the status of a usage error."""
-    yamlmain([NAME])
+def _fullusage() -> NoReturn:
+    """Print the commands, and exit as `rosparam` without arguments does."""
+    from minirospy.cli.ros.rosparam import main
+
+    sys.exit(main([]))
 
 
 def _resolve(graph: Graph, param: str) -> str:
