@@ -606,6 +606,10 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
             time.sleep(0.02)
         after = memory.memory_info().rss / MIB
         median, p99, worst, calls, failed = good.since(begin)
+        last, wait, _ = good.calls[-1]
+        if last < end:
+            # The present call has no answer yet.
+            worst, failed = max(worst, time.monotonic() - last - wait), failed + 1
         if fleet:
             _, _, wait, rounds, _ = fleet.since(0.0)
             alive = fleet.process.poll() is None
