@@ -428,7 +428,7 @@ time.sleep(60)
 
 
 @POSIX_ONLY
-def test_a_loop_that_asks_keeps_its_clean_up(master: str) -> None:
+def test_a_loop_that_polls_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
 rospy.init_node("asks")
@@ -469,7 +469,7 @@ print("done", flush=True)
 
 
 @POSIX_ONLY
-def test_a_program_that_was_told_keeps_its_clean_up(master: str) -> None:
+def test_a_program_that_was_notified_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
 rospy.init_node("told")
@@ -693,7 +693,7 @@ def test_two():
         ("_p:=99999999999", "invalid command-line parameters: [_p:=99999999999]: the integer"),
     ],
 )
-def test_a_wrong_argument_is_told_in_one_line(master: str, argument: str, told: str) -> None:
+def test_a_wrong_argument_is_reported_in_one_line(master: str, argument: str, told: str) -> None:
     script = f"""
 import rospy
 try:
@@ -796,7 +796,7 @@ rospy.loginfo("line")
 
 
 @POSIX_ONLY
-def test_a_fork_is_left_to_the_system_until_it_asks(master: str) -> None:
+def test_a_fork_is_left_to_the_system_until_it_polls(master: str) -> None:
     """A Python handler would wait for the C code that a worker of a pool is in: now and then for ever."""
     process = start("""
 import os, signal, sys, time

@@ -34,7 +34,7 @@ rospy.logwarn("warn")
 """
 
 
-def test_handlers_that_a_program_gave_the_root_stay_and_nothing_is_said_twice() -> None:
+def test_root_handlers_of_the_program_stay_without_duplicate_lines() -> None:
     program = f"""
 import logging
 logging.basicConfig(level=logging.INFO, format="MINE %(message)s")

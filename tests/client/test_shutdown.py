@@ -52,7 +52,7 @@ def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: Shutdow
     assert timeline(machine, 10.0, 20.0) == [(10.5, Action.INTERRUPT)]
 
 
-def test_a_main_thread_that_leaves_the_graph_itself_is_interrupted_after_that(
+def test_interrupt_waits_while_the_main_thread_unregisters(
     machine: ShutdownMachine,
 ) -> None:
     machine.runs_in_main = True

@@ -64,7 +64,7 @@ print("who has asked for it may clean up")
     ]
 
 
-def test_who_sleeps_by_simulated_time_wakes_up_when_it_ends() -> None:
+def test_sleepers_wake_up_when_simulated_time_ends() -> None:
     program = """
 import rospy.rostime
 rospy.set_param("/use_sim_time", True)
@@ -80,7 +80,7 @@ print(thread.is_alive(), rospy.get_time() > 1e9)
     assert run(program) == ["False True"]
 
 
-def test_an_error_in_simulated_time_is_told_where_a_timer_ends() -> None:
+def test_an_error_in_simulated_time_is_logged_where_a_timer_ends() -> None:
     program = """
 import rospy.rostime
 threading.excepthook = lambda args: print(args.exc_type.__name__, args.exc_value)

@@ -74,7 +74,7 @@ publisher.publish(True)
 
 @pytest.mark.parametrize("latch", [False, True])
 @pytest.mark.parametrize("subscriber", [False, True])
-def test_a_first_message_that_its_subscriber_misses_is_told_of_once(
+def test_a_first_message_without_subscriber_is_logged_once(
     start: Start, master: str, subscriber: bool, latch: bool
 ) -> None:
     if subscriber:
@@ -125,7 +125,7 @@ except rospy.ROSException as error:
     assert errors == ""
 
 
-def test_another_type_on_a_topic_of_this_process_is_told_of(start: Start) -> None:
+def test_another_type_on_a_topic_of_this_process_is_logged(start: Start) -> None:
     _, errors = finished(
         start("""
 rospy.init_node("talker")
@@ -198,7 +198,7 @@ for kind, value in ((Bool, numpy.array([1, 3])[1] > 2), (Bool, numpy.any([False]
     assert output == "True True\nTrue False\nTrue 3\n"
 
 
-def test_listeners_hear_of_peers_in_order_and_a_faulty_one_ends_nothing(start: Start) -> None:
+def test_listeners_are_notified_in_order_and_a_faulty_one_ends_nothing(start: Start) -> None:
     output, errors = finished(
         start("""
 rospy.init_node("talker")
@@ -358,11 +358,11 @@ print(newest[-1])
 """
 
 
-def test_a_latched_message_that_comes_at_this_moment_is_the_last_one_heard(start: Start) -> None:
+def test_a_latched_message_during_a_join_is_delivered_last(start: Start) -> None:
     assert finished(start(LATCHED_MEANWHILE)) == ("[2]\n3\n", "")
 
 
-def test_a_publisher_that_was_killed_and_comes_back_is_heard_again(start: Start) -> None:
+def test_messages_of_a_killed_publisher_that_restarts_are_received(start: Start) -> None:
     listener = start(LISTENER)
     assert line(listener) == "ready"
     first = start(TALKER.format(text="one"))
@@ -397,7 +397,7 @@ print("alone", flush=True)
     assert "SyntaxWarning" in warning
 
 
-def test_subscriber_that_joins_while_a_latched_publisher_connects_gets_its_message(start: Start) -> None:
+def test_subscriber_joining_a_connecting_latched_publisher_gets_message(start: Start) -> None:
     """The publisher connects, and its message arrives, between the two halves of the constructor."""
     output, _ = finished(
         start("""

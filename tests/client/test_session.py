@@ -1,0 +1,72 @@
+"""A session is replaced, never reset: by a second init_node, and by a fork."""
+
+from __future__ import annotations
+
+import pytest
+
+from minirospy.client import session as sessions
+from minirospy.client.session import Session, current_session, replace_session, replace_session_in_fork
+from minirospy.clock import SimulatedClock
+
+
+@pytest.fixture(autouse=True)
+def session(monkeypatch: pytest.MonkeyPatch) -> Session:
+    """Return a session without a node, in place of the process's."""
+    own = Session()
+    monkeypatch.setattr(sessions._Process, "session", own)
+    return own
+
+
+def test_a_session_is_not_replaced_before_its_shutdown(session: Session) -> None:
+    replace_session()
+    assert current_session() is session
+
+
+def test_a_session_is_not_replaced_after_a_signal(session: Session) -> None:
+    session.lifecycle.machine.signal(0.0)
+    session.lifecycle.signal_shutdown("test")
+    replace_session()
+    assert current_session() is session
+
+
+def test_the_next_session_keeps_name_clock_and_listeners_alone(session: Session) -> None:
+    session.identity.be_called("/one")
+    session.clock = SimulatedClock(5)
+    session.has_time = True
+    session.parameter_listeners.append(print)
+    session.init_arguments = ("one",)
+    session.lifecycle.on_shutdown(lambda: None)
+    session.lifecycle.signal_shutdown("test")
+
+    replace_session()
+    following = current_session()
+    assert following is not session
+    assert (following.name, following.clock, following.has_time) == ("/one", session.clock, True)
+    assert following.parameter_listeners == [print]
+    assert (following.init_arguments, following.node, following.lifecycle.hooks) == (None, None, [])
+    assert not following.is_shutdown()
+    # The old one stays what it was, for the publishers that were made in it.
+    assert session.is_shutdown()
+
+
+@pytest.mark.parametrize("was_down", [False, True])
+def test_a_fork_keeps_the_state_and_not_the_hooks(session: Session, *, was_down: bool) -> None:
+    ran: list[str] = []
+    session.lifecycle.on_shutdown(lambda: ran.append("hook of the parent"))
+    if was_down:
+        session.lifecycle.signal_shutdown("test")
+        ran.clear()
+
+    replace_session_in_fork()
+    assert current_session().is_fork
+    assert current_session().is_shutdown() == was_down
+    current_session().lifecycle.signal_shutdown("end of the fork")
+    assert ran == []
+
+
+def test_what_waits_for_a_node_runs_once_it_is_ready(session: Session) -> None:
+    ran: list[int] = []
+    session.when_ready(lambda: ran.append(1))
+    assert ran == []
+    session.publish_node()
+    assert ran == [1]
