@@ -19,7 +19,8 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 import pytest
 
 from minirospy.escape import has_controls
-from minirospy.runtime.master.master import Master, notifier
+from minirospy.runtime.master import notifier
+from minirospy.runtime.master.master import Master
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import serialize_response
 

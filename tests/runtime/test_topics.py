@@ -17,7 +17,8 @@ import pytest
 from minirospy.environment import Environment
 from minirospy.errors import HandshakeRefused, MasterUnreachableError, RpcUnreachable, WireError
 from minirospy.runtime.master.master import Master
-from minirospy.runtime.node.node import Node, topics
+from minirospy.runtime.node import topics
+from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
