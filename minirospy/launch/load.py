@@ -111,6 +111,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not Path(word).exists():
             raise MinirospyError(f"[{word}] is no launch file: an argument is written {name}:={value}")
+
     if len(what) == 2 and not Path(what[0]).is_file():
         package, file = what
         try:
@@ -120,6 +121,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
                 f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
                 f"file name: {error}{_package_with(file, packages)}"
             ) from error
+
     for file in what:
         if not Path(file).is_file():
             raise MinirospyError(
@@ -307,6 +309,7 @@ class _File:
         if name in args.declared:
             raise tag.error(f"arg '{name}' has already been declared")
         args.declared.add(name)
+
         if not self._depth and value is None:
             self._spec.args[name] = ArgDoc(name, default, tag.element.attributes.get("doc"))
         if value is not None:
@@ -339,6 +342,7 @@ class _File:
             raise tag.error(
                 f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
             )
+
         inner = self._below(tag, scope)
         self._clear(tag, inner)
         hands_on_all = tag.flag("pass_all_args")
@@ -362,6 +366,7 @@ class _File:
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise tag.error(f"cannot include [{file}]: {why}{_near_files(file)}") from None
+
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)
         _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
@@ -392,6 +397,7 @@ class _File:
         if tag.element.children:
             child = next(tag.children())
             raise child.error(f"<machine>: <{child.name}> has no place in it: use env-loader instead")
+
         timeout = tag.number("timeout", 10.0)
         if timeout <= 0:
             raise tag.error(f"'timeout' must be a positive number: [{timeout:g}]")
@@ -406,6 +412,7 @@ class _File:
             file=self._file,
             line=tag.line,
         )
+
         other = self._spec.machines.setdefault(machine.name, machine)
         if replace(other, file=machine.file, line=machine.line) != machine:
             where = f"{other.file}:{other.line}"
@@ -436,6 +443,7 @@ class _File:
         command = tag.choice("command", ("load", "dump", "delete"))
         ns, param = tag.optional("ns") or "", tag.optional("param") or ""
         namespace = names.join(scope.namespace, ns)
+
         if command == "load":
             is_private = names.is_private(ns) or (not ns and names.is_private(param))
             if not is_private:
@@ -444,6 +452,7 @@ class _File:
                 return scope
             values = rosparam_values(tag, "/" + ns.lstrip("~/"), param.lstrip("~/"))
             return replace(scope, private=(*scope.private, *((name[1:], value) for name, value in values)))
+
         name = names.canonicalize(names.join(namespace, param)) or "/"
         file = tag.optional("file")
         if command == "delete" and file is not None:
@@ -499,12 +508,14 @@ class _File:
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
             raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
+
         scope = self._below(tag, scope)
         full_name = names.canonicalize(f"{scope.namespace}/{name}")
         if tag.flag("clear_params"):
             self._spec.clear.append(full_name)
         for private, value in scope.private:
             self._set(tag, f"{full_name}/{private}", value)
+
         inner = replace(scope, namespace=full_name + "/", private=())
         for child in tag.children():
             if child.name == "param":

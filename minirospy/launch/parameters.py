@@ -36,6 +36,7 @@ def param_value(tag: Tag) -> object:
         text = _decoded(tag, text, _read(tag, text))
     else:
         text = _output_of(tag, text)
+
     name = tag.element.attributes["name"]
     try:
         value = convert(text, tag.optional("type") or "auto")

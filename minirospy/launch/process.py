@@ -143,6 +143,7 @@ def end_processes(
         (_terminate, timeouts.terminate, "escalating to SIGTERM"),
         (_kill, timeouts.terminate, "escalating to SIGKILL"),
     )
+
     killed: list[Process] = []
     for step, seconds, words in steps:
         running = [process for process in processes if process.is_running]
@@ -158,6 +159,7 @@ def end_processes(
         for process in running:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.popen.wait(max(0.0, end - time.monotonic()))
+
     if not _WINDOWS:
         for process in processes:
             # Processes that a node started and left behind, in its group.

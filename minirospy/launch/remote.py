@@ -130,6 +130,7 @@ class RemoteMachines:
                 f"WARNING: ROS_MASTER_URI [{self._environment.master_uri}] means another master on another machine: "
                 "set it, and ROS_HOSTNAME, to this machine's name or address"
             )
+
         api = Api(
             self._environment,
             {
@@ -143,6 +144,7 @@ class RemoteMachines:
         )
         self._api = api
         self._output.say(f"started roslaunch server {api.uri}", bold=True)
+
         by_machine: dict[tuple[str, str, int, str], list[tuple[NodeSpec, MachineSpec]]] = {}
         for node, machine in nodes:
             key = (machine.address, machine.user, machine.ssh_port, machine.env_loader)
@@ -183,6 +185,7 @@ class RemoteMachines:
             self._output.warn(
                 f"WARNING: {machine.file}:{machine.line}: the password is not used: give ssh a key (ssh-copy-id {where})"
             )
+
         options = [
             "BatchMode=yes",
             f"ConnectTimeout={max(1, round(machine.timeout))}",
@@ -199,6 +202,7 @@ class RemoteMachines:
             f"ROS_MASTER_URI={shlex.quote(self._environment.master_uri)} {loader}roslaunch -c {shlex.quote(name)} "
             f"-u {uri} --run_id {shlex.quote(self._run_id)} {timeouts}"
         )
+
         try:
             process = start_process(
                 name,
@@ -223,6 +227,7 @@ class RemoteMachines:
                 continue
             text = f"unable to start remote roslaunch child [{child.name}]: {why}"
             raise LaunchError(machine.file, machine.line, text)
+
         try:
             succeeded, failed = call(child.uri, "launch", launch_text(child.nodes))
         except (RpcError, ValueError) as error:

@@ -58,6 +58,7 @@ class Launcher:
         self._guardian: Guardian | None = None
         self._remote: RemoteMachines | None = None
         self._files = FileWatch(packages) if options.watch else None
+
         self.supervisor = Supervisor(
             self._start_process,
             self._process_exited,
@@ -69,6 +70,7 @@ class Launcher:
         self._master = LaunchMaster(environment, self._output, self.supervisor.pause)
         self._starter = NodeStarter(environment, packages, options, self._master)
         self._dead = DeadNodes(environment.master_uri)
+
         self._has_begun = False
         self._has_run = False
         self.failed: list[NodeSpec] = []

@@ -55,6 +55,7 @@ def run_bare(
     results_file.unlink(missing_ok=True)
     command = [sys.executable, str(file)] if file.suffix == ".py" else [str(file.absolute())]
     command += [*arguments, f"{XML_OUTPUT_FLAG}{results_file}", *(["--text"] if text else [])]
+
     started = time.perf_counter()
     try:
         status = _run(command, seconds)

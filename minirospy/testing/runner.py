@@ -66,6 +66,7 @@ class RosTest:
                     f"[{test.node.name}], whose place it takes where it is a node itself: give the <test> a name",
                     file=sys.stderr,
                 )
+
         for name, tests in sorted(by_name.items()):
             case = TestCaseResult(f"test{name}")
             case.classname = _CLASS
@@ -114,6 +115,7 @@ class RosTest:
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
+
         with contextlib.ExitStack() as stack:
             if not self.text:
                 stack.enter_context(contextlib.redirect_stdout(said))
@@ -156,6 +158,7 @@ class RosTest:
             output="screen" if self.text else "log",
         )
         spec = replace(self.spec, nodes=[*self.spec.nodes, node], tests=[])
+
         launcher = Launcher(spec, environment, self.packages, RunOptions(strict=True, log_errors=True))
         timer = threading.Timer(test.time_limit, launcher.stop, ("time-limit",))
         timer.start()

@@ -104,6 +104,7 @@ class Node:
         self.services: dict[str, ServiceServer] = {}
         self.parameters: set[str] = set()
         """The parameters that this node has subscribed to at the master; the caller that subscribes adds them."""
+
         self._tables: Mapping[str, dict[str, Any]] = {
             "Publisher": self.publications,
             "Subscriber": self.subscriptions,
@@ -117,6 +118,7 @@ class Node:
         """Topics with a subscription that has ended recently."""
         self._requesting: dict[str, asyncio.TimerHandle] = {}
         """Topics whose publishers are to be requested from the master again."""
+
         self.uri = ""
         self._on_shutdown = on_shutdown
         self._on_parameter = on_parameter
@@ -124,6 +126,7 @@ class Node:
         self._watch_seconds = watch_seconds
         self.when_registered_again: list[Callable[[], object]] = []
         """Called in workers when the master had forgotten this node: to register what else it needs."""
+
         self._readers = ReaderSet()
         self._rpc = AsyncRpcClient(same_host=environment.same_host)
         self._server: RpcServer | None = None
@@ -134,6 +137,7 @@ class Node:
         """The value of :func:`local.this_host`, where this node uses Unix sockets too."""
         self.unix_name = ""
         """Where topics are served to processes of this machine; "" where they are not."""
+
         self._watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
         self._answered = 0.0
@@ -157,6 +161,7 @@ class Node:
         self._listener.open(host, tcpros_port, ports)
         if self.environment.same_host:
             self._open_unix_listener()
+
         self._server = RpcServer(
             SlaveApi(self).dispatch,
             bind_host=host,
@@ -171,6 +176,7 @@ class Node:
         except BaseException:
             await self.close()
             raise
+
         self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
         self._watching = asyncio.ensure_future(self._watch_master())
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
@@ -374,6 +380,7 @@ class Node:
                 raise
             sock.close()  # the master has notified the peer that this node leaves
             return
+
         if "service" in fields:
             server = self.services.get(fields["service"])
             if server:
@@ -389,6 +396,7 @@ class Node:
                 why = f"[{self.name}] is not a publisher of [{fields['topic']}]. Topics are {topics}"
         else:
             why = "no topic or service name detected"
+
         if why:
             self._listener.log_refusal(f"Could not process inbound connection: {why}{fields}")
             await tcp.send_header(sock, {"error": why})
@@ -499,6 +507,7 @@ class Node:
             await asyncio.sleep(self._watch_seconds)
             if not (self._known or any(self._tables.values())):
                 continue
+
             known = [key for key, part in self._known.items() if part]
             asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
             has_forgotten = False
@@ -518,6 +527,7 @@ class Node:
             except RpcError as error:
                 _log.debug("looking up this node: %s", error)
                 continue
+
             failures = 0
             if has_forgotten:
                 self._known.clear()

@@ -69,6 +69,7 @@ class ServiceClient:
         # Made before connecting, so that the server finds it when it looks at the connection for the first time.
         header = serialize_header(fields)
         self._sock = _connected(parse_service_uri(uri), timeout, same_host=same_host)
+
         try:
             self._sock.sendall(header)
             self._reader = Reader(self._sock)
@@ -78,6 +79,7 @@ class ServiceClient:
         except BaseException:
             self._sock.close()
             raise
+
         if waits:
             self.finish()
 
@@ -226,6 +228,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
     if unix:
         unix.settimeout(timeout)
         return unix
+
     try:
         socket.inet_pton(socket.AF_INET, address[0])
     except OSError:
@@ -233,6 +236,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sock = socket.create_connection(named, timeout)
         sockets.tune(sock)
         return sock
+
     # Most services have an address for a host: no resolver is needed.
     sock = socket.socket()
     try:

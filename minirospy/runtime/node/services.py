@@ -127,6 +127,7 @@ class ServiceServer:
                 length = reader.take(4, at_end_ok=True)
                 if not length:
                     return
+
                 connection.busy = True
                 request = reader.take(checked(LENGTH.unpack(length)[0]))
                 sock.sendall(self._respond(memoryview(request), fields))
@@ -188,6 +189,7 @@ class LoopServiceServer(ServiceServer):
     async def _serve_on_loop(self, connection: _Connection, fields: Header) -> None:
         sock, loop = connection.sock, asyncio.get_running_loop()
         persistent = _is_persistent(fields)
+
         try:
             while not self._closed:
                 length = await _receive_length(sock)

@@ -112,6 +112,7 @@ class Publication:
         why = check_subscriber(fields, self.topic, self.type)
         if why:
             return why
+
         sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         link = OutLink(
@@ -123,6 +124,7 @@ class Publication:
             header=serialize_header(answer),
             split=fields.get("split_frames") == "1",
         )
+
         for other in self.links:
             if other.peer == link.peer and other.waiting:
                 # A node connects but once: it lost the old link, where frames wait for a peer that is not there.
@@ -227,6 +229,7 @@ class Subscription:
         self._workers = workers
         self._readers = readers
         self._on_loop = on_loop
+
         self.lists = 0
         """How many lists of publishers have been received."""
         self._plan = SubscriptionPlan()
@@ -357,6 +360,7 @@ class Subscription:
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
+
         try:
             sockets.tune(sock, nodelay=self.tcp_nodelay)
             fields = subscriber_header(
@@ -440,6 +444,7 @@ class Subscription:
                 self._complaints.error("no connection for %s: %s", self.topic, explain(cause))
             self._start_connecting(action)
             return
+
         nameless = isinstance(cause, socket.gaierror)
         # A publisher that is shutting down refuses or disconnects; silence is the address's fault, or a firewall's.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
@@ -463,6 +468,7 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
         host = split_uri(uri)[0]
     except ValueError:
         return "That is no address of a node: whoever registered it has to say http://host:port/"
+
     if nameless:
         return (
             f"This machine does not know the name '{host}': on the publisher's machine set ROS_IP to its address, "

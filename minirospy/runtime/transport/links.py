@@ -86,6 +86,7 @@ class OutLink:
         self.sent_bytes = 0
         self.sent = 0
         self.dropped = 0
+
         self._is_same_host = sock.family not in FAMILIES
         if self._is_same_host:
             self.address, self.transport = "unix", "UNIXROS"
@@ -94,6 +95,7 @@ class OutLink:
                 host, port = sock.getpeername()[:2]
                 self.address = f"{host}:{port}"
                 self._is_same_host = host == sock.getsockname()[0]
+
         self._sock = sock
         self._loop = loop
         self._on_closed = on_closed
@@ -141,6 +143,7 @@ class OutLink:
             self.sent_bytes += len(frame)
             if self._outbox and self._has_to_wait(frame):
                 return
+
             try:
                 count = self._sock.send(frame)
             except (BlockingIOError, InterruptedError):
@@ -215,6 +218,7 @@ class OutLink:
         self.sent_bytes += 4 + frame.size
         if self._outbox and self._has_to_wait(buffers):
             return
+
         size = sum(map(len, buffers))
         left = size
         end = time.monotonic() + _PUSH_SECONDS
@@ -232,6 +236,7 @@ class OutLink:
                 return
             if not self._may_stay() or time.monotonic() > end or not is_writable(self._sock, _PUSH_WAIT_MS):
                 break
+
         self._begun = left < size
         self._outbox.append(buffers)
         self._post(self._start_writing)
@@ -263,6 +268,7 @@ class OutLink:
             self._loop.remove_writer(self._sock)
             self._loop.call_later(_PUSH_SECONDS, self._start_writing)
             return
+
         try:
             if self._closed:
                 return
@@ -291,6 +297,7 @@ class OutLink:
                 outbox.popleft()
                 self._begun = False
             return
+
         small: list[bytes] = []
         for frame in islice(outbox, _GATHER):
             if isinstance(frame, list):
