@@ -138,7 +138,7 @@ def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPat
     assert roslaunch.roslaunch_logs.get_run_id() is None
 
 
-def test_a_listener_may_fail_and_may_end_all(
+def test_a_listener_may_fail_and_may_stop_the_launch(
     master: str, package: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     died: list[str] = []

@@ -14,7 +14,7 @@ from minirospy.cli.ros import roslaunch
 from tests.launch.conftest import BIN
 
 
-def test_every_fault_is_told_with_its_line(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_fault_is_reported_with_its_line(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
     inner = package / "inner.launch"
     inner.write_text('<launch>\n<param name="p" value="$(env NO_SUCH)"/>\n</launch>')
     file = package / "a.launch"

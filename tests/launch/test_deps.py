@@ -42,7 +42,7 @@ def test_what_a_file_needs(files: Path, capsys: pytest.CaptureFixture[str]) -> N
     )
 
 
-def test_a_file_that_is_missing_is_told(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_file_is_reported(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files.write_text('<launch>\n<include file="$(find other)/gone.launch"/></launch>')
     assert roslaunch_deps.main([str(files)]) == 0
     said = capsys.readouterr()

@@ -16,7 +16,7 @@ def load(attributes: str = "", inside: str = "") -> LaunchSpec:
     return load_text(TEST.format(attributes, inside), {}, Packages.below(), {})
 
 
-def test_what_a_test_says() -> None:
+def test_attributes_of_a_test() -> None:
     spec = load()
     (test,) = spec.tests
     assert (test.test_name, test.time_limit, test.retry) == ("a", 60.0, 0)

@@ -41,7 +41,7 @@ def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: 
     assert "ended by SIGINT" in launch.read_until("ended by")
 
 
-def test_a_node_that_does_not_listen_is_killed(start: Start, master: str) -> None:
+def test_a_node_that_ignores_signals_is_killed(start: Start, master: str) -> None:
     deaf = start(
         f'{NODE}"a" args="SIGINT SIGTERM" output="screen"/>', "--sigint-timeout=0.2", "--sigterm-timeout=0.2"
     )
@@ -98,7 +98,7 @@ def test_a_program_that_is_missing_stops_no_other(start: Start, master: str) -> 
     assert launch.process.returncode == 0
 
 
-def test_respawn_waits_as_long_as_it_says(start: Start, master: str) -> None:
+def test_respawn_waits_for_its_delay(start: Start, master: str) -> None:
     launch = start(
         f'<node pkg="pkg" type="stop.py" name="a" args="0" respawn="true" respawn_delay="0.3"/>{NODE}"b"/>'
     )
@@ -121,7 +121,7 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     assert f"[a-1] {file} has changed\nended by SIGINT\n[a-1] restarting process\n" in said
 
 
-def test_a_node_is_guarded_and_watched_before_it_is_heard_of(
+def test_a_node_is_guarded_and_watched_before_it_is_announced(
     package: Path, master: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = NodeSpec("/a", "pkg", "wait.py")

@@ -8,7 +8,7 @@ from minirospy.runtime.transport import complaints
 from minirospy.runtime.transport.complaints import Complaints
 
 
-def test_a_flood_is_told_by_its_first_line_and_its_number(
+def test_a_flood_is_logged_as_its_first_line_and_a_count(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
@@ -31,7 +31,7 @@ def test_a_flood_is_told_by_its_first_line_and_its_number(
     assert all(record.filename == "test_complaints.py" for record in caplog.records)
 
 
-def test_so_many_lines_as_were_asked_for_and_the_number_of_the_others_at_the_end(
+def test_the_requested_number_of_lines_and_a_count_of_the_others(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     told = Complaints(complaints.logging.getLogger("test-complaints"), 3)

@@ -114,7 +114,7 @@ def test_a_full_queue_drops_the_oldest_and_never_half_a_frame(
     assert all(data[at : at + 4] == struct.pack("<I", size) for at in range(0, len(data), size + 4))
 
 
-def test_a_peer_that_hangs_up_ends_the_link_and_whoever_waits_for_it(
+def test_a_peer_that_disconnects_closes_the_link_and_releases_waiting_threads(
     pair: tuple[socket.socket, socket.socket], loop: LoopThread
 ) -> None:
     ended = threading.Event()
@@ -129,7 +129,7 @@ def test_a_peer_that_hangs_up_ends_the_link_and_whoever_waits_for_it(
     link.send(b"to nobody")
 
 
-def test_what_a_subscriber_says_is_not_listened_to(
+def test_bytes_from_a_subscriber_are_ignored(
     pair: tuple[socket.socket, socket.socket], loop: LoopThread
 ) -> None:
     ended = threading.Event()

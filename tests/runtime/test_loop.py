@@ -11,7 +11,7 @@ import pytest
 from minirospy.runtime.transport.loop import LoopClosedError, LoopThread
 
 
-def test_a_call_that_comes_while_the_loop_ends_is_told_so() -> None:
+def test_a_call_while_the_loop_closes_gets_an_error() -> None:
     thread = LoopThread("test-loop")
     stopping, begun = threading.Event(), threading.Event()
 
@@ -34,7 +34,7 @@ def test_a_call_that_comes_while_the_loop_ends_is_told_so() -> None:
     thread.close()
 
 
-def test_calls_begin_in_their_order() -> None:
+def test_calls_start_in_their_order() -> None:
     thread = LoopThread("test-loop")
     order: list[int] = []
 

@@ -121,7 +121,7 @@ def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
             assert any(isinstance(arg, str) and has_controls(arg) for arg in call[1:]), call
 
 
-def test_nodes_are_told_what_real_rosmaster_tells_them(master: str) -> None:
+def test_nodes_are_notified_as_by_real_rosmaster(master: str) -> None:
     golden = json.loads((HERE / "master_answers.json").read_text())["notices"]
     for call, ours, real in zip(referee().SCENE, notices(master, golden), golden, strict=True):
         assert ours == real, call
@@ -176,7 +176,7 @@ def proxy(master: str) -> Iterator[ServerProxy]:
         yield found
 
 
-def test_subscribers_are_told_the_full_list_each_time(proxy: ServerProxy, slaves: list[Slave]) -> None:
+def test_subscribers_get_the_full_list_each_time(proxy: ServerProxy, slaves: list[Slave]) -> None:
     subscriber, publisher = slaves
     proxy.registerSubscriber("/sub", "/t", "std_msgs/Bool", subscriber.uri)
     proxy.registerPublisher("/pub", "/t", "std_msgs/Bool", publisher.uri)
@@ -189,7 +189,7 @@ def test_subscribers_are_told_the_full_list_each_time(proxy: ServerProxy, slaves
     assert subscriber.next() == ("publisherUpdate", "/master", "/t", [])
 
 
-def test_the_older_node_of_a_name_is_told_to_stop(proxy: ServerProxy, slaves: list[Slave]) -> None:
+def test_the_older_node_of_a_name_is_shut_down(proxy: ServerProxy, slaves: list[Slave]) -> None:
     old, new = slaves
     proxy.registerPublisher("/same", "/t", "std_msgs/Bool", old.uri)
     proxy.registerPublisher("/same", "/u", "std_msgs/Bool", new.uri)
@@ -202,7 +202,7 @@ def test_the_older_node_of_a_name_is_told_to_stop(proxy: ServerProxy, slaves: li
     assert proxy.unregisterPublisher("/same", "/u", old.uri)[2] == 0  # type: ignore[index]
 
 
-def test_a_subscriber_that_never_answers_delays_nobody(proxy: ServerProxy, slaves: list[Slave]) -> None:
+def test_a_subscriber_that_never_answers_delays_no_other(proxy: ServerProxy, slaves: list[Slave]) -> None:
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
@@ -232,7 +232,7 @@ def test_an_update_does_not_meet_the_answer_to_a_registration(
     assert fresh.called.empty()
 
 
-def test_what_was_held_is_told_a_moment_later(proxy: ServerProxy, slaves: list[Slave]) -> None:
+def test_a_deferred_update_is_sent_a_moment_later(proxy: ServerProxy, slaves: list[Slave]) -> None:
     told = slaves[0]
     for number in range(20):
         proxy.registerSubscriber("/node", f"/t{number}", "std_msgs/Bool", told.uri)
@@ -286,7 +286,7 @@ def test_many_calls_in_one(proxy: ServerProxy) -> None:
         (b'POST / HTTP/1.1\r\nContent-Length: 41\r\n\r\n<!DOCTYPE a [<!ENTITY b "c">]><methodCall>', b"400"),
     ],
 )
-def test_bad_requests_are_refused_and_harm_nobody(master: str, request_bytes: bytes, status: bytes) -> None:
+def test_bad_requests_are_refused_and_do_no_harm(master: str, request_bytes: bytes, status: bytes) -> None:
     port = int(master.rsplit(":", 1)[1])
     with socket.create_connection(("127.0.0.1", port), 5) as sock:
         sock.sendall(request_bytes)

@@ -187,7 +187,7 @@ def exchange(uri: str, data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("what", BAD)
-def test_bad_requests_get_their_answer_and_harm_nobody(master: str, what: str) -> None:
+def test_bad_requests_get_an_answer_and_do_no_harm(master: str, what: str) -> None:
     request, expected = BAD[what]
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/kept", 1)

@@ -104,7 +104,7 @@ def test_a_method_that_is_not_there_is_a_fault() -> None:
         ({"service": "/s", "callerid": "/raw"}, "[/node] is not a provider of  [/s]"),
     ],
 )
-def test_a_peer_that_asks_for_what_is_not_there_is_told_so(
+def test_a_peer_that_requests_an_unknown_topic_gets_an_error(
     fields: dict[str, str], error: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scene() -> None:
@@ -149,7 +149,7 @@ def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.Mon
         ("localhost", "localhost", False),
     ],
 )
-def test_a_node_that_is_on_loopback_for_a_master_elsewhere_says_so(
+def test_a_node_on_loopback_warns_of_a_master_on_another_host(
     host: str, master: str, told: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scene() -> None:
@@ -160,7 +160,7 @@ def test_a_node_that_is_on_loopback_for_a_master_elsewhere_says_so(
     assert ("set ROS_IP" in caplog.text) == told
 
 
-def test_news_of_parameters_are_told_in_order() -> None:
+def test_parameter_updates_are_delivered_in_order() -> None:
     told: list[int] = []
     both, later = threading.Event(), threading.Event()
 
@@ -180,7 +180,7 @@ def test_news_of_parameters_are_told_in_order() -> None:
     assert told == [1, 2]
 
 
-def test_other_threads_may_ask_what_there_is_while_it_changes() -> None:
+def test_other_threads_may_query_the_tables_while_they_change() -> None:
     node = Node("/n", Environment.read(NO_MASTER))
 
     class Publishing(Publication):

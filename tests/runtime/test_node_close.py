@@ -182,7 +182,7 @@ def test_close_sends_the_unregistration_before_it_flushes() -> None:
     run(scene)
 
 
-def test_close_leaves_a_name_with_a_call_under_way_to_the_end_of_that() -> None:
+def test_close_unregisters_a_name_after_the_call_under_way() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)

@@ -45,7 +45,7 @@ async def until(condition: Callable[[], object]) -> None:
         await asyncio.sleep(0.002)
 
 
-def test_a_kept_connection_that_the_peer_closed_is_made_anew() -> None:
+def test_a_kept_connection_that_the_peer_closed_is_replaced() -> None:
     async def test() -> None:
         client, server = AsyncRpcClient(), RpcServer(lambda method, args: [method, *args])
         await server.start()
@@ -109,7 +109,7 @@ def test_a_server_at_the_ipv6_address_of_localhost_alone_is_found() -> None:
     run(test)
 
 
-def test_what_is_under_way_ends_with_its_client_and_its_time() -> None:
+def test_a_call_under_way_ends_with_its_client_or_its_time_limit() -> None:
     async def test() -> None:
         with socket.create_server(("127.0.0.1", 0)) as silent:
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
@@ -156,7 +156,7 @@ def test_bad_answers(answer: bytes, why: str) -> None:
     run(test)
 
 
-def test_a_bad_uri_is_told_at_once() -> None:
+def test_a_bad_uri_is_reported_immediately() -> None:
     async def test() -> None:
         client, found = AsyncRpcClient(), list[bytes | RpcError]()
         client.begin("nonsense", CALL, 1.0, found.append)
@@ -196,7 +196,7 @@ def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -
     run(test)
 
 
-def test_an_update_that_waited_tells_of_the_publishers_that_came_unsaid() -> None:
+def test_an_update_that_waited_lists_later_publishers_too() -> None:
     async def test() -> None:
         told: list[int] = []
 
@@ -265,7 +265,7 @@ def test_a_kept_connection_ends_with_its_server() -> None:
     run(test)
 
 
-def test_what_a_server_says_unasked_is_nobodys_answer() -> None:
+def test_unrequested_bytes_of_a_server_are_not_an_answer() -> None:
     body = b"<methodResponse><params><param><value>%d</value></param></params></methodResponse>"
     calls = ended = 0
 
@@ -295,7 +295,7 @@ def test_what_a_server_says_unasked_is_nobodys_answer() -> None:
     run(test)
 
 
-def test_a_node_on_the_loop_is_told_without_a_call() -> None:
+def test_a_node_on_the_loop_is_notified_without_a_call() -> None:
     async def test() -> None:
         told: list[tuple[float, str, int]] = []
         loop = asyncio.get_running_loop()

@@ -33,7 +33,7 @@ def connect(server: RpcServer) -> socket.socket:
     return socket.create_connection(("127.0.0.1", server.port), 5)
 
 
-def test_who_asks_much_at_once_keeps_nobody_waiting_and_gets_all_its_answers_in_order() -> None:
+def test_a_client_with_many_requests_delays_no_other_and_gets_answers_in_order() -> None:
     told: list[str] = []
 
     def dispatch(method: str, args: Sequence[Any]) -> str:
@@ -62,7 +62,7 @@ def test_who_asks_much_at_once_keeps_nobody_waiting_and_gets_all_its_answers_in_
     assert places == sorted(places)
 
 
-def test_who_is_hung_up_on_amid_its_requests_gets_no_more_answers() -> None:
+def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> None:
     told: list[str] = []
 
     def dispatch(method: str, args: Sequence[Any]) -> int:
@@ -87,7 +87,7 @@ def test_who_is_hung_up_on_amid_its_requests_gets_no_more_answers() -> None:
     assert asyncio.run(scene()) == len(told) < 50
 
 
-def test_the_time_limit_starts_anew_for_who_gets_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rpc_server, "_PROGRESS", 10_000)
 
     async def scene() -> None:
@@ -118,7 +118,7 @@ def test_the_time_limit_starts_anew_for_who_gets_on(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("last_closes", [False, True])
-def test_who_asks_on_while_a_method_waits_is_not_read_from_meanwhile(last_closes: bool) -> None:
+def test_a_client_is_not_read_from_while_its_method_waits(last_closes: bool) -> None:
     told: list[str] = []
 
     async def scene() -> bytes:

@@ -57,14 +57,14 @@ def test_a_port_out_of_a_range() -> None:
             tcp.bind("127.0.0.1", 0, range(first, first + 1))
 
 
-def test_a_port_that_is_asked_for_goes_before_the_range() -> None:
+def test_a_requested_port_is_preferred_to_the_range() -> None:
     with tcp.bind("127.0.0.1") as probe:
         port = probe.getsockname()[1]
     with tcp.bind("127.0.0.1", port, range(1, 2)) as sock:
         assert sock.getsockname()[1] == port
 
 
-def test_connecting_says_what_it_did_when_it_fails() -> None:
+def test_a_failed_connection_names_its_step() -> None:
     async def scene() -> None:
         with pytest.raises(ConnectionRefusedError):
             await tcp.connect("127.0.0.1", 1)
@@ -147,7 +147,7 @@ def test_garbage_is_refused_with_a_log_line(data: bytes, caplog: pytest.LogCaptu
     assert "refused: " in caplog.text
 
 
-def test_a_peer_that_says_nothing_is_left_after_a_while(
+def test_a_silent_peer_is_disconnected_after_a_while(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tcp.receive_header, "__defaults__", (0.05,))

@@ -190,7 +190,7 @@ def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() ->
     run_manually(scene)
 
 
-def test_update_after_the_pause_or_of_another_topic_is_sent_at_once() -> None:
+def test_update_after_the_pause_or_of_another_topic_is_sent_immediately() -> None:
     async def scene(clock: ManualLoop) -> None:
         told: list[str] = []
         notifier = Notifier(Graph(), Turns(), 5.0)
@@ -276,7 +276,7 @@ async def graph(*names: str) -> AsyncIterator[tuple[Master, list[Node]]]:
         await master.close()
 
 
-def test_connection_that_says_nothing_is_closed_after_10_seconds(caplog: pytest.LogCaptureFixture) -> None:
+def test_silent_connection_is_closed_after_10_seconds(caplog: pytest.LogCaptureFixture) -> None:
     async def scene(clock: ManualLoop) -> None:
         async with graph("/n") as (_, (node,)):
             with socket.create_connection(("127.0.0.1", node.tcpros_port)) as peer:

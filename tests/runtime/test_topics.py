@@ -177,7 +177,7 @@ def test_a_publisher_that_closes_the_connection_is_connected_again() -> None:
     run(scene)
 
 
-def test_a_refused_subscriber_is_told_why_and_does_not_ask_again_until_something_changes(
+def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def scene() -> None:
@@ -196,7 +196,7 @@ def test_a_refused_subscriber_is_told_why_and_does_not_ask_again_until_something
     assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
 
 
-def test_a_publisher_that_sends_garbage_is_told_of_and_asked_less_and_less(
+def test_a_publisher_that_sends_garbage_is_reported_and_retried_less_and_less(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delays: list[float] = []
@@ -355,7 +355,7 @@ async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
     return sock
 
 
-def test_a_publisher_whose_address_is_none_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_publisher_with_an_invalid_address_is_reported(caplog: pytest.LogCaptureFixture) -> None:
     async def scene() -> None:
         async with graph("/a") as (_, (node,)):
             subscription = await listen(node, "/t", Box())
@@ -541,7 +541,7 @@ KINDS = ["publisher", "subscriber", "service"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_registration_does_not_overtake_the_end_of_the_one_before(
+def test_a_registration_does_not_overtake_the_unregistration_before(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     async def scene() -> None:
@@ -558,7 +558,7 @@ def test_a_registration_does_not_overtake_the_end_of_the_one_before(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_end_of_the_node_does_not_overtake_a_registration(
+def test_the_shutdown_of_the_node_does_not_overtake_a_registration(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     async def scene() -> None:
@@ -604,7 +604,7 @@ def test_close_gives_up_a_registration_that_a_silent_master_leaves_unanswered(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_master_that_was_away_for_a_moment_hears_what_it_missed(
+def test_a_master_that_was_away_gets_the_registrations_it_missed(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     """It kept its tables, so it knows the node."""
@@ -637,7 +637,7 @@ def test_a_master_that_was_away_for_a_moment_hears_what_it_missed(
     run(scene)
 
 
-def test_a_master_that_restarted_and_heard_of_something_new_hears_of_the_rest() -> None:
+def test_a_restarted_master_that_knows_one_new_topic_gets_all_others() -> None:
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.3, port=free_port()) as (master, (a,)):
             await offer(a, "service")
@@ -677,7 +677,9 @@ def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
     assert not caplog.text
 
 
-def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_master_that_forgot_everything_gets_all_registrations_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     async def scene() -> None:
         async with graph("/a", "/b", watch_seconds=0.05, port=free_port()) as (master, (a, b)):
             box = Box()
@@ -712,7 +714,7 @@ def test_a_master_that_forgot_everything_is_told_again(caplog: pytest.LogCapture
     assert "has restarted: registered again" in caplog.text
 
 
-def test_a_list_that_is_still_filling_drops_nobody_who_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(topics, "_SETTLE_SECONDS", 0.01)
 
     async def scene() -> None:

@@ -208,7 +208,7 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
     run(scene)
 
 
-def test_a_name_that_somebody_else_took_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     # As if this process, which took the name, were another user's and not root's.
     monkeypatch.setattr(local, "_TRUSTED", frozenset())
@@ -290,7 +290,7 @@ print(local.bind(host, port).getsockname() == f"\\0minirospy-{host}:{port}".enco
 
 
 @pytest.mark.parametrize("host", ["a..b", "a" * 64, "\u00fc" * 64, "\udcff", "a\0b"])
-def test_what_can_be_nobodys_name_is_told_of_as_unreachable(host: str) -> None:
+def test_an_impossible_host_name_is_reported_as_unreachable(host: str) -> None:
     async def scene() -> None:
         uri, service = f"http://{host}:9/", f"rosrpc://{host}:9"
         with pytest.raises(RpcUnreachable):

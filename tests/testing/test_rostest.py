@@ -53,7 +53,7 @@ def cases(file: Path) -> list[str]:
     return [case.get("name") or "" for case in ElementTree.parse(file).getroot().iter("testcase")]
 
 
-def test_each_way_to_end(tmp_path: Path) -> None:
+def test_each_outcome(tmp_path: Path) -> None:
     status, out, err = ran("rostest", "tested", "all.test", "limit:=1.0")
     assert (status, err) == (1, "")
     said = out.split("[ROSTEST]---")[0]
@@ -98,7 +98,7 @@ def test_a_test_called_as_a_node_is_warned_of(tmp_path: Path) -> None:
     assert "x.test:1: test [a] is called as the node [/a]" in err
 
 
-def test_a_failed_test_is_status_2_and_names_are_as_asked(tmp_path: Path) -> None:
+def test_a_failed_test_is_status_2_and_names_are_as_requested(tmp_path: Path) -> None:
     file = write_test(tmp_path / "x.test", '<test test-name="bad" pkg="tested" type="bad.py"/>')
     base = tmp_path / "results"
     options = ("--package", "mine", "--pkgdir", tmp_path, "--results-filename", "other.xml")
@@ -174,7 +174,7 @@ def test_ctrl_c_before_the_tests_is_no_success(
     assert command([str(TEST / "good.py")]) == 1
 
 
-def test_no_test_outlives_a_ctrl_c_that_comes_when_it_begins(
+def test_no_test_outlives_a_ctrl_c_at_its_start(
     tmp_path: Path, interrupted_processes: list[subprocess.Popen[bytes]]
 ) -> None:
     with pytest.raises(MinirospyError, match="interrupted: how the test went is not known"):
