@@ -232,6 +232,34 @@ def _count(master: FakeMaster, method: str) -> int:
     return [name for name, _ in master.calls].count(method)
 
 
+def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by asyncio.wait_for before Python 3.12, where the answer comes in the same moment."""
+
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            node._watch_seconds = 0.0
+            looking = asyncio.Event()
+
+            async def lose(awaitable: Coroutine[Any, Any, Any], _: float) -> None:
+                awaitable.close()
+                looking.set()
+                try:
+                    await asyncio.sleep(60)
+                except asyncio.CancelledError:
+                    return
+
+            with monkeypatch.context() as patch:
+                patch.setattr(node_module.asyncio, "wait_for", lose)
+                assert node._watching
+                node._watching.cancel()
+                node._watching = asyncio.ensure_future(node._watch_master())
+                await looking.wait()
+                await node.close()
+
+    run(scene)
+
+
 def test_close_gives_up_on_a_master_that_is_silent(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

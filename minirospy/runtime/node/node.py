@@ -252,6 +252,9 @@ class Node:
         except asyncio.TimeoutError as error:
             self._is_master_silent = True
             raise MasterUnreachableError(self.environment.master_uri) from error
+        if self._closed:
+            # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the answer.
+            raise asyncio.CancelledError
 
     async def advertise(self, publication: Publication) -> None:
         """Publish a topic. One publication a topic: a second is a ValueError."""
@@ -503,7 +506,7 @@ class Node:
         master that kept its tables.
         """
         failures = 0
-        while True:
+        while not self._closed:
             await asyncio.sleep(self._watch_seconds)
             if not (self._known or any(self._tables.values())):
                 continue
