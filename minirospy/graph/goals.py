@@ -213,7 +213,7 @@ _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.
 
 
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
-    """What a client in ``state`` passes through when it hears ``status``; None where that cannot follow.
+    """Return what a client in ``state`` passes through when it receives ``status``; None where that cannot follow.
 
     Raises KeyError on a status that no server tells.
     """
@@ -233,5 +233,5 @@ def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -
 
 
 def visible_state(status: int) -> int:
-    """What the simple client tells of a goal's status: one that is being cancelled is still pending or active."""
+    """Return the simple client's view of a goal's status: one that is being cancelled is still pending or active."""
     return int(_VISIBLE.get(status, status))

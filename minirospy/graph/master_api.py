@@ -128,7 +128,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def hold(self, uri: str, topic: str) -> None:
-        """The node gets its answer about a topic or PARAMETERS, and is not told of changes at the same moment."""
+        """Delay notices to a node about a topic or PARAMETERS, whose answer it is receiving now."""
 
     @abstractmethod
     def stop(self) -> None:
@@ -145,11 +145,11 @@ class MasterApi(ABC):
     # --- about the master
 
     def get_pid(self, caller_id: str) -> Answer:
-        """The master's process id."""
+        """Return the master's process id."""
         return [SUCCESS, "", os.getpid()]
 
     def get_uri(self, caller_id: str) -> Answer:
-        """The master's URI."""
+        """Return the master's URI."""
         return [SUCCESS, "", self.uri]
 
     def shutdown(self, caller_id: str, msg: str = "") -> Answer:
@@ -171,7 +171,7 @@ class MasterApi(ABC):
         return [SUCCESS, f"rosrpc URI: [{uri}]", uri] if uri else [ERROR, "no provider", ""]
 
     def get_system_state(self, caller_id: str) -> Answer | Steps[Answer]:
-        """Publishers, subscribers and services, each as [name, nodes]."""
+        """Return publishers, subscribers and services, each as [name, nodes]."""
         steps = self.collect_system_state()
         return finish(steps) if self.registry.is_small else steps
 
@@ -259,7 +259,7 @@ class MasterApi(ABC):
     # --- parameters
 
     def get_param(self, caller_id: str, name: str) -> Answer:
-        """A parameter's value."""
+        """Return a parameter's value."""
         try:
             return [SUCCESS, f"Parameter [{name}]", self.parameters.get(name)]
         except KeyError:
@@ -318,7 +318,7 @@ class MasterApi(ABC):
         return self._run(delete(), self.parameters.count_subscriptions())
 
     def search_param(self, caller_id: str, key: str) -> Answer:
-        """The nearest parameter of a name, upwards from the caller's namespace."""
+        """Return the nearest parameter of a name, upwards from the caller's namespace."""
         if key.startswith("~"):
             return [FAILURE, "Internal failure: invalid key", 0]
         if not caller_id.startswith("/"):
@@ -329,7 +329,7 @@ class MasterApi(ABC):
         return [SUCCESS, f"Found [{found}]", found]
 
     def get_param_names(self, caller_id: str) -> Answer | Steps[Answer]:
-        """The names of all parameters."""
+        """Return the names of all parameters."""
 
         def collect() -> Steps[Answer]:
             return [SUCCESS, "Parameter names", (yield from self.parameters.names_in_steps())]
@@ -395,9 +395,9 @@ def _store_nothing(_: object) -> Steps[int]:
 
 
 def nothing(*_: object) -> None:
-    """What stands where a journal or a log would."""
+    """Do nothing, in place of a journal or a log."""
 
 
 def key_of_node(key: str) -> str:
-    """A parameter's name among a node's entries, where topics and services stand too."""
+    """Return a parameter's name among a node's entries, which hold topics and services too."""
     return key.rstrip("/") or "/"

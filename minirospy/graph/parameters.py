@@ -139,7 +139,7 @@ class ParameterTree:
         return self._updates(path)
 
     def search(self, namespace: str, key: str) -> str | None:
-        """The name of the nearest parameter ``key``, upwards from ``namespace``.
+        """Return the name of the nearest parameter ``key``, upwards from ``namespace``.
 
         Only the first part of ``key`` has to exist, as the API demands: a node may look for a namespace
         whose parameters come later. None where there is none.

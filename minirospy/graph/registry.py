@@ -210,7 +210,7 @@ class Registry:
         return self._bytes < _FEW_BYTES
 
     def node_uri(self, node: str) -> str | None:
-        """The URI of a node's Slave API."""
+        """Return the URI of a node's Slave API."""
         entry = self._nodes.get(node)
         return entry.uri if entry else None
 
@@ -228,16 +228,16 @@ class Registry:
         return len(self._subscribers.get(topic, ()))
 
     def publisher_uris(self, topic: str) -> list[str]:
-        """The URIs of a topic's publishers."""
+        """Return the URIs of a topic's publishers."""
         return list(self._publishers.get(topic, {}).values())
 
     def subscriptions(self, node: str) -> list[str]:
-        """The topics that a node subscribes to."""
+        """Return the topics that a node subscribes to."""
         entry = self._nodes.get(node)
         return entry.names(_SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
-        """The type of each topic that was ever registered with one."""
+        """Return the type of each topic that was ever registered with one."""
         return dict(self._types)
 
     def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:

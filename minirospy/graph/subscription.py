@@ -43,7 +43,7 @@ class SubscriptionPlan:
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """The master's list has come: the full one, or with ``keep`` one that lacks some who are still there."""
+        """Apply the master's list: the full one, or with ``keep`` one that lacks some publishers that still exist."""
         wanted = dict.fromkeys(uris)
         if keep:
             wanted.update(dict.fromkeys(self._failures))
@@ -58,17 +58,17 @@ class SubscriptionPlan:
         return self._failures.get(uri, 0)
 
     def worked(self, uri: str) -> None:
-        """The link to ``uri`` has done its work: its next failure counts as the first."""
+        """Record that the link to ``uri`` works: its next failure counts as the first."""
         if uri in self._failures:
             self._failures[uri] = 0
 
     def refused(self, uri: str) -> None:
-        """The publisher at ``uri`` does not want us: the same answer would come again."""
+        """Record that the publisher at ``uri`` refuses this subscriber: the same answer would come again."""
         if uri in self._failures:
             self._refusals.add(uri)
 
     def lost(self, uri: str) -> Connect | None:
-        """The link to ``uri`` could not be made, or ended; None where its publisher has left."""
+        """Return the next attempt at ``uri``, whose link failed or closed; None where its publisher has left."""
         if uri not in self._failures:
             return None
         failures = self._failures[uri]

@@ -57,7 +57,7 @@ class LargeFrame(NamedTuple):
     size: int
 
     def buffers(self, *, split: bool) -> list[bytes]:
-        """What goes into the socket, as a split frame where that is asked for and this message allows it."""
+        """Return what goes into the socket, as a split frame where that is requested and this message allows it."""
         first, *others = self.pieces
         if split and len(others) == 1 and begins_split(first, len(others[0])):
             return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
@@ -189,7 +189,7 @@ class FrameReader:
         return self._small[self._end :]
 
     def received(self, count: int) -> Iterator[memoryview]:
-        """The frames that are complete after ``count`` more bytes in :meth:`space`. Raises WireError."""
+        """Return the frames that are complete after ``count`` more bytes in :meth:`space`. Raises WireError."""
         if self._large is not None:
             self._filled += count
             if self._filled == self._wanted:

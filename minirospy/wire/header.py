@@ -21,14 +21,14 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_header(fields: Mapping[str, str]) -> bytes:
-    """The header with its own length in front, fields sorted as rospy and roscpp send them."""
+    """Return the header with its own length in front, fields sorted as rospy and roscpp send them."""
     pairs = [f"{name}={fields[name]}".encode() for name in sorted(fields)]
     body = b"".join(_LENGTH.pack(len(pair)) + pair for pair in pairs)
     return _LENGTH.pack(len(body)) + body
 
 
 def parse_header(body: bytes) -> Header:
-    """The fields of a header whose length has been taken off. Raises WireError."""
+    """Return the fields of a header whose length has been taken off. Raises WireError."""
     fields: Header = {}
     at = 0
     while at < len(body):

@@ -126,7 +126,7 @@ class HttpReader:
         return len(self._buffer) + self._chunked
 
     def feed(self, data: bytes) -> list[HttpMessage]:
-        """The messages that are complete with ``data``; b"" means that the peer has ended.
+        """Return the messages that are complete with ``data``; b"" means that the peer has closed.
 
         Raises RpcProtocolError.
         """
@@ -168,12 +168,12 @@ class HttpReader:
         self._in_body = False
 
     def continue_line(self) -> bytes:
-        """What a peer that sent ``Expect: 100-continue`` waits for."""
+        """Return what a peer that sent ``Expect: 100-continue`` waits for."""
         self.wants_continue = False
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """The messages in the buffer, and None where it has to be filled; ``head`` has been taken out already."""
+        """Yield the messages in the buffer, and None where it has to be filled; ``head`` has been removed already."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
@@ -310,7 +310,7 @@ def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
 
 
 def serialize_error(status: int, text: str) -> bytes:
-    """A refusal, after which the connection ends."""
+    """Return a refusal, after which the connection closes."""
     body = (text + "\n").encode()
     return (
         f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: text/plain; charset=utf-8\r\n"

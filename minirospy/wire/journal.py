@@ -41,7 +41,7 @@ class Recovered(NamedTuple):
 
 
 def serialize_record(record: list[Any]) -> bytes:
-    """A record as it stands in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
+    """Return a record's bytes in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
@@ -111,7 +111,7 @@ def unpack(data: bytes) -> object:
 
 
 def parse_journal(data: bytes) -> Recovered:
-    """The records in ``data``, up to the first that is not whole."""
+    """Return the records in ``data``, up to the first that is not whole."""
     if not data.startswith(HEAD):
         return Recovered([], 0, "it does not begin as a journal" if data else "it is empty")
     records: list[list[object]] = []

@@ -48,7 +48,7 @@ class InterfaceType(NamedTuple):
 def subscriber_header(
     topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
 ) -> Header:
-    """What a subscriber opens with; ``split_frames`` says that it understands them (``wire/framing``)."""
+    """Return what a subscriber opens with; ``split_frames``: it understands them (``wire/framing``)."""
     return {
         **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
@@ -63,7 +63,7 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """What a publisher answers with; ``extra`` are the user's fields.
+    """Return what a publisher answers with; ``extra`` are the user's fields.
 
     They win, as with rospy: a relay of AnyMsg tells the type of what it relays.
     """
@@ -122,7 +122,7 @@ def service_client_header(
     probe: bool = False,
     extra: Mapping[str, str] | None = None,
 ) -> Header:
-    """What a service client opens with; ``probe`` only asks whether the service is alive."""
+    """Return what a service client opens with; ``probe`` only tests whether the service is alive."""
     fields = {"callerid": caller_id, "md5sum": md5sum, "service": service}
     if persistent:
         fields["persistent"] = "1"
@@ -135,7 +135,7 @@ def service_client_header(
 def service_header(
     service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
 ) -> Header:
-    """What a service answers with: rospy's fields, and roscpp's types of request and response."""
+    """Return what a service answers with: rospy's fields, and roscpp's types of request and response."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,

@@ -78,7 +78,7 @@ class Serialized(bytes):
 
 
 def serialize_call(method: str, args: Sequence[Any]) -> bytes:
-    """A call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
+    """Return a call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
     parts = [_HEAD, "<methodCall><methodName>", _escape(method), "</methodName><params>"]
     for value in args:
         parts.append("<param>")
@@ -89,7 +89,7 @@ def serialize_call(method: str, args: Sequence[Any]) -> bytes:
 
 
 def serialize_response(value: Any) -> bytes:
-    """A successful answer as XML."""
+    """Return a successful answer as XML."""
     if type(value) is Serialized:
         return value
     parts = [_HEAD, "<methodResponse><params><param>"]
@@ -99,7 +99,7 @@ def serialize_response(value: Any) -> bytes:
 
 
 def serialize_fault(code: int, text: str) -> bytes:
-    """A fault as XML."""
+    """Return a fault as XML."""
     parts = [_HEAD, "<methodResponse><fault>"]
     _write({"faultCode": code, "faultString": text}, parts, 0)
     parts.append("</fault></methodResponse>\n")
@@ -144,7 +144,7 @@ def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
 
 
 def parse_call(body: bytes | bytearray) -> Call:
-    """The call in ``body``. Raises RpcProtocolError."""
+    """Return the call in ``body``. Raises RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -152,7 +152,7 @@ def parse_call(body: bytes | bytearray) -> Call:
 
 
 def parse_response(body: bytes | bytearray) -> Any:
-    """The value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
+    """Return the value in an answer. Raises RpcFault where the peer answered with one, else RpcProtocolError."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]
@@ -359,7 +359,7 @@ def _write_bytes_in_steps(value: bytes, out: _Output) -> Steps[None]:
 
 
 def _writer_of_kin(value: Any) -> Callable[[Any, list[str], int], None]:
-    """The writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
+    """Return the writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):
             return writer

@@ -488,7 +488,7 @@ def _ago(seconds: float) -> str:
 
 
 def _names_of(host: str, bind_host: str) -> list[str]:
-    """What ROS_MASTER_URI may call a master that listens on ``bind_host``."""
+    """Return what ROS_MASTER_URI may call a master that listens on ``bind_host``."""
     names = [host]
     if bind_host in {"127.0.0.1", "0.0.0.0", "::"}:
         names.append("localhost")

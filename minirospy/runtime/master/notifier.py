@@ -92,7 +92,7 @@ class Notifier:
     """
 
     def __init__(self, state: State, turns: Turns, timeout: float, *, same_host: bool = True) -> None:
-        """``turns`` runs what takes long. ``timeout``: seconds that a call may take."""
+        """Take ``turns``, which run what takes long, and ``timeout``, the seconds that a call may take."""
         self._state = state
         self._turns = turns
         self._timeout = timeout
@@ -117,7 +117,7 @@ class Notifier:
         self._is_writing = False
 
     def hold(self, uri: str, topic: str) -> None:
-        """The node gets an answer that tells how a topic, or PARAMETERS, is now: a change is told a moment later.
+        """Delay notices to a node whose answer reports a topic, or PARAMETERS, as it is now.
 
         A node of rospy that takes the update first and then the answer goes by the answer, the older of the two.
         """
@@ -308,7 +308,7 @@ class Notifier:
             del self._nodes[node.uri]
 
     def _update(self, topic: str, publishers: list[str]) -> bytes:
-        """The call that tells of a topic's publishers."""
+        """Return the call that reports a topic's publishers."""
         if self._last[:2] != (topic, publishers):
             body = serialize_call("publisherUpdate", [_MASTER, topic, publishers])
             self._last = (topic, publishers, body)

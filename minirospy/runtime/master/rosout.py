@@ -148,7 +148,7 @@ def _bytes_of(message: Any) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """What a logger of Python is called here: ``ros`` and what is below it, as in the nodes of roscpp."""
+    """Return the name of a Python logger here: ``ros`` and what is below it, as in the nodes of roscpp."""
     return "ros" + name.removeprefix("minirospy")
 
 

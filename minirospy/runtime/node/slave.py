@@ -133,11 +133,11 @@ class SlaveApi:
         return [SUCCESS, "bus info", rows]
 
     def get_master_uri(self, caller_id: str) -> Answer:
-        """The master that this node registered with."""
+        """Return the master that this node registered with."""
         return [SUCCESS, self._node.environment.master_uri, self._node.environment.master_uri]
 
     def get_name(self, caller_id: str) -> Answer:
-        """This node's name."""
+        """Return this node's name."""
         return [SUCCESS, "", self._node.name]
 
     def get_uri(self, caller_id: str) -> Answer:
@@ -145,7 +145,7 @@ class SlaveApi:
         return [SUCCESS, "", self._node.uri]
 
     def get_pid(self, caller_id: str) -> Answer:
-        """This process's id."""
+        """Return this process's id."""
         return [SUCCESS, "", os.getpid()]
 
     def get_publications(self, caller_id: str) -> Answer:
@@ -159,12 +159,12 @@ class SlaveApi:
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: Any) -> Answer:
-        """A parameter that this node subscribed to has changed."""
+        """Accept a new value of a parameter that this node subscribed to."""
         self._node.parameter_changed(key, value)
         return [SUCCESS, "", 0]
 
     def publisher_update(self, caller_id: str, topic: str, publishers: list[str]) -> Answer:
-        """The master's full list of a topic's publishers."""
+        """Accept the master's full list of a topic's publishers."""
         self._node.publishers_changed(topic, publishers)
         return [SUCCESS, "", 0]
 
@@ -195,6 +195,6 @@ class SlaveApi:
 
 
 def _connection_text(link: InLink | OutLink, port: int) -> str:
-    """A connection in the words of which `rosnode info` shows the numbers; of a Unix socket, which has no port, none."""
+    """Return a connection's text, of which `rosnode info` shows the numbers; none of a Unix socket, without a port."""
     on = f" on port {port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

@@ -57,7 +57,7 @@ class AsyncRpcClient:
         self.closed = False
 
     async def call(self, uri: str, method: str, *args: Any, timeout: float = 5.0) -> Any:
-        """The value that ``method`` at ``uri`` answers, within ``timeout`` seconds.
+        """Return the value that ``method`` at ``uri`` answers, within ``timeout`` seconds.
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError.
         """
@@ -69,7 +69,7 @@ class AsyncRpcClient:
             call.cancel()
 
     def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[Body | RpcError], None]) -> Call:
-        """The same without a coroutine, which costs a master as much as all the rest of a call.
+        """Do the same without a coroutine, which costs a master as much as all the rest of a call.
 
         ``body`` is the call as XML. ``done`` is called on the loop, perhaps at once, with the answer as XML, or with
         what :meth:`call` would raise.
@@ -93,7 +93,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def take(self, address: _Address) -> _Connection | None:
-        """A kept connection."""
+        """Return a kept connection."""
         kept = self._idle.get(address)
         if not kept:
             return None
@@ -121,7 +121,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """A kept connection has ended."""
+        """Forget a kept connection, which has closed."""
         connection.close()
         kept = self._idle[connection.address]
         kept.remove(connection)
@@ -299,7 +299,7 @@ class Call:
             self._answered(messages[0], is_all=len(messages) == 1 and reader.is_idle)
 
     def broken(self, error: Exception) -> None:
-        """This connection does not do: perhaps another one does."""
+        """Give up this connection and try another one."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
             # The peer closed it meanwhile: once more on a new one.
@@ -312,7 +312,7 @@ class Call:
             self.fail(error)
 
     def _connect(self) -> None:
-        """A new connection, at once where the host needs no looking up."""
+        """Open a new connection, immediately where the host needs no look-up."""
         host, port = self._address
         unix = local.reach(host, port) if self._client.same_host else None
         if unix:
@@ -370,7 +370,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """A connection to this machine is made by now, although nobody has said so yet."""
+        """Use a connection to this machine, which is open by now, although the loop has not reported it yet."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)
@@ -474,7 +474,7 @@ def _parts(uri: str) -> tuple[str, int, str]:
 
 
 def _literal(host: str) -> str:
-    """The IPv4 address that ``host`` is, or surely has; else ""."""
+    """Return the IPv4 address that ``host`` is, or surely has; else ""."""
     if host == "localhost":
         return "127.0.0.1"
     try:

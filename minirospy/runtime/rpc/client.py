@@ -43,7 +43,7 @@ class RpcClient:
         self._idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: Any) -> Any:
-        """The value that ``method`` answers.
+        """Return the value that ``method`` answers.
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
         """

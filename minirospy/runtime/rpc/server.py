@@ -390,7 +390,7 @@ class _Connection:
         self._set_deadline()
 
     def _receive(self, most: int = _RECEIVE) -> bytes | None:
-        """What has come; b"" at the end, None where nothing has."""
+        """Return the bytes that have arrived; b"" at the end, None where there are none."""
         try:
             return self._sock.recv(most)
         except (BlockingIOError, InterruptedError):
@@ -722,7 +722,7 @@ class _Connection:
             self._server.holders.pop(self, None)
 
     def _set_deadline(self) -> None:
-        """A request that has begun, or an answer that waits, has a time limit; an idle connection has none."""
+        """Set the time limit of a request that has started, or an answer that waits; an idle connection has none."""
         if self._out or not self._reader.is_idle:
             is_due = not self._has_deadline or self._moved > _PROGRESS
             if is_due and self._state is not _ENDED and self._state is not _REFUSED:

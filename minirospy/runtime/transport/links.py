@@ -163,7 +163,7 @@ class OutLink:
             self._drained.wait_for(lambda: not self._outbox or self._closed)
 
     async def drain(self, timeout: float) -> None:
-        """The same on the loop, for at most ``timeout`` seconds."""
+        """Do the same on the loop, for at most ``timeout`` seconds."""
         end = self._loop.time() + timeout
         while self._outbox and self._loop.time() < end:
             await asyncio.sleep(0.005)
