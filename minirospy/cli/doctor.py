@@ -12,7 +12,6 @@ import threading
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
@@ -36,7 +35,7 @@ def roswtf(argv: Sequence[str] | None = None) -> int:
 class _DoctorParser(Parser):
     """Takes ``name:=value`` from among the words."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, the launch files' as ``args``. Raises CommandLineError."""
         options = super().parse([word for word in words if ":=" not in word])
         options["args"] = dict(

@@ -48,7 +48,7 @@ class Misuse(UsageError):
 class _Help(argparse.HelpFormatter):
     """Help as wide as the terminal; argparse asks shutil for that, whose import costs more than its own."""
 
-    def __init__(self, prog: str, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, prog: str, *args: int, **kwargs: Any) -> None:
         try:
             width = os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
         except (OSError, ValueError):
@@ -59,7 +59,7 @@ class _Help(argparse.HelpFormatter):
 class _Accepted(argparse.Action):
     """An option that is accepted for compatibility and leaves nothing behind."""
 
-    def __init__(self, option_strings: Sequence[str], dest: str, nargs: Any = 0, **kwargs: Any) -> None:
+    def __init__(self, option_strings: Sequence[str], dest: str, nargs: int | str = 0, **kwargs: Any) -> None:
         super().__init__(option_strings, dest, nargs=nargs, **{**kwargs, "default": argparse.SUPPRESS})
 
     def __call__(self, *_: object) -> None:
@@ -97,7 +97,7 @@ class Parser(argparse.ArgumentParser):
         self._intermixed = bool(ros_usage) if intermixed is None else intermixed
         self.register("action", "accepted", _Accepted)
 
-    def add_argument(self, *names: Any, completer: str = "", **kwargs: Any) -> argparse.Action:
+    def add_argument(self, *names: str, completer: str = "", **kwargs: Any) -> argparse.Action:
         """Add an argument as argparse does.
 
         ``completer`` is the name of a function of minirospy.cli.completion.completers, which is imported only when
@@ -130,7 +130,7 @@ class Parser(argparse.ArgumentParser):
         group.register("action", "accepted", _Accepted)
         return group
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, ready for the command's function. Raises CommandLineError."""
         parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
         return vars(parsed)

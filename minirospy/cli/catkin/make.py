@@ -12,7 +12,6 @@ import shutil
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from minirospy.cli.catkin.create import TOP_LEVEL
 from minirospy.cli.catkin.workspace import (
@@ -48,7 +47,7 @@ def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
 class _MakeParser(Parser):
     """Leaves out the words for CMake; what they set becomes ``variables``."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raises CommandLineError."""
         return {**super().parse(without_cmake(words)), "variables": cmake_variables(words)}
 

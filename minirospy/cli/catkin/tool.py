@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy.cli.catkin.create import create_package_here, create_parser
 from minirospy.cli.catkin.workspace import (
@@ -102,7 +102,7 @@ class _CatkinParser(Parser):
             completer="folders",
         )
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raises CommandLineError."""
         if not self._takes_cmake_words:
             return super().parse(words)

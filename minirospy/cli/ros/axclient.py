@@ -8,12 +8,16 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 from minirospy.cli.parser import Parser
 from minirospy.cli.ros.form import ask_for, fields, flow
 from minirospy.cli.verbs import Command
 from minirospy.errors import ROSException, UsageError
+
+if TYPE_CHECKING:
+    from minirospy.actionlib import SimpleActionClient
+    from minirospy.idl.protocols import Action, Message
 
 __all__ = ["COMMAND", "action_class", "main", "read_answer"]
 
@@ -30,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 class NodeParser(Parser):
     """Leaves out the remapping arguments, which the node reads itself."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raises CommandLineError."""
         from minirospy import client as rospy
 
@@ -87,7 +91,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
     return _Progress(client, message).run()
 
 
-def action_class(type_: str) -> type[Any]:
+def action_class(type_: str) -> type[Action]:
     """Return the class of an action by its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
     Raises NotFoundError.
@@ -98,8 +102,7 @@ def action_class(type_: str) -> type[Any]:
     found = get_message_class(name)
     if found is None or not hasattr(found, "action_goal"):
         found = message_class(name if name.endswith("Action") else name + "Action")
-    cls: type[Any] = found
-    return cls
+    return cast("type[Action]", found)
 
 
 def read_answer(question: str) -> str:
@@ -140,7 +143,7 @@ def _found_type(action: str, timeout: float | None) -> str:
 class _Progress:
     """A goal under way: prints its state and feedback, cancels at Ctrl-C."""
 
-    def __init__(self, client: Any, goal: Any) -> None:
+    def __init__(self, client: SimpleActionClient, goal: Message) -> None:
         self._client = client
         self._goal = goal
         self._done = threading.Event()
@@ -175,7 +178,7 @@ class _Progress:
             print(strify_message(result), flush=True)
         return 0 if state == GoalStatus.SUCCEEDED else 1
 
-    def _on_done(self, state: int, result: Any) -> None:
+    def _on_done(self, state: int, result: Message) -> None:
         self._done.set()
 
     def _on_active(self) -> None:
@@ -184,7 +187,7 @@ class _Progress:
         if is_first:
             self._tell("Active")
 
-    def _on_feedback(self, feedback: Any) -> None:
+    def _on_feedback(self, feedback: Message) -> None:
         # It travels by a connection of its own, and may come before the status.
         self._on_active()
         line = "Feedback: " + ", ".join(f"{field.path}: {flow(field.value)}" for field in fields(feedback))
@@ -207,10 +210,10 @@ class _Progress:
                 print(line, flush=True)
 
 
-def progress(goal: Any, feedback: Any) -> float | None:
+def progress(goal: Message, feedback: Message) -> float | None:
     """How much of a goal is reached, 0 to 1, where each has one number and the goal's is the greater; else None."""
     wanted, reached = (
-        [field.value for field in fields(message) if type(field.value) in (int, float)]
+        [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]
         for message in (goal, feedback)
     )
     if len(wanted) != 1 or len(reached) != 1 or not 0 <= reached[0] <= wanted[0] or not wanted[0]:

@@ -8,12 +8,15 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy.cli.parser import Parser
 from minirospy.cli.ros.axclient import NodeParser, action_class, read_answer
 from minirospy.cli.ros.form import ask_for
 from minirospy.cli.verbs import Command
+
+if TYPE_CHECKING:
+    from minirospy.actionlib import SimpleActionServer
 
 __all__ = ["COMMAND", "main"]
 
@@ -60,7 +63,7 @@ def _axserver(action: str, type: str) -> None:
                 return
 
 
-def _answer(server: Any) -> bool:
+def _answer(server: SimpleActionServer) -> bool:
     """Ask what becomes of the goal until it has ended; False where the input ends: then it is aborted."""
     types = server.action_server
     endings: dict[str, Callable[..., None]] = {

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from minirospy.errors import MessageException, ValueTextError
+from minirospy.idl.protocols import Message, is_message
 from minirospy.introspect.messages import check, fill
 from minirospy.introspect.values import parse_value
 
 __all__ = ["Field", "ask_for", "fields", "flow"]
+
+_M = TypeVar("_M", bound=Message)
 
 
 class Field(NamedTuple):
@@ -17,25 +20,25 @@ class Field(NamedTuple):
 
     path: str
     type: str
-    value: Any
+    value: object
 
 
-def fields(message: Any, prefix: str = "") -> Iterator[Field]:
+def fields(message: Message, prefix: str = "") -> Iterator[Field]:
     """Return the fields of a message and of those in it; an array, a time and a duration are one field each."""
     for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
         value = getattr(message, name)
-        if hasattr(value, "_slot_types"):
+        if is_message(value):
             yield from fields(value, f"{prefix}{name}.")
         else:
             yield Field(prefix + name, type_, value)
 
 
 def ask_for(
-    message: Any,
+    message: _M,
     ask: Callable[[str], str],
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
-) -> Any:
+) -> _M:
     """``message`` with the answers to a question per field; an empty answer leaves a field as it is.
 
     Of the message's own fields those in ``known`` are not asked for.
@@ -67,7 +70,7 @@ def flow(value: Any) -> str:
         return str(value)
     if isinstance(value, bytes | list | tuple):
         return "[" + ", ".join(flow(each) for each in value) + "]"
-    if hasattr(value, "_slot_types"):
+    if is_message(value):
         inner = (f"{name}: {flow(getattr(value, name))}" for name in value.__slots__)
         return "{" + ", ".join(inner) + "}"
     if hasattr(value, "nsecs"):
@@ -79,14 +82,14 @@ def _question(field: Field) -> str:
     return f"{field.path} ({field.type}) [{flow(field.value)}]: "
 
 
-def _value(field: Field, answer: str) -> Any:
+def _value(field: Field, answer: str) -> object:
     """Return an answer's value; a string needs no quotes."""
     if field.type == "string" and answer[0] not in "'\"":
         return answer
     return parse_value(answer)
 
 
-def _nested(path: str, value: Any) -> Any:
+def _nested(path: str, value: object) -> object:
     """``a.b`` and a value -> {a: {b: value}}."""
     for name in reversed(path.split(".")):
         value = {name: value}

@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 class _MasterParser(Parser):
     """Leaves out the remapping arguments that a launch file may add."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raises CommandLineError."""
         return super().parse([word for word in words if ":=" not in word])
 

@@ -178,7 +178,7 @@ def _child(options: LaunchOptions, environment: Environment, packages: Packages)
 class _LaunchParser(Parser):
     """Takes ``name:=value`` from among the words."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
         options = super().parse([word for word in words if ":=" not in word])
         options["args"] = dict(

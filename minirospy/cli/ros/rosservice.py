@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.cli.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.cli.parser import Parser
@@ -17,6 +17,7 @@ from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
     from minirospy.names import Arguments
 
 __all__ = ["FAMILY", "main"]
@@ -178,7 +179,7 @@ def _warn_waiting(graph: Graph, service: str) -> None:
     hint_near(service, graph.state().services)
 
 
-def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
+def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
     """Each request: one of the values typed, or one for each document on standard input.
 
     In a terminal the fields that have no value yet are asked for.
@@ -203,7 +204,7 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Any]:
             raise UsageError(f"please specify service arguments: {' '.join(names)}")
 
 
-def _filled_request(type_: str, values: Sequence[object]) -> Any:
+def _filled_request(type_: str, values: Sequence[object]) -> Message:
     try:
         return services.fill_request(type_, values)
     except MessageException as error:
@@ -217,7 +218,7 @@ def _filled_request(type_: str, values: Sequence[object]) -> Any:
         raise WordedError(error, RosText("\n".join(lines), 2)) from error
 
 
-def _asked_for(request: Any, known: Sequence[str]) -> Any:
+def _asked_for(request: Message, known: Sequence[str]) -> Message:
     from minirospy.cli.ros.form import ask_for
 
     def refuse(error: Exception) -> None:

@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from minirospy import private_files
 from minirospy.cli.parser import Misuse, Parser
@@ -37,7 +36,7 @@ def rosunit(argv: Sequence[str] | None = None) -> int:
 class _RostestParser(Parser):
     """Takes ``name:=value`` from among the words."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
         options = super().parse([word for word in words if ":=" not in word])
         options["args"] = dict(

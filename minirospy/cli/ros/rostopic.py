@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import sys
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from minirospy.cli.command import RosText, WordedError, refuse_bag, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser
@@ -20,7 +20,6 @@ from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from typing import Any
 
     from minirospy.introspect.streams import Received, ToolNode
     from minirospy.names import Arguments
@@ -421,12 +420,12 @@ def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list
 class _PubParser(Parser):
     """Accepts negative numbers as values beside an option that is called `-1`."""
 
-    def parse(self, words: Sequence[str]) -> dict[str, Any]:
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, with the negative numbers among the values."""
         options = super().parse(
             [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
         )
-        options["args"] = [word.removeprefix(_SHIELD) for word in options["args"]]
+        options["args"] = [word.removeprefix(_SHIELD) for word in cast("list[str]", options["args"])]
         return options
 
 

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/rostopic#rostopic_pub. What is printed is what ROS p
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.cli.command import tool_node, warn
 from minirospy.errors import UsageError
@@ -18,6 +18,7 @@ from minirospy.introspect.publishing import publish_all, values_to_publish
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
     from minirospy.names import Arguments
 
@@ -66,7 +67,7 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
     with tool_node("rostopic", arguments, ros_time=options.use_rostime) as node:
         publisher = node.publisher(topic, cls, latch=lasting)
 
-        def filled(values: list[Any]) -> Any:
+        def filled(values: list[object]) -> Message:
             return fill_message(cls, values, node.clock.now())
 
         if node.simulated:
@@ -75,7 +76,7 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
         if options.once or (lasting and options.rate is None):
             _latch(node, publisher, message, options)
             return
-        messages: Iterable[Any] = itertools.repeat(message)
+        messages: Iterable[Message] = itertools.repeat(message)
         if from_documents:
             # The first messages of a file have nobody to go to before subscribers have connected.
             seconds = _REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
@@ -84,7 +85,7 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
         elif options.substitute_keywords:
             messages = map(filled, itertools.repeat(values))
 
-        def show(message: Any) -> None:
+        def show(message: Message) -> None:
             if options.verbose:
                 print(f"publishing {message}", flush=True)
 
@@ -97,7 +98,7 @@ def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
         warn(f"topic [{topic}] is of type [{other}] already, not [{type_}]")
 
 
-def _latch(node: ToolNode, publisher: TopicPublisher, message: Any, options: Publishing) -> None:
+def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options: Publishing) -> None:
     how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
     print(f"publishing and latching {shown}{how_long}", flush=True)
