@@ -23,6 +23,7 @@ from minirospy.idl.protocols import Action, Message
 __all__ = ["SimpleActionClient"]
 
 DoneCallback = Callable[[int, Any], object]
+FeedbackCallback = Callable[[Any], object]
 
 
 class SimpleActionClient:
@@ -37,7 +38,7 @@ class SimpleActionClient:
         self.gh: ClientGoalHandle | None = None
         self.done_cb: DoneCallback | None = None
         self.active_cb: Callable[[], object] | None = None
-        self.feedback_cb: Callable[[Any], object] | None = None
+        self.feedback_cb: FeedbackCallback | None = None
         self._set_simple_state(SimpleGoalState.PENDING)
         # Held while a goal is sent: its answer may come before its handle is known.
         self._lock = threading.RLock()
@@ -53,7 +54,7 @@ class SimpleActionClient:
         goal: Message,
         done_cb: DoneCallback | None = None,
         active_cb: Callable[[], object] | None = None,
-        feedback_cb: Callable[[Any], object] | None = None,
+        feedback_cb: FeedbackCallback | None = None,
     ) -> None:
         """Send a goal; the one before is not tracked any more.
 

@@ -6,7 +6,7 @@ import asyncio
 import itertools
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Generator
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 from actionlib_msgs.msg import GoalID, GoalStatus
 
@@ -17,12 +17,14 @@ from minirospy.actionlib.statuses import StatusList, find_status
 from minirospy.aio import Publisher, Subscription
 from minirospy.errors import ROSException, ROSInterruptException
 from minirospy.graph.goals import TERMINAL, GoalState
+from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 
 __all__ = ["ActionClient", "ClientGoal"]
 
 _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
+_M = TypeVar("_M", bound=Message)
 
 
 class ClientGoal(Generic[_R, _F]):
@@ -33,7 +35,7 @@ class ClientGoal(Generic[_R, _F]):
     ``async with goal:`` cancels it where the block is left before its end.
     """
 
-    def __init__(self, id: str, cancel: Callable[[ClientGoal[Any, Any]], None]) -> None:
+    def __init__(self, id: str, cancel: Callable[[ClientGoal[_R, _F]], None]) -> None:
         self.id = id
         self.state = GoalState.PENDING
         """The last status that the server published."""
@@ -56,7 +58,7 @@ class ClientGoal(Generic[_R, _F]):
         if not self.done:
             self._cancel(self)
 
-    def __await__(self) -> Generator[Any, None, _R]:
+    def __await__(self) -> Generator[object, None, _R]:
         return self._result().__await__()
 
     def __aiter__(self) -> AsyncIterator[_F]:
@@ -122,7 +124,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         super().__init__(node, name, action)
         types = self._types
         self._goals: dict[str, ClientGoal[_R, _F]] = {}
-        self._goal: Publisher[Any] = node.advertise(
+        self._goal: Publisher[ActionGoal] = node.advertise(
             self._topic("goal"), types.action_goal, tcp_nodelay=True, headers=TAKES_FAST_ANSWERS
         )
         self._cancel: Publisher[GoalID] = node.advertise(self._topic("cancel"), GoalID, tcp_nodelay=True)
@@ -130,12 +132,9 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._result = node.subscribe(self._topic("result"), types.action_result, queue_size=WAITING)
         self._feedback = node.subscribe(self._topic("feedback"), types.action_feedback, queue_size=WAITING)
         self._heard = asyncio.Event()
-        for subscription, take in (
-            (self._status, self._take_status),
-            (self._result, self._take_result),
-            (self._feedback, self._take_feedback),
-        ):
-            self._start(self._read(subscription, take))
+        self._start(self._read(self._status, self._take_status))
+        self._start(self._read(self._result, self._take_result))
+        self._start(self._read(self._feedback, self._take_feedback))
         self._registration = asyncio.ensure_future(self._register())
 
     async def wait_for_server(self, timeout: float | None = None) -> None:
@@ -184,49 +183,49 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         for subscription in (self._result, self._feedback):
             await subscription.wait_for_publishers()
 
-    async def _send(self, message: Any, goal: ClientGoal[_R, _F]) -> None:
+    async def _send(self, message: ActionGoal, goal: ClientGoal[_R, _F]) -> None:
         await self._wait_for_server()
         if not goal.done:
             goal._is_sent = True
             await self._goal.publish(message)
 
-    def _cancel_goal(self, goal: ClientGoal[Any, Any]) -> None:
+    def _cancel_goal(self, goal: ClientGoal[_R, _F]) -> None:
         if not self._is_closed:
             self._start(self._send_cancel(goal))
 
-    async def _send_cancel(self, goal: ClientGoal[Any, Any]) -> None:
+    async def _send_cancel(self, goal: ClientGoal[_R, _F]) -> None:
         # Who only looks at the goals, as `rostopic echo`, is connected, too.
         if goal._is_sent and self._goal.num_connections:
             await self._cancel.publish(GoalID(id=goal.id))
         else:
             self._end_goal(goal, GoalState.RECALLED, "cancelled before a server was there", None)
 
-    async def _read(self, subscription: Subscription[Any], take: Callable[[Any], None]) -> None:
+    async def _read(self, subscription: Subscription[_M], take: Callable[[_M], None]) -> None:
         async for message in subscription:
             take(message)
         for goal in list(self._goals.values()):
             goal._interrupt()
 
-    def _take_status(self, statuses: Any) -> None:
+    def _take_status(self, statuses: StatusList) -> None:
         self._heard.set()
         for goal in list(self._goals.values()):
             goal._take_status(find_status(statuses, goal.id))
             if goal.done:
                 del self._goals[goal.id]
 
-    def _take_result(self, message: Any) -> None:
+    def _take_result(self, message: ActionResult) -> None:
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
             # Feedback travels by a connection of its own: what has come by now is to be read first.
-            end = (goal, GoalState(status.status), status.text, message.result)
+            end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 
-    def _take_feedback(self, message: Any) -> None:
+    def _take_feedback(self, message: ActionFeedback) -> None:
         goal = self._goals.get(message.status.goal_id.id)
         if goal is not None:
-            goal._take_feedback(message.feedback)
+            goal._take_feedback(cast("_F", message.feedback))
 
-    def _end_goal(self, goal: ClientGoal[Any, Any], state: GoalState, text: str, result: Any) -> None:
+    def _end_goal(self, goal: ClientGoal[_R, _F], state: GoalState, text: str, result: _R | None) -> None:
         self._goals.pop(goal.id, None)
         goal._end(state, text, result)

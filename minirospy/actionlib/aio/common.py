@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from minirospy import Node
 from minirospy.actionlib.spec import ActionTypes, action_types
 from minirospy.aio.handle import Handle
 from minirospy.errors import MinirospyError
 from minirospy.graph.goals import GoalState
+from minirospy.idl.protocols import Action
 
 __all__ = ["WAITING", "ActionClass", "ActionEnd", "GoalError"]
 
@@ -66,10 +67,10 @@ class GoalError(MinirospyError):
 class ActionEnd(Handle):
     """What both ends have in common: their topics, and tasks that read them."""
 
-    def __init__(self, node: Node, name: str, action: Any) -> None:
+    def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)
         self._node = node
-        self._types: ActionTypes = action_types(action)
+        self._types: ActionTypes = action_types(cast("type[Action]", action))
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_closed = False
 
@@ -77,7 +78,7 @@ class ActionEnd(Handle):
         # Each topic may be remapped by itself.
         return self._node.resolve(f"{self.name}/{name}")
 
-    def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+    def _start(self, work: Coroutine[object, None, None]) -> asyncio.Task[None]:
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

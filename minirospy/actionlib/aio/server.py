@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from io import BytesIO
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from actionlib_msgs.msg import GoalID, GoalStatus
 
@@ -17,6 +17,7 @@ from minirospy.actionlib.statuses import StatusList, status_bytes
 from minirospy.aio import Publisher, Subscription
 from minirospy.errors import ROSException
 from minirospy.graph.goals import SERVER_STEPS, GoalEvent, GoalState, is_meant
+from minirospy.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.idl.service import to_response
 
 __all__ = ["ActionServer", "ServerGoal"]
@@ -38,8 +39,8 @@ _EVENTS = {
 class ServerGoal(Generic[_G, _F]):
     """A goal that a server got; what ``execute`` works on."""
 
-    def __init__(self, server: ActionServer[_G, Any, _F], message: Any) -> None:
-        self.request: _G = message.goal
+    def __init__(self, server: ActionServer[_G, Any, _F], message: ActionGoal) -> None:
+        self.request = cast("_G", message.goal)
         """What is requested: the goal's message."""
         self.is_cancel_requested = False
         """Whether the goal is to make way: a client has cancelled it, or a newer one has come."""
@@ -61,7 +62,7 @@ class ServerGoal(Generic[_G, _F]):
         """How far the goal is."""
         return GoalState(self._status.status)
 
-    async def publish_feedback(self, *args: Any, **kwds: Any) -> None:
+    async def publish_feedback(self, *args: object, **kwds: object) -> None:
         """Send feedback to the goal's client: the feedback's message, or its fields."""
         await self._server._publish_feedback(self, args, kwds)
 
@@ -79,7 +80,7 @@ class ServerGoal(Generic[_G, _F]):
                 self._task.cancel()
 
 
-Execute = Callable[[ServerGoal[_G, _F]], Awaitable[Any]]
+Execute = Callable[[ServerGoal[_G, _F]], Awaitable[object]]
 
 
 class ActionServer(ActionEnd, Generic[_G, _R, _F]):
@@ -118,17 +119,17 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._kept_nanoseconds = 0
         self._changed = asyncio.Event()
 
-        self._result: Publisher[Any] = node.advertise(
+        self._result: Publisher[ActionResult] = node.advertise(
             self._topic("result"), types.action_result, queue_size=50, tcp_nodelay=True
         )
-        self._feedback: Publisher[Any] = node.advertise(
+        self._feedback: Publisher[ActionFeedback] = node.advertise(
             self._topic("feedback"), types.action_feedback, queue_size=50, tcp_nodelay=True
         )
-        self._status: Publisher[Any] = node.advertise(
+        self._status: Publisher[StatusList] = node.advertise(
             self._topic("status"), StatusList, queue_size=50, tcp_nodelay=True, latch=True
         )
 
-        self._subscriptions: list[Subscription[Any]] = []
+        self._subscriptions: list[Subscription[Message]] = []
         self._registration = self._start(self._register())
 
     async def close(self) -> None:
@@ -158,7 +159,9 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             await subscription
         self._start(self._tell(1.0 / frequency))
 
-    async def _read(self, subscription: Subscription[Any], take: Callable[[Any], Awaitable[None]]) -> None:
+    async def _read(
+        self, subscription: Subscription[Message], take: Callable[[Any], Awaitable[None]]
+    ) -> None:
         async for message in subscription:
             await take(message)
         # The node ends: what runs is to end with it.
@@ -166,7 +169,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             if goal._task:
                 goal._task.cancel()
 
-    async def _take_goal(self, message: Any) -> None:
+    async def _take_goal(self, message: ActionGoal) -> None:
         if not TAKES_FAST_ANSWERS.items() <= (message._connection_header or {}).items():
             await asyncio.sleep(SEND_SECONDS)
         now = self._node.now()
@@ -253,7 +256,9 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             event = GoalEvent.CANCEL
         await self._finish(goal, event, result)
 
-    async def _finish(self, goal: ServerGoal[_G, _F], event: GoalEvent, result: Any = None) -> None:
+    async def _finish(
+        self, goal: ServerGoal[_G, _F], event: GoalEvent, result: Message | None = None
+    ) -> None:
         if event is GoalEvent.ABORT and goal.state in {GoalState.PENDING, GoalState.RECALLING}:
             event = GoalEvent.CANCEL
         goal._step(event, goal.text)
@@ -266,7 +271,9 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         with contextlib.suppress(ROSException):
             await self._result.publish(message)
 
-    async def _publish_feedback(self, goal: ServerGoal[_G, _F], args: Any, kwds: Any) -> None:
+    async def _publish_feedback(
+        self, goal: ServerGoal[_G, _F], args: Sequence[object], kwds: Mapping[str, object]
+    ) -> None:
         feedback_class = self._types.feedback
         is_whole = len(args) == 1 and not kwds and getattr(args[0], "_type", None) == feedback_class._type
         feedback = args[0] if is_whole else feedback_class(*args, **kwds)
