@@ -7,7 +7,7 @@ everybody when something changes, and Done to a client for the requests it carri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import msgpack  # type: ignore[import-untyped]
@@ -156,11 +156,11 @@ def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
     return messages[0].pins, messages[0].person
 
 
-def _message(item: Any) -> Message:
+def _message(item: Sequence[object]) -> Message:
     return _READERS[_natural(item[0])](*item[1:])
 
 
-def _request(number: Any, item: Any) -> Request:
+def _request(number: object, item: Sequence[Any] | None) -> Request:
     if item is None:
         return Request(_natural(number), None)
     operation = _OPERATIONS[_natural(item[0])](*item[1:])
@@ -171,21 +171,23 @@ def _request(number: Any, item: Any) -> Request:
     return Request(_natural(number), operation)
 
 
-def _welcome(version: Any, items: Any, person: Any = None) -> Welcome:
+def _welcome(
+    version: object, items: Iterable[tuple[int, int, object, object]], person: Sequence[float] | None = None
+) -> Welcome:
     pins = [_pin(*item) for item in items]
     if len(pins) != PINS:
         raise ProtocolError(f"{len(pins)} pins instead of {PINS}")
     return Welcome(_natural(version), pins, _position(person))
 
 
-def _position(item: Any) -> Position | None:
+def _position(item: Sequence[float] | None) -> Position | None:
     if item is None:
         return None
     ahead, left = item
     return float(ahead), float(left)
 
 
-def _pin(function: Any, pull: Any, world: Any, latch: Any) -> Pin:
+def _pin(function: int, pull: int, world: object, latch: object) -> Pin:
     return Pin(Function(function), Pull(pull), None if world is None else int(bool(world)), int(bool(latch)))
 
 

@@ -399,7 +399,7 @@ class Gpio:
                     self._interrupted[channel] = self._readable[channel]
             frame = frame.f_back
 
-    def _output_several(self, channel: Any, value: Any) -> None:
+    def _output_several(self, channel: object, value: Any) -> None:
         if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
             return
         channels = _channels(channel)

@@ -8,14 +8,13 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from typing import Any
 
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, RpcError
 from minirospy.launch.load import load_text
 from minirospy.launch.output import Output
 from minirospy.launch.process import Process
-from minirospy.launch.remote import Api, call
+from minirospy.launch.remote import Api, Method, call
 from minirospy.launch.runner import Launcher, RunOptions
 from minirospy.launch.spec import LaunchSpec
 from minirospy.workspace.packages import Packages
@@ -65,7 +64,7 @@ class _Child(Launcher):
         super().__init__(LaunchSpec(), environment, packages, options, output)
         self._parent = parent
 
-    def methods(self) -> dict[str, Any]:
+    def methods(self) -> dict[str, Method]:
         """Return the methods that the parent calls."""
         return {
             "launch": self._launch,

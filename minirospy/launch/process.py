@@ -9,10 +9,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from minirospy import private_files
 from minirospy.errors import MinirospyError
@@ -176,7 +176,7 @@ def _own_group() -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def _opened(path: Path | None) -> Any:
+def _opened(path: Path | None) -> Iterator[IO[str] | None]:
     if path is None:
         yield None
         return

@@ -29,7 +29,7 @@ from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.loop import LoopThread
 
-__all__ = ["Api", "RemoteMachines", "call", "launch_text"]
+__all__ = ["Api", "Method", "RemoteMachines", "call", "launch_text"]
 
 _CALL_SECONDS = 15.0
 _SHUTDOWN_SECONDS = 5.0
@@ -45,7 +45,7 @@ class Monitor(Protocol):
         """Note that a process on another machine has exited."""
 
 
-Method = Callable[..., Any]
+Method = Callable[..., object]
 
 
 class Api:
@@ -69,20 +69,20 @@ class Api:
             self._loop.run(self._server.close(), 2.0)
         self._loop.close()
 
-    def _dispatch(self, method: str, args: Sequence[Any]) -> Awaitable[Any]:
+    def _dispatch(self, method: str, args: Sequence[object]) -> Awaitable[list[object]]:
         function = self._methods.get(method)
         if function is None:
             raise RpcFault(1, f'method "{method}" is not supported')
         return self._answer(function, args)
 
-    async def _answer(self, function: Method, args: Sequence[Any]) -> list[Any]:
+    async def _answer(self, function: Method, args: Sequence[object]) -> list[object]:
         try:
             return [1, "success", await asyncio.to_thread(function, *args)]
         except (MinirospyError, TypeError, ValueError) as error:
             return [-1, str(error), 0]
 
 
-def call(uri: str, method: str, *args: Any, timeout: float = _CALL_SECONDS) -> Any:
+def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -> Any:
     """Call a method of another roslaunch. Raises RpcError."""
     client = RpcClient(uri, timeout)
     try:
