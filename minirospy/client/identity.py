@@ -10,7 +10,6 @@ import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from minirospy import names
 from minirospy.environment import Environment
@@ -106,7 +105,7 @@ class Identity:
         self.remappings = arguments.resolved_remappings(self._name)
 
 
-def private_parameters(arguments: names.Arguments) -> dict[str, Any]:
+def private_parameters(arguments: names.Arguments) -> dict[str, object]:
     """Return the values of ``_param:=value``, read as YAML. Raises ROSInitException on what is not YAML."""
     if arguments.wrong:
         raise ROSInitException(

@@ -9,8 +9,8 @@ import contextlib
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 from minirospy import errors
 from minirospy.client.shutdown import Phase, ShutdownMachine, ThreadState
@@ -18,6 +18,7 @@ from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Deferral", "Lifecycle", "ROSInterruptException"]
 
+_Hook = TypeVar("_Hook", bound=Callable[..., object])
 _TOO_LATE = "already shutdown"
 _log = logging.getLogger(__name__)
 
@@ -217,7 +218,7 @@ class Lifecycle:
             self.machine.phase = Phase.LEFT
             self.left.set()
 
-    def _add_hook(self, hooks: list[Any], hook: Callable[..., object], given: tuple[object, ...]) -> None:
+    def _add_hook(self, hooks: list[_Hook], hook: _Hook, given: tuple[object, ...]) -> None:
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
         with self._lock:
@@ -226,7 +227,7 @@ class Lifecycle:
                 return
         hook(*given)
 
-    def _run_hooks(self, hooks: list[Any], given: tuple[object, ...]) -> None:
+    def _run_hooks(self, hooks: Iterable[Callable[..., object]], given: tuple[object, ...]) -> None:
         # A hook may add another: it runs last.
         for hook in hooks:
             try:

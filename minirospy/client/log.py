@@ -23,6 +23,8 @@ from minirospy.client.session import current_session
 from minirospy.clock import SimulatedClock
 
 if TYPE_CHECKING:
+    from roscpp.srv import SetLoggerLevelRequest
+
     from minirospy.client.session import Session
 
 __all__ = [
@@ -182,7 +184,7 @@ def _offer_logger_services() -> None:
 
     from minirospy.client.services import Service
 
-    def get_loggers(request: object) -> Any:
+    def get_loggers(request: object) -> GetLoggersResponse:
         levels = {
             name: logging.getLogger(name).getEffectiveLevel()
             for name in sorted(logging.root.manager.loggerDict)
@@ -190,7 +192,7 @@ def _offer_logger_services() -> None:
         found = [Logger(name, _LEVEL_NAME[_known_level(level)]) for name, level in levels.items()]
         return GetLoggersResponse(found)
 
-    def set_level(request: Any) -> Any:
+    def set_level(request: SetLoggerLevelRequest) -> SetLoggerLevelResponse:
         level = {name.lower(): number for number, name in _LEVEL_NAME.items()}.get(request.level.lower())
         if level is None:
             _log.error(

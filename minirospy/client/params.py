@@ -6,12 +6,15 @@ import copy
 import functools
 import re
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
 from minirospy.graph.parameter_cache import NOT_SET
+
+if TYPE_CHECKING:
+    import datetime
 
 __all__ = [
     "UNSPECIFIED",
@@ -45,7 +48,7 @@ class MasterGoneError(ROSException, ConnectionRefusedError):
         return str(self.args[0])
 
 
-def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
+def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return a parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
@@ -59,7 +62,7 @@ def get_param(param_name: str, default: Any = UNSPECIFIED) -> Any:
     return default
 
 
-def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
+def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return the same from a cache that the master keeps up to date; before init_node without the cache."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
@@ -82,7 +85,7 @@ def get_param_cached(param_name: str, default: Any = UNSPECIFIED) -> Any:
     return default
 
 
-def set_param(param_name: str, param_value: Any) -> None:
+def set_param(param_name: str, param_value: object) -> None:
     """Set a parameter; a dictionary sets a whole namespace.
 
     Raises TypeError or OverflowError on a value that XML-RPC has no type for, ROSException where the master
@@ -165,7 +168,7 @@ class KeptParameters:
         if self._notifier:
             self._notifier(key, value)
 
-    def _told(self, key: str, value: Any) -> None:
+    def _told(self, key: str, value: object) -> None:
         self.update(key, value)
 
 
@@ -175,7 +178,7 @@ def get_param_server_cache() -> KeptParameters:
     return KeptParameters()
 
 
-def _get(name: str) -> Any:
+def _get(name: str) -> object:
     """Return the value, or NOT_SET."""
     try:
         return _ask("get", name, lambda: current_session().master.get_param(name))
@@ -194,7 +197,7 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
         raise ROSException(f"unable to {verb} parameter [{name}]: {error}") from error
 
 
-def _as_rospy(value: Any) -> Any:
+def _as_rospy(value: object) -> object:
     """``value`` with bytes and dates in xmlrpc.client's wrappers, where rospy has them."""
     if isinstance(value, dict):
         return {key: _as_rospy(item) for key, item in value.items()}
@@ -208,7 +211,7 @@ def _as_rospy(value: Any) -> Any:
     return value
 
 
-def _check_sendable(value: Any) -> None:
+def _check_sendable(value: object) -> None:
     """Raise what rospy raises on a value for which XML-RPC has no type."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
@@ -232,7 +235,7 @@ def _check_sendable(value: Any) -> None:
         raise TypeError(f"cannot marshal {type(value)} objects")
 
 
-def _is_date(value: object) -> bool:
+def _is_date(value: object) -> TypeGuard[datetime.datetime]:
     import datetime
 
     return isinstance(value, datetime.datetime)

@@ -22,6 +22,7 @@ from minirospy.client.topic import (
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import ROSException, ROSSerializationException, SerializationError
 from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.workers import InOrder
 from minirospy.wire.framing import LargeFrame, Pieces
 from minirospy.wire.tcpros import ANY, InterfaceType
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Published", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
-_M = TypeVar("_M", bound=Any)
+_M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
 class SubscribeListener:
@@ -47,7 +48,7 @@ class SubscribeListener:
         """Handle the end of a subscriber; ``num_peers`` are left."""
 
 
-class Publisher(Topic[_M]):
+class Publisher(Topic[_M_co]):
     """Publishes messages of ``data_class`` on a topic.
 
     ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
@@ -62,7 +63,7 @@ class Publisher(Topic[_M]):
     def __init__(
         self,
         name: str,
-        data_class: type[_M],
+        data_class: type[_M_co],
         subscriber_listener: SubscribeListener | None = None,
         tcp_nodelay: bool = False,
         latch: bool = False,
@@ -89,7 +90,7 @@ class Publisher(Topic[_M]):
         self.impl = state
         self._session.when_ready(state.register)
 
-    def publish(self, *args: Any, **kwds: Any) -> None:
+    def publish(self, *args: Any, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
         Raises ROSException before init_node and after unregister, ROSSerializationException or TypeError on
@@ -122,14 +123,14 @@ class Publisher(Topic[_M]):
 class Published(Shared):
     """One published topic of the process: what its Publishers share."""
 
-    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
+    def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         # asyncio comes with it.
         from minirospy.runtime.node.topics import Publication
 
         super().__init__(session, topic, data_class)
         self._deferral = session.lifecycle.deferral
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
-        self._handles: set[Publisher[Any]] = set()
+        self._handles: set[Publisher[Message]] = set()
         self.subscriber_listeners: list[SubscribeListener] = []
         """Are notified of subscribers; a program may add and remove."""
         self._events: InOrder | None = None
@@ -141,7 +142,7 @@ class Published(Shared):
 
     def join(
         self,
-        handle: Publisher[Any],
+        handle: Publisher[Message],
         listener: SubscribeListener | None,
         queue_size: int | None,
         latch: bool,
@@ -175,7 +176,7 @@ class Published(Shared):
             wait = self._session.begin(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
 
-    def leave(self, handle: Publisher[Any]) -> None:
+    def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
             # A process that has forked, or is another node by now, has forgotten it.
@@ -210,7 +211,7 @@ class Published(Shared):
         if not self._registered and not self._session.is_shutdown():
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: Message) -> None:
         """Send a message to every subscriber."""
         publication = self.publication
         if not self._registered:
@@ -300,11 +301,11 @@ class Published(Shared):
             self._events = InOrder(self._session.node.workers)
         topic = self.publication.topic
 
-        def publish_to_all(*args: Any, **kwds: Any) -> None:
+        def publish_to_all(*args: object, **kwds: object) -> None:
             for handle in list(self._handles)[:1]:
                 handle.publish(*args, **kwds)
 
-        def publish_to_peer(*args: Any, **kwds: Any) -> None:
+        def publish_to_peer(*args: object, **kwds: object) -> None:
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 

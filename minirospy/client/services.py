@@ -34,6 +34,9 @@ from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
+    from types import TracebackType
+
+    from minirospy.idl.protocols import Message
     from minirospy.runtime.node.service_client import ServiceClient
     from minirospy.runtime.node.services import ServiceServer
 
@@ -61,7 +64,7 @@ class Service(Generic[_S]):
         self,
         name: str,
         service_class: type[_S],
-        handler: Callable[[Any], Any],
+        handler: Callable[[Any], object],
         buff_size: int = 65536,
         error_handler: Callable[[Exception, type[Exception], Exception, Any], object] | None = None,
     ) -> None:
@@ -153,7 +156,7 @@ class Service(Generic[_S]):
             raise ServiceException(f"error processing request: {error}") from error
 
     @staticmethod
-    def _log_error(error: Exception, _: type[Exception], __: Exception, tb: Any) -> None:
+    def _log_error(error: Exception, _: type[Exception], __: Exception, tb: TracebackType | None) -> None:
         text = "".join(traceback.format_exception(type(error), error, tb))
         _log.error("Error processing request: %s\n%s", error, text)
 
@@ -189,7 +192,7 @@ class ServiceProxy(Generic[_S]):
         self._client: ServiceClient | None = None
         self._lock = threading.Lock()
 
-    def __call__(self, *args: Any, **kwds: Any) -> Any:
+    def __call__(self, *args: object, **kwds: object) -> Any:
         """Call the service and return its response.
 
         Raises ServiceException where the call fails, TypeError or AttributeError where the arguments do not
@@ -197,7 +200,7 @@ class ServiceProxy(Generic[_S]):
         """
         return self.call(*args, **kwds)
 
-    def call(self, *args: Any, **kwds: Any) -> Any:
+    def call(self, *args: object, **kwds: object) -> Any:
         """Call the service, as calling the proxy itself does."""
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
@@ -281,7 +284,7 @@ class ServiceProxy(Generic[_S]):
         except (OSError, WireError) as error:
             raise ServiceException(f"unable to connect to service: {error}") from error
 
-    def _exchange(self, client: ServiceClient, request: bytes, *, keep: bool) -> Any:
+    def _exchange(self, client: ServiceClient, request: bytes, *, keep: bool) -> Message:
         keeping = False
         try:
             with current_session().lifecycle.interrupting(client.hang_up):
@@ -303,7 +306,7 @@ class ServiceProxy(Generic[_S]):
                 client.close()
                 if self._client is client:
                     self._client = None
-        response = self.response_class()
+        response: Message = self.response_class()
         try:
             response.deserialize(memoryview(body) if self._takes_memoryview else body)
         except (DeserializationError, SerializationError) as error:

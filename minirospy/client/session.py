@@ -59,7 +59,7 @@ class Session:
         self.subscribed: dict[str, Subscribed] = {}
         self.offered: dict[str, Service[Any]] = {}
         self.parameters = ParameterCache()
-        self.parameter_listeners: list[Callable[[str, Any], object]] = (
+        self.parameter_listeners: list[Callable[[str, object], object]] = (
             previous.parameter_listeners if previous else []
         )
         """Called with the name and the value of each parameter that the master reports as changed."""
@@ -136,11 +136,11 @@ class Session:
                 return
         function()
 
-    def run(self, coroutine: Coroutine[Any, Any, _T]) -> _T:
+    def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
         """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
         return self.begin(coroutine)()
 
-    def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[], _T]:
+    def begin(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
         """Start ``coroutine`` on the node's loop, under a lock that orders the starts; what is returned waits for it.
 
         Raises as :meth:`run` does.
@@ -232,7 +232,7 @@ class Session:
             )
         self.lifecycle.signal_shutdown(reason)
 
-    def _on_parameter(self, key: str, value: Any) -> None:
+    def _on_parameter(self, key: str, value: object) -> None:
         self.parameter_changed(key)
         for listener in self.parameter_listeners:
             listener(key, value)

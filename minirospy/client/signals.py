@@ -15,7 +15,6 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
-from typing import Any
 
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action
@@ -45,7 +44,7 @@ class SignalWatchdog:
         self._deferral = lifecycle.deferral
         self._deferral.dispatch = self._dispatch
         self._is_sending = is_sending
-        self._previous: dict[int, Any] = {}
+        self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         """The handlers before, by the numbers of the signals."""
         self._number = int(signal.SIGINT)
         self._error: BaseException | None = None
@@ -251,11 +250,11 @@ def suppress_interrupt_tracebacks(lifecycle: Callable[[], Lifecycle]) -> None:
             raise SystemExit(0)
         hooks[0](kind, error, trace)
 
-    def of_thread(arguments: Any) -> None:
+    def of_thread(arguments: threading.ExceptHookArgs) -> None:
         if not is_expected(arguments.exc_value):
             hooks[1](arguments)
 
-    def of_exit(arguments: Any) -> None:
+    def of_exit(arguments: sys.UnraisableHookArgs) -> None:
         if not is_expected(arguments.exc_value):
             hooks[2](arguments)
 

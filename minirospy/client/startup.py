@@ -12,7 +12,6 @@ import signal
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from minirospy import names
 from minirospy.client import log
@@ -171,7 +170,7 @@ def _wait_for_master(session: Session) -> None:
     raise session.lifecycle.interrupted(f"shut down while waiting for the master at {uri}")
 
 
-def _set_parameters(session: Session, parameters: Mapping[str, Any]) -> None:
+def _set_parameters(session: Session, parameters: Mapping[str, object]) -> None:
     """Set the private parameters of the command line."""
     for key, value in parameters.items():
         session.master.set_param(names.resolve("~" + key, session.name), value)
@@ -181,7 +180,7 @@ def _follow_clock_topic(clock: SimulatedClock) -> None:
     """Set ``clock`` from /clock (rosgraph_msgs/Clock)."""
     from rosgraph_msgs.msg import Clock
 
-    def on_clock(message: Any) -> None:
+    def on_clock(message: Clock) -> None:
         clock.set(message.clock.to_nsec())
 
     Subscriber("/clock", Clock, on_clock, queue_size=1)

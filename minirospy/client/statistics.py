@@ -9,11 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.client.session import current_session
 from minirospy.client.time import Duration, Time
 from minirospy.wire.header import Header
+
+if TYPE_CHECKING:
+    from rosgraph_msgs.msg import TopicStatistics
+
+    from minirospy.client.publisher import Publisher
+    from minirospy.idl.protocols import Message
 
 __all__ = ["Report", "Spread", "StatisticsPublisher", "TopicStatisticsCounter", "WindowLimits"]
 
@@ -32,7 +38,7 @@ class WindowLimits(NamedTuple):
     max_size: float = 64.0
 
     @classmethod
-    def read(cls, get: Callable[[str, Any], Any]) -> WindowLimits:
+    def read(cls, get: Callable[[str, object], Any]) -> WindowLimits:
         """Return the limits that the parameters /statistics_window_... set; ``get(key, default)`` reads one."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
@@ -147,17 +153,17 @@ class StatisticsPublisher:
         from minirospy.client.publisher import Publisher
 
         self._topic = topic
-        self._message_class: Any = TopicStatistics
+        self._message_class: type[TopicStatistics] = TopicStatistics
         self._counter = TopicStatisticsCounter(WindowLimits.read(get_param))
-        self._publisher: Publisher[Any] = Publisher("/statistics", TopicStatistics, queue_size=10)
+        self._publisher: Publisher[TopicStatistics] = Publisher("/statistics", TopicStatistics, queue_size=10)
 
-    def count(self, message: Any, header: Header, size: int) -> None:
+    def count(self, message: Message, header: Header, size: int) -> None:
         """Count one message of ``size`` bytes."""
         report = self._counter.count(message, header, size, current_session().clock.now())
         if report:
             self._publisher.publish(self._as_message(report))
 
-    def _as_message(self, report: Report) -> Any:
+    def _as_message(self, report: Report) -> TopicStatistics:
         message = self._message_class()
         message.topic = self._topic
         message.node_pub = report.publisher

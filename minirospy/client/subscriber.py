@@ -14,6 +14,7 @@ from minirospy.client.session import Session, current_session
 from minirospy.client.topic import Shared, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
+from minirospy.idl.protocols import Message
 from minirospy.runtime.transport.complaints import Complaints
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
@@ -26,12 +27,13 @@ if TYPE_CHECKING:
 __all__ = ["Subscribed", "Subscriber", "wait_for_message"]
 
 _log = logging.getLogger("rosout")
-_M = TypeVar("_M", bound=Any)
+_M = TypeVar("_M", bound=Message)
+_M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: the counts themselves, and what their times come from."""
 
 
-class Subscriber(Topic[_M]):
+class Subscriber(Topic[_M_co]):
     """Calls ``callback(message)`` with each message of a topic.
 
     ``callback_args`` is handed to the callback as second argument. ``queue_size``: while the callback is
@@ -47,7 +49,7 @@ class Subscriber(Topic[_M]):
     def __init__(
         self,
         name: str,
-        data_class: type[_M],
+        data_class: type[_M_co],
         callback: Callable[..., object] | None = None,
         callback_args: Any = None,
         queue_size: int | None = None,
@@ -122,13 +124,13 @@ class _Callback(NamedTuple):
     """A subscriber's function with the argument that it wants beside the message."""
 
     function: Callable[..., object]
-    args: Any
+    args: object
 
 
 class _Receiver(NamedTuple):
     """A message class, whether it can be read from a memoryview (genpy's cannot), and who wants it."""
 
-    data_class: type[Any]
+    data_class: type[Message]
     takes_memoryview: bool
     callbacks: tuple[_Callback, ...]
 
@@ -136,11 +138,11 @@ class _Receiver(NamedTuple):
 class Subscribed(Shared):
     """One subscribed topic of the process: what its Subscribers share."""
 
-    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
+    def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         super().__init__(session, topic, data_class)
         self.subscription: Subscription | None = None
         self._tcp_nodelay = False
-        self._handles: list[Subscriber[Any]] = []
+        self._handles: list[Subscriber[Message]] = []
         self._added: list[_Callback] = []
         self._receivers: tuple[_Receiver, ...] = ()
         self._statistics: StatisticsPublisher | None = None
@@ -156,12 +158,12 @@ class Subscribed(Shared):
         """Whether the node with this Slave API is connected."""
         return any(link.uri == endpoint_id for link in self.connections)
 
-    def join(self, handle: Subscriber[Any], tcp_nodelay: bool) -> None:
+    def join(self, handle: Subscriber[Message], tcp_nodelay: bool) -> None:
         self._tcp_nodelay = self._tcp_nodelay or tcp_nodelay
         self._handles.append(handle)
         self._update()
 
-    def leave(self, handle: Subscriber[Any]) -> None:
+    def leave(self, handle: Subscriber[Message]) -> None:
         with self._session.lock:
             self._handles.remove(handle)
             self._update()
@@ -174,7 +176,7 @@ class Subscribed(Shared):
             wait = self._session.begin(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
-    def add_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
+    def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
         """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
         callback = _Callback(cb, cb_args)
         with self._session.lock:
@@ -183,7 +185,7 @@ class Subscribed(Shared):
             links = self.connections
         self.replay(self.data_class, callback, links)
 
-    def remove_callback(self, cb: Callable[..., object], cb_args: Any) -> None:
+    def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
         """Call ``cb`` no more, which add_callback or a Subscriber was given. Raises KeyError."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
@@ -243,7 +245,7 @@ class Subscribed(Shared):
         """Group the callbacks by class, so that a message is deserialised once for all of a class."""
         if self.subscription:
             self.subscription.newest = self._newest()
-        by_class: dict[type[Any], list[_Callback]] = {}
+        by_class: dict[type[Message], list[_Callback]] = {}
         for handle in self._handles:
             callbacks = by_class.setdefault(handle.data_class, [])
             if handle.callback is not None:
@@ -255,7 +257,7 @@ class Subscribed(Shared):
             if callbacks
         )
 
-    def replay(self, data_class: type[Any], callback: _Callback, links: tuple[InLink, ...]) -> None:
+    def replay(self, data_class: type[Message], callback: _Callback, links: tuple[InLink, ...]) -> None:
         """Give a callback, which has joined, the last message of each latched publisher."""
         receivers = (_Receiver(data_class, False, (callback,)),)
         for link in links:
@@ -268,7 +270,7 @@ class Subscribed(Shared):
                 # It came meanwhile, and may have been delivered before the older one: rather twice than not last.
                 self._deliver(newest, link.header, receivers)
 
-    def _handle_with(self, callback: _Callback) -> Subscriber[Any]:
+    def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
         for handle in self._handles:
             if (handle.callback, handle.callback_args) == callback:
                 return handle
@@ -297,7 +299,7 @@ class Subscribed(Shared):
                 _call(callback, message)
 
 
-def _call(callback: _Callback, message: Any) -> None:
+def _call(callback: _Callback, message: Message) -> None:
     try:
         if callback.args is None:
             callback.function(message)

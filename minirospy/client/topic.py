@@ -12,13 +12,14 @@ from typing import Any, Generic, TypeVar
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
+from minirospy.idl import protocols
 from minirospy.idl.message import Message
 from minirospy.wire.tcpros import ANY
 
 __all__ = ["AnyMsg", "Shared", "Topic", "register_with_master", "unregister_from_master"]
 
 _log = logging.getLogger("rosout")
-_M = TypeVar("_M", bound=Any)
+_M_co = TypeVar("_M_co", bound=protocols.Message, covariant=True)
 
 
 class AnyMsg(Message):
@@ -37,19 +38,19 @@ class AnyMsg(Message):
             raise ROSException("AnyMsg does not accept arguments")
         self._buff: bytes | None = None
 
-    def serialize(self, buff: Any) -> None:
+    def serialize(self, buff: protocols.Writer) -> None:
         """Write the bytes that were received."""
         if self._buff is None:
             raise ROSException("AnyMsg is not initialized")
         buff.write(self._buff)
 
-    def deserialize(self, str: Any) -> AnyMsg:
+    def deserialize(self, str: protocols.Buffer) -> AnyMsg:
         """Take the bytes."""
         self._buff = bytes(str)
         return self
 
 
-class Topic(Generic[_M]):
+class Topic(Generic[_M_co]):
     """What Publisher and Subscriber share: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
 
     ``impl`` is what all handles of the topic in this process share, None once unregistered.
@@ -57,7 +58,7 @@ class Topic(Generic[_M]):
 
     impl: Shared | None
 
-    def __init__(self, name: str, data_class: type[_M], reg_type: str) -> None:
+    def __init__(self, name: str, data_class: type[_M_co], reg_type: str) -> None:
         if not name or not isinstance(name, str):
             raise ValueError("topic name is not a non-empty string")
         if data_class is None:
@@ -94,14 +95,14 @@ class Topic(Generic[_M]):
 class Shared:
     """What the handles of one topic in this process share: the ``impl`` that user code sees of rospy's."""
 
-    def __init__(self, session: Session, topic: str, data_class: type[Any]) -> None:
+    def __init__(self, session: Session, topic: str, data_class: type[protocols.Message]) -> None:
         self._session = session
         self.resolved_name = self.name = topic
         self.data_class = data_class
         self.type: str = data_class._type
 
     @property
-    def connections(self) -> tuple[Any, ...]:
+    def connections(self) -> tuple[object, ...]:
         """The links to the other ends."""
         raise NotImplementedError
 

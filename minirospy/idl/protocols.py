@@ -55,7 +55,7 @@ class Message(Protocol):
     def serialize(self, buff: Writer) -> None:
         """Write the message. Raise genpy.SerializationError."""
 
-    def deserialize(self, data: Buffer) -> Message:
+    def deserialize(self, data: Buffer, /) -> Message:
         """Read the message from bytes, and return it. Raise genpy.DeserializationError."""
 
 
