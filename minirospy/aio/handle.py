@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Generator
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from minirospy.errors import (
     MasterUnreachableError,
@@ -14,6 +14,7 @@ from minirospy.errors import (
     RpcError,
     SerializationError,
 )
+from minirospy.idl.protocols import Message
 from minirospy.wire.framing import Pieces
 
 __all__ = ["Handle", "pieces_of", "registered", "serialized"]
@@ -27,7 +28,7 @@ class Handle:
 
     _registration: asyncio.Task[None]
 
-    def __await__(self: _H) -> Generator[Any, None, _H]:
+    def __await__(self: _H) -> Generator[object, None, _H]:
         yield from asyncio.shield(self._registration).__await__()
         return self
 
@@ -54,7 +55,7 @@ async def registered(
         log.critical("unable to register %s with master: %s", what, error)
 
 
-def pieces_of(message: Any) -> Pieces:
+def pieces_of(message: Message) -> Pieces:
     pieces = Pieces()
     try:
         message.serialize(pieces)
@@ -63,5 +64,5 @@ def pieces_of(message: Any) -> Pieces:
     return pieces
 
 
-def serialized(message: Any) -> bytes:
+def serialized(message: Message) -> bytes:
     return b"".join(pieces_of(message))

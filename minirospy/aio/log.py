@@ -6,7 +6,7 @@ import contextlib
 import logging
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.aio.topics import Publisher
 from minirospy.errors import (
@@ -14,6 +14,8 @@ from minirospy.errors import (
 )
 
 if TYPE_CHECKING:
+    from rosgraph_msgs.msg import Log
+
     from minirospy.aio.node import Node
 
 __all__ = ["RosoutHandler", "TerminalHandler"]
@@ -43,7 +45,7 @@ class RosoutHandler(logging.Handler):
 
     _LEVELS = ((logging.CRITICAL, 16), (logging.ERROR, 8), (logging.WARNING, 4), (logging.INFO, 2))
 
-    def __init__(self, node: Node, publisher: Publisher[Any], message_class: Any) -> None:
+    def __init__(self, node: Node, publisher: Publisher[Log], message_class: type[Log]) -> None:
         super().__init__()
         self._node = node
         self._publisher = publisher

@@ -38,8 +38,8 @@ __all__ = ["Node"]
 
 _M = TypeVar("_M", bound=Message)
 _T = TypeVar("_T")
-_Request = TypeVar("_Request")
-_Response = TypeVar("_Response")
+_Request = TypeVar("_Request", bound=Message)
+_Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
 _BILLION = 1_000_000_000
@@ -98,10 +98,10 @@ class Node:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stopping = asyncio.Event()
         self._published: dict[str, PublishedTopic] = {}
-        self._kept: dict[str, tuple[Publisher[Any], asyncio.Task[None]]] = {}
+        self._kept: dict[str, tuple[Publisher[Message], asyncio.Task[None]]] = {}
         self._served: set[str] = set()
         self._subscribed: dict[str, SubscribedTopic] = {}
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self._tasks: set[asyncio.Task[object]] = set()
         self._simulated: SimulatedTime | None = None
         self._is_closed = False
 
@@ -256,7 +256,7 @@ class Node:
         state.publication.latch = state.publication.latch or latch
         return Publisher(self, state, message_class, waits=queue_size is None)
 
-    async def publish(self, topic: str, message: Any) -> None:
+    async def publish(self, topic: str, message: Message) -> None:
         """Publish one message; the topic stays advertised.
 
         The first message of a topic waits up to a second for the subscribers that the master knows.
@@ -264,7 +264,7 @@ class Node:
         resolved = self.resolve(topic)
         kept = self._kept.get(resolved)
         if kept is None:
-            publisher: Publisher[Any] = self.advertise(resolved, type(message))
+            publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher._wait_for_expected()))
         publisher, expected = kept
         # Others that publish meanwhile wait, too.
@@ -274,7 +274,7 @@ class Node:
     # --- services
 
     async def call(
-        self, service: str, service_class: ServiceClass[Any, _Response], *args: Any, **kwds: Any
+        self, service: str, service_class: ServiceClass[Message, _Response], *args: object, **kwds: object
     ) -> _Response:
         """Call a service, with a request or its fields, and return its response.
 
@@ -286,7 +286,7 @@ class Node:
     def service_proxy(
         self,
         service: str,
-        service_class: ServiceClass[Any, _Response],
+        service_class: ServiceClass[Message, _Response],
         *,
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
@@ -298,7 +298,7 @@ class Node:
         self,
         service: str,
         service_class: ServiceClass[_Request, _Response],
-        handler: Callable[[_Request], Awaitable[Any]] | Callable[[_Request], Any],
+        handler: Callable[[_Request], Awaitable[object]] | Callable[[_Request], object],
     ) -> Service:
         """Offer a service; ``await node.serve(...)`` waits until the master knows it.
 
@@ -325,7 +325,7 @@ class Node:
 
     # --- parameters
 
-    async def get_param(self, name: str, default: Any = _UNSPECIFIED) -> Any:
+    async def get_param(self, name: str, default: object = _UNSPECIFIED) -> Any:
         """Return a parameter's value, or ``default``.
 
         Raises KeyError where it is not set and there is no default, MasterUnreachableError.
@@ -337,7 +337,7 @@ class Node:
                 raise KeyError(name) from error
             return default
 
-    async def set_param(self, name: str, value: Any) -> None:
+    async def set_param(self, name: str, value: object) -> None:
         """Set a parameter; a dictionary sets a whole namespace. Raises RpcError on a value of no XML-RPC type."""
         await self._node.master("setParam", self.resolve(name), value)
 
@@ -404,14 +404,14 @@ class Node:
         for published in self._published.values():
             published.links_changed()
 
-    def _spawn(self, work: Coroutine[Any, Any, _T]) -> asyncio.Task[_T]:
+    def _spawn(self, work: Coroutine[object, object, _T]) -> asyncio.Task[_T]:
         """Start a task that is cancelled when the node closes."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def _later(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    def _later(self, work: Callable[[], Coroutine[object, object, None]]) -> None:
         """Do ``work`` on the loop, from any thread; not at all once the node is closed."""
         if self._loop and not self._is_closed:
             with contextlib.suppress(RuntimeError):

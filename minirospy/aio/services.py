@@ -20,6 +20,7 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.idl.message import args_kwds_to_message
+from minirospy.idl.protocols import Message
 from minirospy.idl.service import to_response
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer, ServiceServer
 from minirospy.wire.header import Header
@@ -30,12 +31,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Service", "ServiceClass", "ServiceProxy"]
 
-_Request_co = TypeVar("_Request_co", covariant=True)
-_Response_co = TypeVar("_Response_co", covariant=True)
+_Request_co = TypeVar("_Request_co", bound=Message, covariant=True)
+_Response_co = TypeVar("_Response_co", bound=Message, covariant=True)
 
 
 class ServiceClass(Protocol[_Request_co, _Response_co]):
     """What a service class has, as ``std_srvs.srv.SetBool``: the classes of its request and response."""
+
+    @property
+    def _md5sum(self) -> str: ...
 
     @property
     def _request_class(self) -> type[_Request_co]: ...
@@ -51,19 +55,19 @@ class ServiceProxy(Generic[_Response_co]):
         self,
         node: Node,
         name: str,
-        service_class: ServiceClass[Any, _Response_co],
+        service_class: ServiceClass[Message, _Response_co],
         persistent: bool,
         headers: Mapping[str, str] | None,
     ) -> None:
         self.name = name
         self._node = node
-        self._service_class: Any = service_class
+        self._service_class = service_class
         self._persistent = persistent
         self._headers = dict(headers or {})
         self._client: AsyncServiceClient | None = None
         self._lock = asyncio.Lock()
 
-    async def __call__(self, *args: Any, **kwds: Any) -> _Response_co:
+    async def __call__(self, *args: object, **kwds: object) -> _Response_co:
         """Call the service. Raises as :meth:`Node.call` does."""
         request = serialized(args_kwds_to_message(self._service_class._request_class, args, kwds))
         if not self._persistent:
@@ -128,13 +132,13 @@ class ServiceProxy(Generic[_Response_co]):
             ) from error
         except (OSError, WireError) as error:
             raise ServiceException(f"transport error completing service call: {error}") from error
-        response: Any = self._service_class._response_class()
+        response = self._service_class._response_class()
         try:
             response.deserialize(body)
         except Exception as error:  # whatever a foreign message class raises on bad bytes
             raise ServiceException(f"transport error completing service call: {error}") from error
         response._connection_header = client.header
-        return response  # type: ignore[no-any-return]
+        return response
 
 
 class Service(Handle):
@@ -143,8 +147,8 @@ class Service(Handle):
     def __init__(self, node: Node, name: str, service_class: Any, handler: Callable[[Any], Any]) -> None:
         self.name = name
         self._node = node
-        self._request_class: Any = service_class._request_class
-        self._response_class: Any = service_class._response_class
+        self._request_class: type[Message] = service_class._request_class
+        self._response_class: type[Message] = service_class._response_class
         self._handler = handler
         runtime = node._node
         is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(
@@ -184,13 +188,13 @@ class Service(Handle):
         except Exception as error:
             raise self._failure(error) from error
 
-    def _request(self, body: bytes, header: Header) -> Any:
+    def _request(self, body: bytes, header: Header) -> Message:
         request = self._request_class()
         request.deserialize(body)
         request._connection_header = header
         return request
 
-    def _response(self, returned: Any) -> bytes:
+    def _response(self, returned: object) -> bytes:
         return serialized(to_response(self._response_class, returned))
 
     def _failure(self, error: Exception) -> ServiceException:

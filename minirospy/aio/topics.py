@@ -31,17 +31,19 @@ if TYPE_CHECKING:
 
 __all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
 
-_M = TypeVar("_M", bound=Message)
+_M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _JOIN_SECONDS = 1.0
 
 
-class Subscription(Handle, Generic[_M]):
+class Subscription(Handle, Generic[_M_co]):
     """The messages of a topic, for ``async for``; made by :meth:`Node.subscribe`.
 
     The iteration ends when the subscription is closed or the node ends.
     """
 
-    def __init__(self, node: Node, state: SubscribedTopic, message_class: type[_M], queue_size: int) -> None:
+    def __init__(
+        self, node: Node, state: SubscribedTopic, message_class: type[_M_co], queue_size: int
+    ) -> None:
         self.topic = state.topic
         self.dropped = 0
         """How many messages gave way to newer ones."""
@@ -55,10 +57,10 @@ class Subscription(Handle, Generic[_M]):
         self._state = state
         self._registration = state.join(self)
 
-    def __aiter__(self) -> AsyncIterator[_M]:
+    def __aiter__(self) -> AsyncIterator[_M_co]:
         return self
 
-    async def __anext__(self) -> _M:
+    async def __anext__(self) -> _M_co:
         while True:
             while not self._queue:
                 if self._ended:
@@ -69,7 +71,7 @@ class Subscription(Handle, Generic[_M]):
             if message is not None:
                 return message
 
-    async def next(self, timeout: float | None = None) -> _M:
+    async def next(self, timeout: float | None = None) -> _M_co:
         """Return the next message.
 
         Raises TimeoutError after ``timeout`` seconds, ROSInterruptException where the subscription ends.
@@ -128,8 +130,8 @@ class Subscription(Handle, Generic[_M]):
         for callback in self._state.subscription.on_connected:
             callback()
 
-    def _deserialized(self, frame: bytes | memoryview, header: Header) -> _M | None:
-        message: Any = self._message_class()
+    def _deserialized(self, frame: bytes | memoryview, header: Header) -> _M_co | None:
+        message = self._message_class()
         try:
             message.deserialize(frame if self._takes_memoryview else bytes(frame))
         except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
@@ -142,13 +144,13 @@ class Subscription(Handle, Generic[_M]):
             )
             return None
         message._connection_header = header
-        return message  # type: ignore[no-any-return]
+        return message
 
 
-class Publisher(Handle, Generic[_M]):
+class Publisher(Handle, Generic[_M_co]):
     """Publishes messages on a topic; made by :meth:`Node.advertise`."""
 
-    def __init__(self, node: Node, state: PublishedTopic, message_class: type[_M], *, waits: bool) -> None:
+    def __init__(self, node: Node, state: PublishedTopic, message_class: type[_M_co], *, waits: bool) -> None:
         self.topic = state.publication.topic
         self._node = node
         self._message_class = message_class
@@ -156,7 +158,7 @@ class Publisher(Handle, Generic[_M]):
         self._state: PublishedTopic | None = state
         self._registration = state.join(self)
 
-    async def publish(self, *args: Any, **kwds: Any) -> None:
+    async def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
         Does not wait for subscribers, except with ``queue_size=None``. Raises ROSException once it is closed,
@@ -210,10 +212,10 @@ class Publisher(Handle, Generic[_M]):
 class SubscribedTopic:
     """One subscribed topic of a node."""
 
-    def __init__(self, node: Node, topic: str, message_class: type[Any]) -> None:
+    def __init__(self, node: Node, topic: str, message_class: type[Message]) -> None:
         self.topic = topic
         self._node = node
-        self._handles: weakref.WeakSet[Subscription[Any]] = weakref.WeakSet()
+        self._handles: weakref.WeakSet[Subscription[Message]] = weakref.WeakSet()
         runtime = node._node
         self.subscription: RuntimeSubscription = runtime.make_subscription(
             topic, InterfaceType.of(message_class), self._deliver, on_loop=True
@@ -222,13 +224,13 @@ class SubscribedTopic:
             registered(runtime.subscribe, self.subscription, f"subscription [{topic}]", node.log)
         )
 
-    def join(self, handle: Subscription[Any]) -> asyncio.Task[None]:
+    def join(self, handle: Subscription[Message]) -> asyncio.Task[None]:
         self._handles.add(handle)
         # `async for ... break` leaves a subscription behind without a reference.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
-    async def leave(self, handle: Subscription[Any]) -> None:
+    async def leave(self, handle: Subscription[Message]) -> None:
         self._handles.discard(handle)
         try:
             await self._leave_if_empty()
@@ -259,10 +261,10 @@ class SubscribedTopic:
 class PublishedTopic:
     """One published topic of a node."""
 
-    def __init__(self, node: Node, publication: Publication, message_class: type[Any]) -> None:
+    def __init__(self, node: Node, publication: Publication, message_class: type[Message]) -> None:
         self.publication = publication
         self._node = node
-        self._handles: set[Publisher[Any]] = set()
+        self._handles: set[Publisher[Message]] = set()
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(message_class, "_has_header", False))
         self._changed = asyncio.Event()
@@ -270,11 +272,11 @@ class PublishedTopic:
             registered(node._node.advertise, publication, f"publication [{publication.topic}]", node.log)
         )
 
-    def join(self, handle: Publisher[Any]) -> asyncio.Task[None]:
+    def join(self, handle: Publisher[Message]) -> asyncio.Task[None]:
         self._handles.add(handle)
         return self._registration
 
-    async def leave(self, handle: Publisher[Any]) -> None:
+    async def leave(self, handle: Publisher[Message]) -> None:
         self._handles.discard(handle)
         self.links_changed()
         try:
