@@ -171,7 +171,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Return what draws: over what was drawn before; below it where the terminal's cursor cannot go back (TERM=dumb)."""
+    """Yield a function that draws over the last drawing; below it where the cursor cannot go back (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -182,7 +182,7 @@ def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
 
 
 def _act(board: Board, key: str) -> None:
-    """Do what a key says."""
+    """Apply a key to the board."""
     if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
         pin = BUTTONS[int(key) - 1]
         (board.release if board.get(pin) else board.press)(pin)

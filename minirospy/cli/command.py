@@ -205,7 +205,7 @@ def hint_near(name: str, known: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
-    """Return the node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
+    """Yield the node of a command that listens or publishes; it leaves the graph also where `kill` ends the command.
 
     ``arguments``: what a launch file gives it as a node: `__name:=`, `__ns:=`, `__master:=`.
     """

@@ -74,7 +74,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Whether this is a terminal whose cursor cannot go back, as in an editor's window."""
+    """Return whether this is a terminal whose cursor cannot go back, as in an editor's window."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -82,7 +82,7 @@ def _is_dumb() -> bool:
 
 @contextlib.contextmanager
 def _own_world() -> Iterator[Path]:
-    """Set up a master port and a board of the demo's own, so that it disturbs nobody; a folder for its files."""
+    """Set up a master port and a board of the demo's own, so that it disturbs nobody; yield a folder for its files."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -96,7 +96,7 @@ def _own_world() -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """roslaunch with the workshop's launch file; it is ended by Ctrl-C's signal, which ends all its nodes."""
+    """Run roslaunch with the workshop's launch file; end it by Ctrl-C's signal, which ends all its nodes."""
     command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
     windows = sys.platform == "win32"
     flags = subprocess.CREATE_NEW_PROCESS_GROUP if windows else 0  # type: ignore[attr-defined,unused-ignore]
@@ -123,7 +123,7 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
-    """Return when a press of the button lights the LED for the first time: then both nodes are connected."""
+    """Press the button until the LED lights: then both nodes are connected. Raises MinirospyError."""
     print("Starting the master, button_publisher.py and led_actuator.py ...", flush=True)
     end = time.monotonic() + _START_SECONDS
     while time.monotonic() < end:
@@ -139,14 +139,14 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release; the seconds until the LED has followed, None where it did not."""
+    """Press or release; return the seconds until the LED has followed, None where it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
 
 
 def _wait_for(board: Board, level: int, timeout: float) -> int | None:
-    """Wait until the LED has ``level``; None after ``timeout`` seconds."""
+    """Wait until the LED has ``level``, and return it; return None after ``timeout`` seconds."""
     watch = board.watch([LED], timeout=timeout)
     if board.get(LED) == level:
         return level

@@ -93,12 +93,12 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
 
 
 def _is_file(word: str) -> bool:
-    """Whether a file is meant, rather than a machine."""
+    """Return whether a word names a file, rather than a machine."""
     return "/" in word or word.endswith((".launch", ".test", ".xml")) or Path(word).is_file()
 
 
 def _wait_for_signal() -> None:
-    """Until Ctrl-C, or SIGTERM: a listener takes itself out of the master."""
+    """Wait for Ctrl-C or SIGTERM, so that a listener unregisters before it exits."""
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -114,7 +114,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
-    """Whether a launch file loads, and whether the programs that it starts are there."""
+    """Yield whether a launch file loads, and whether the programs that it starts are there."""
     from minirospy.errors import MinirospyError
     from minirospy.launch.command import node_command
     from minirospy.launch.load import load_files

@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """What pyproject.toml names as the console script's function."""
+        """Return the console script's function as pyproject.toml names it."""
         return f"minirospy.cli.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
@@ -42,7 +42,7 @@ class Entry(NamedTuple):
         return main
 
     def load_grammar(self) -> Command | Family | None:
-        """Import the module; return what the command's words are read by, None where that is code."""
+        """Import the module; return the Command or Family that it defines, None where it has only a function."""
         grammar: Command | Family | None = (
             getattr(self._load_module(), self.grammar) if self.grammar else None
         )

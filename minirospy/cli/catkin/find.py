@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Return the prefixes of the workspaces that are sourced, the nearest first; None for minirospy's own packages."""
+    """Yield the prefixes of the sourced workspaces, the nearest first; last None, for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

@@ -26,7 +26,7 @@ _END_SECONDS = 20.0
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; 1 where one failed.
+    """Run the tests of the chosen packages, or of all; return 1 where one failed.
 
     Raises BuildError, NotFoundError; MinirospyError at Ctrl-C.
 
@@ -69,7 +69,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
-    """Return the exit status. Raises MinirospyError at Ctrl-C, when the test has ended its nodes."""
+    """Run a test; return its exit status. Raises MinirospyError at Ctrl-C, after the test has ended its nodes."""
     with interrupt_noted() as interrupted, subprocess.Popen(command, env=environment, cwd=folder) as popen:
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)

@@ -34,7 +34,7 @@ class Counts(NamedTuple):
 
     @property
     def is_bad(self) -> bool:
-        """Whether something went wrong."""
+        """Return whether something went wrong."""
         return bool(self.errors or self.failures)
 
     def plus(self, other: Counts) -> Counts:
@@ -67,7 +67,7 @@ def read_counts(file: Path) -> Counts:
 
 
 def results_below(folder: Path) -> Iterator[tuple[Path, Counts | ValueError]]:
-    """Each XML file below a folder, sorted: its counts, or why it has none."""
+    """Yield each XML file below a folder, sorted, with its counts, or why it has none."""
     for file in sorted(folder.rglob("*.xml")):
         try:
             yield file, read_counts(file)

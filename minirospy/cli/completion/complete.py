@@ -196,7 +196,7 @@ def _at_home(text: str) -> str:
 
 
 def _quoted(text: str, word: _Word) -> str:
-    """``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
+    """Return ``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
     if word.quote:
         # A folder's quotes stay open: what is in it comes next.
         end = "" if text.endswith("/") else word.quote

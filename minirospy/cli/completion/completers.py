@@ -58,7 +58,7 @@ Completer = Callable[[Place], Iterable[str]]
 
 
 def nothing(_: Place) -> Iterable[str]:
-    """Return nothing: a number, an expression, a name that is new."""
+    """Return no candidates: for a number, an expression, a new name."""
     return ()
 
 
@@ -72,7 +72,7 @@ def _packages() -> Packages:
 
 
 def package_names(_: Place) -> Iterable[str]:
-    """Every package."""
+    """Return the names of all packages."""
     return _packages().names()
 
 
@@ -84,7 +84,7 @@ def build_targets(place: Place) -> Iterable[str]:
 
 
 def package_folders(place: Place) -> Iterable[str]:
-    """``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of results of tests."""
+    """Return ``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of results of tests."""
     if any(not word.startswith("-") for word in place.given):
         return []
     package, slash, _ = place.word.partition("/")
@@ -147,14 +147,14 @@ def _below(root: Path, shown: str, word: str) -> list[str]:
 
 
 def files(place: Place) -> Iterable[str]:
-    """Files and folders of this computer, as shells complete them."""
+    """Return files and folders of this computer, as shells complete them."""
     head, slash, begun = place.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=begun.startswith("."))]
 
 
 def folders(place: Place) -> Iterable[str]:
-    """Folders of this computer."""
+    """Return folders of this computer."""
     return [name for name in files(place) if name.endswith("/")]
 
 
@@ -168,7 +168,7 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
 
 
 def rosrun_words(place: Place) -> Iterable[str]:
-    """Options of rosrun, a package, a program of it; then what the program takes: files, remaps."""
+    """Return options of rosrun, packages, programs of one; then the program's arguments: files, remappings."""
     given = list(place.given)
     while given and given[0].startswith("-"):
         if given.pop(0) in ("-p", "--prefix"):
@@ -220,7 +220,7 @@ def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 
 
 def launch_words(place: Place) -> Iterable[str]:
-    """Return a package and a launch file of it, or a path of one; then ``arg:=`` of what the file declares."""
+    """Yield packages, launch files of one, or their paths; then ``arg:=`` for each argument that the file declares."""
     if ":=" not in place.word:
         if not place.given:
             yield from _packages().names()
@@ -235,7 +235,7 @@ def launch_words(place: Place) -> Iterable[str]:
 
 
 def launch_files(place: Place) -> Iterable[str]:
-    """Launch files of this computer, and the folders on the way to them."""
+    """Return launch files of this computer, and the folders on the way to them."""
     return [name for name in files(place) if name.endswith((*_LAUNCH, "/"))]
 
 
@@ -257,7 +257,7 @@ def _launch_args(place: Place) -> Iterator[str]:
 
 
 def launch_nodes(place: Place) -> Iterable[str]:
-    """`roslaunch PACKAGE FILE --args NODE`: the nodes of the launch file."""
+    """Return the nodes of the launch file, for `roslaunch PACKAGE FILE --args NODE`."""
     from minirospy.launch.load import Source as LaunchSource
     from minirospy.launch.load import describe_args, load_sources
 
@@ -293,12 +293,12 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Global names, with their first slash only where that is how they are being typed."""
+    """Return global names, with their first slash only where they are typed so."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
 def topics(place: Place) -> Iterable[str]:
-    """Topics; for echo and type also the fields of one."""
+    """Return the topics; for echo and type also the fields of one."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = place.verb in ("echo", "type") and "/" in place.word[1:]
@@ -315,7 +315,7 @@ def topics(place: Place) -> Iterable[str]:
 
 
 def nodes(place: Place) -> Iterable[str]:
-    """Nodes that are not named yet."""
+    """Return the nodes that are not named yet."""
     from minirospy.introspect.nodes import list_nodes
 
     names = _live(list_nodes)
@@ -333,21 +333,21 @@ def machines(_: Place) -> Iterable[str]:
 
 
 def services(place: Place) -> Iterable[str]:
-    """Services."""
+    """Return the services."""
     from minirospy.introspect.services import list_services
 
     return _as_typed(_live(lambda graph: [service.name for service in list_services(graph)]), place.word)
 
 
 def parameters(place: Place) -> Iterable[str]:
-    """Parameters."""
+    """Return the parameters."""
     from minirospy.introspect.parameters import list_parameters
 
     return _as_typed(_live(list_parameters), place.word)
 
 
 def parameter_value(place: Place) -> Iterable[str]:
-    """`rosparam set PARAMETER`: the value that it has, to be changed."""
+    """Return a parameter's value, to be changed, for `rosparam set PARAMETER`."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
 
@@ -360,7 +360,7 @@ def parameter_value(place: Place) -> Iterable[str]:
 
 
 def loggers(place: Place) -> Iterable[str]:
-    """`rosconsole get NODE`: the loggers of the node."""
+    """Return the loggers of a node, for `rosconsole get NODE`."""
     from minirospy.introspect.services import call_service, fill_request
 
     if not place.given:
@@ -385,7 +385,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(place: Place, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """``pkg/``, then ``pkg/Type``: all types at once would be hundreds. `rosmsg show` takes the name alone too."""
+    """Return ``pkg/``, then ``pkg/Type``: all types would be hundreds. `rosmsg show` takes the name alone too."""
     from minirospy.introspect.interfaces import Interfaces, Kind
 
     package, slash, _ = place.word.partition("/")
@@ -403,22 +403,22 @@ def _types(place: Place, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
 
 
 def message_types(place: Place) -> Iterable[str]:
-    """Types of messages."""
+    """Return the types of messages."""
     return _types(place, "msg", ("msg", "action"))
 
 
 def service_types(place: Place) -> Iterable[str]:
-    """Types of services."""
+    """Return the types of services."""
     return _types(place, "srv", ("srv",))
 
 
 def prototype_types(place: Place) -> Iterable[str]:
-    """`rosmsg-proto msg|srv`: types of that kind."""
+    """Return the types of a kind, for `rosmsg-proto msg|srv`."""
     return service_types(place) if place.given[:1] == ("srv",) else message_types(place)
 
 
 def topic_type(place: Place) -> Iterable[str]:
-    """`rostopic pub TOPIC`: the type that the topic has, any where it has none."""
+    """Return the topic's type, all types where it has none, for `rostopic pub TOPIC`."""
     if not place.given:
         return message_types(place)
 
@@ -430,7 +430,7 @@ def topic_type(place: Place) -> Iterable[str]:
 
 
 def message_text(place: Place) -> Iterable[str]:
-    """`rostopic pub TOPIC TYPE`: a whole message to be changed."""
+    """Return a whole message to be changed, for `rostopic pub TOPIC TYPE`."""
     if len(place.given) != 2:
         return []
     catalogue = _catalogue()
@@ -438,7 +438,7 @@ def message_text(place: Place) -> Iterable[str]:
 
 
 def request_text(place: Place) -> Iterable[str]:
-    """`rosservice call SERVICE`: a whole request to be changed."""
+    """Return a whole request to be changed, for `rosservice call SERVICE`."""
     from minirospy.introspect.services import service_type
 
     if len(place.given) != 1:
@@ -501,7 +501,7 @@ def on_one_line(text: str) -> str:
 
 
 def pins(place: Place) -> Iterable[str]:
-    """Pins of the virtual board that have something on them; those of buttons to press."""
+    """Return the pins of the virtual board that have something on them; to press, those of buttons."""
     from minirospy.gpio.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if place.verb in ("press", "release") else (*LEDS, *BUTTONS))
@@ -515,5 +515,5 @@ def shells(_: Place) -> Iterable[str]:
 
 
 def kinds(_: Place) -> Iterable[str]:
-    """`rosmsg-proto`: of what kind a type is."""
+    """Return the kinds of types, for `rosmsg-proto`."""
     return ("msg", "srv")

@@ -106,7 +106,7 @@ def action_class(type_: str) -> type[Action]:
 
 
 def read_answer(question: str) -> str:
-    """Return a line from the terminal; at the end of the input each answer is empty."""
+    """Prompt for a line and return it; at the end of the input return an empty one."""
     try:
         return input(question)
     except EOFError:
@@ -120,7 +120,7 @@ def _complain(error: Exception) -> None:
 
 
 def _found_type(action: str, timeout: float | None) -> str:
-    """Return the type of the action that is served at ``action``. Raises ROSException after ``timeout`` seconds."""
+    """Wait for the action's server; return the action's type. Raises ROSException after ``timeout`` seconds."""
     from minirospy.introspect.graph import Graph
 
     waiting = threading.Event()
@@ -152,7 +152,7 @@ class _Progress:
         self._is_active = False
 
     def run(self) -> int:
-        """Send the goal and wait for its end; the exit status."""
+        """Send the goal and wait for its end; return the exit status."""
         from actionlib_msgs.msg import GoalStatus
 
         from minirospy.idl.message import strify_message
@@ -211,7 +211,7 @@ class _Progress:
 
 
 def progress(goal: Message, feedback: Message) -> float | None:
-    """How much of a goal is reached, 0 to 1, where each has one number and the goal's is the greater; else None."""
+    """Return the share of a goal reached, 0 to 1, where each has one number and the goal's is the greater; else None."""
     wanted, reached = (
         [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]
         for message in (goal, feedback)

@@ -24,7 +24,7 @@ class Field(NamedTuple):
 
 
 def fields(message: Message, prefix: str = "") -> Iterator[Field]:
-    """Return the fields of a message and of those in it; an array, a time and a duration are one field each."""
+    """Yield the fields of a message and of those in it; an array, a time and a duration are one field each."""
     for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
         value = getattr(message, name)
         if is_message(value):
@@ -39,7 +39,7 @@ def ask_for(
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
 ) -> _M:
-    """``message`` with the answers to a question per field; an empty answer leaves a field as it is.
+    """Fill ``message`` with the answers to a question per field, and return it; an empty answer changes nothing.
 
     Of the message's own fields those in ``known`` are not asked for.
 
@@ -90,7 +90,7 @@ def _value(field: Field, answer: str) -> object:
 
 
 def _nested(path: str, value: object) -> object:
-    """``a.b`` and a value -> {a: {b: value}}."""
+    """Return a value as nested dictionaries: ``a.b`` gives {a: {b: value}}."""
     for name in reversed(path.split(".")):
         value = {name: value}
     return value

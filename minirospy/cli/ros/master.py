@@ -389,7 +389,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """Return how many clients may be connected: the limit of open files, less some for other use."""
+    """Raise the limit of open files; return how many clients it allows, less some for other use."""
     if sys.platform == "win32":
         return 400
     import resource

@@ -90,7 +90,7 @@ def _places() -> list[_Logs]:
 
 
 def _agreed(command: str) -> bool:
-    """Whether the person at the terminal says yes to ``command``; asked again on anything but y and n."""
+    """Prompt for a yes to ``command``, until y or n is typed; return whether it was yes."""
     question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\n{command}\n(y/n)?"
     while True:
         print(question, flush=True)
@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Of all files and folders at and below a path; of what goes meanwhile, none."""
+    """Yield the status of all files and folders at and below a path; skip those that disappear meanwhile."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()
@@ -140,7 +140,7 @@ def _size(path: Path) -> int:
 
 
 def disk_usage(folder: Path) -> int:
-    """Bytes of whole blocks; on Windows, whose files tell none, of blocks of the usual size."""
+    """Return the bytes of whole blocks; on Windows, which reports none, of blocks of the usual size."""
     return sum(
         status.st_blocks * 512
         if hasattr(status, "st_blocks")

@@ -94,7 +94,7 @@ def _parser(verb: str, description: str) -> Parser:
 def _missing(
     packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], *, everything: bool
 ) -> dict[str, list[str]]:
-    """Return the packages that need each key that is not here.
+    """Return the missing keys, each with the packages that need it.
 
     Raises NotFoundError, ManifestError, UsageError.
     """
@@ -142,7 +142,7 @@ def _is_installed(key: str) -> bool:
 
 
 def _says(keys: dict[str, list[str]]) -> Iterator[str]:
-    """Return a line for each key that is not installed: who asks for it, and what to do."""
+    """Yield a line for each key: the packages that need it, and how to install it."""
     for key, packages in keys.items():
         module = _module(key)
         how = (
@@ -228,7 +228,7 @@ class _IgnoringParser(Parser):
     """Takes any words, and ignores them."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return no arguments."""
+        """Ignore the words; return no arguments."""
         return {}
 
 

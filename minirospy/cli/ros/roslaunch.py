@@ -291,7 +291,7 @@ def _seconds(text: str) -> float:
 
 
 def _refuse_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Real roslaunch takes an argument that no file declares in silence: most often it is a typing error."""
+    """Refuse an argument that no file declares: real roslaunch ignores it, most often it is a typing error."""
     unknown = [name for name in args if name not in spec.args]
     if unknown:
         raise UsageError("; ".join(_unknown(name, spec) for name in unknown))

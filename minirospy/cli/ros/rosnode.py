@@ -82,7 +82,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error that lists the nodes, where a master answers."""
+    """Return the error about a missing node name; it lists the nodes where a master answers."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
@@ -268,7 +268,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return the nodes of ``names`` that there are; of each other one it is said that it is not."""
+    """Return the nodes of ``names`` that exist; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

@@ -65,7 +65,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return what to print where the program is missing, or the package. Raises NotFoundError where neither is known."""
+    """Return a hint for a missing program or package. Raises NotFoundError where neither is known."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -87,7 +87,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Return the program that the person at the terminal chooses of several of one name."""
+    """Prompt for one of several programs of the same name, and return it. Raises UsageError at the input's end."""
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):

@@ -180,7 +180,7 @@ def _warn_waiting(graph: Graph, service: str) -> None:
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
-    """Each request: one of the values typed, or one for each document on standard input.
+    """Yield the requests: one of the values typed, or one for each document on standard input.
 
     In a terminal the fields that have no value yet are asked for.
     """

@@ -194,7 +194,7 @@ def _rosunit(
 
 
 def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
-    """Write and print how it went; the exit status."""
+    """Write the results to ``output``, if given, and print them; return the exit status."""
     if output is not None:
         own.write(output)
         failed = [case.name for case in own.test_case_results if case.failures]

@@ -536,7 +536,7 @@ def _add_window(parser: Parser, default: int) -> None:
 
 
 def _integer(name: str) -> Callable[[str], int]:
-    """Return what reads an integer; ``name`` is what ROS calls it in an error."""
+    """Return a parser of integers; ``name`` is the value's name in ROS's error."""
 
     def read(text: str) -> int:
         import argparse
