@@ -8,7 +8,7 @@ everybody when something changes, and Done to a client for the requests it carri
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import msgpack  # type: ignore[import-untyped]
 
@@ -111,7 +111,14 @@ class Refused(NamedTuple):
 Message = Hello | Request | Welcome | Changed | Done | Refused | PersonMoved
 
 _KINDS: tuple[type[Message], ...] = (Hello, Request, Welcome, Changed, Done, Refused, PersonMoved)
-_OPERATIONS: tuple[type[Operation | MovePerson], ...] = (Setup, Write, Press, Release, Force, MovePerson)
+_OPERATIONS: tuple[Callable[..., Operation | MovePerson], ...] = (
+    Setup,
+    Write,
+    Press,
+    Release,
+    Force,
+    MovePerson,
+)
 _KIND_NUMBER = {kind: number for number, kind in enumerate(_KINDS)}
 _OPERATION_NUMBER = {kind: number for number, kind in enumerate(_OPERATIONS)}
 
@@ -160,7 +167,7 @@ def _message(item: Sequence[object]) -> Message:
     return _READERS[_natural(item[0])](*item[1:])
 
 
-def _request(number: object, item: Sequence[Any] | None) -> Request:
+def _request(number: object, item: Sequence[object] | None) -> Request:
     if item is None:
         return Request(_natural(number), None)
     operation = _OPERATIONS[_natural(item[0])](*item[1:])

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TypedDict
 
 from minirospy import private_files
 from minirospy.errors import MinirospyError
@@ -64,6 +64,13 @@ class Process:
     def is_running(self) -> bool:
         """Whether it has not exited."""
         return self.popen.poll() is None
+
+
+class _Group(TypedDict, total=False):
+    """The options of subprocess.Popen that give a process its own group."""
+
+    creationflags: int
+    start_new_session: bool
 
 
 class Guardian:
@@ -168,7 +175,7 @@ def end_processes(
     return killed
 
 
-def _own_group() -> dict[str, Any]:
+def _own_group() -> _Group:
     """Return the options of a process that a Ctrl-C in the terminal does not reach: roslaunch ends its nodes in order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}

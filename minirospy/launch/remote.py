@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol, cast
 
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, RpcError, RpcFault
@@ -82,7 +82,7 @@ class Api:
             return [-1, str(error), 0]
 
 
-def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -> Any:
+def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -> object:
     """Call a method of another roslaunch. Raises RpcError."""
     client = RpcClient(uri, timeout)
     try:
@@ -229,7 +229,8 @@ class RemoteMachines:
             raise LaunchError(machine.file, machine.line, text)
 
         try:
-            succeeded, failed = call(child.uri, "launch", launch_text(child.nodes))
+            answer = call(child.uri, "launch", launch_text(child.nodes))
+            succeeded, failed = cast("tuple[list[str], list[str]]", answer)
         except (RpcError, ValueError) as error:
             text = f"remote roslaunch child [{child.name}] cannot launch its nodes: {error}"
             raise LaunchError(machine.file, machine.line, text) from None
