@@ -144,11 +144,17 @@ class ServiceProxy(Generic[_Response_co]):
 class Service(Handle):
     """A service that a node offers; made by :meth:`Node.serve`."""
 
-    def __init__(self, node: Node, name: str, service_class: Any, handler: Callable[[Any], Any]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        name: str,
+        service_class: ServiceClass[Message, Message],
+        handler: Callable[[Any], Any],
+    ) -> None:
         self.name = name
         self._node = node
-        self._request_class: type[Message] = service_class._request_class
-        self._response_class: type[Message] = service_class._response_class
+        self._request_class = service_class._request_class
+        self._response_class = service_class._response_class
         self._handler = handler
         runtime = node._node
         is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(

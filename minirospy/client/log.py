@@ -13,7 +13,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
@@ -23,9 +23,21 @@ from minirospy.client.session import current_session
 from minirospy.clock import SimulatedClock
 
 if TYPE_CHECKING:
+    from typing import TypedDict
+
     from roscpp.srv import SetLoggerLevelRequest
+    from typing_extensions import Unpack
 
     from minirospy.client.session import Session
+
+    class _Keywords(TypedDict, total=False):
+        """What a log function passes on, as Python's logging has it."""
+
+        exc_info: object
+        extra: Mapping[str, object] | None
+        stack_info: bool
+        stacklevel: int
+
 
 __all__ = [
     "DEBUG",
@@ -99,7 +111,9 @@ _F = TypeVar("_F", bound=Callable[..., None])
 class LogFunction(Protocol):
     """``loginfo`` and its kin."""
 
-    def __call__(self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
+    def __call__(
+        self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]
+    ) -> None:
         """Log ``msg % args``; ``logger_name`` names a logger below "rosout"."""
 
 
@@ -112,7 +126,7 @@ class ThrottledLogFunction(Protocol):
         msg: object,
         *args: object,
         logger_name: str | None = None,
-        **kwargs: Any,
+        **kwargs: Unpack[_Keywords],
     ) -> None:
         """Log, but from this place in the code at most once in ``period`` seconds."""
 
@@ -435,7 +449,7 @@ def _write(
     args: tuple[object, ...],
     *,
     exc_info: Any = None,
-    extra: dict[str, object] | None = None,
+    extra: Mapping[str, object] | None = None,
     stack_info: bool = False,
     stacklevel: int = 1,
 ) -> None:
@@ -463,7 +477,7 @@ def _write(
 
 
 def _log_function(level: int, name: str) -> LogFunction:
-    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
+    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
         logger = _logger(logger_name)
         if logger.isEnabledFor(level):
             _write(logger, level, sys._getframe(1), msg, args, **kwargs)
@@ -511,7 +525,7 @@ _places = _Places()
 
 
 def _once_function(level: int, name: str) -> LogFunction:
-    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Any) -> None:
+    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
         logger = _logger(logger_name)
         if logger.isEnabledFor(level):
             frame = sys._getframe(1)
@@ -527,7 +541,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         msg: object,
         *args: object,
         logger_name: str | None = None,
-        **kwargs: Any,
+        **kwargs: Unpack[_Keywords],
     ) -> None:
         logger = _logger(logger_name)
         if not logger.isEnabledFor(level):

@@ -149,7 +149,7 @@ class KeptParameters:
     """
 
     def __init__(self) -> None:
-        self._notifier: Callable[[str, Any], object] | None = None
+        self._notifier: Callable[[str, object], object] | None = None
         current_session().parameter_listeners.append(self._told)
 
     def get(self, key: str) -> Any:
@@ -163,7 +163,7 @@ class KeptParameters:
         """Call ``notifier(key, value)`` when the master reports a change; a deleted one has the value {}."""
         self._notifier = notifier
 
-    def update(self, key: str, value: Any) -> None:
+    def update(self, key: str, value: object) -> None:
         """Record that the master has reported a change."""
         if self._notifier:
             self._notifier(key, value)

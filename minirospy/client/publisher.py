@@ -316,7 +316,7 @@ class Published(Shared):
                 self._events.start(listener.peer_unsubscribe, topic, len(self.publication.links))
 
 
-def _checked_size(queue_size: Any) -> int | None:
+def _checked_size(queue_size: int | None) -> int | None:
     """Return a Publisher's queue_size as rospy reads it: a negative one is no limit. Raises ValueError."""
     if queue_size is None:
         return None

@@ -43,14 +43,14 @@ if TYPE_CHECKING:
 __all__ = ["Service", "ServiceProxy", "wait_for_service"]
 
 _log = logging.getLogger("rosout")
-_S = TypeVar("_S", bound=Any)
+_S_co = TypeVar("_S_co", bound=Any, covariant=True)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
 _SILENT_SECONDS = 5.0
 _NO_CONTACT = "failed to contact, will keep trying"
 
 
-class Service(Generic[_S]):
+class Service(Generic[_S_co]):
     """Offers a service: ``handler(request)`` returns the response.
 
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
@@ -63,7 +63,7 @@ class Service(Generic[_S]):
     def __init__(
         self,
         name: str,
-        service_class: type[_S],
+        service_class: type[_S_co],
         handler: Callable[[Any], object],
         buff_size: int = 65536,
         error_handler: Callable[[Exception, type[Exception], Exception, Any], object] | None = None,
@@ -161,7 +161,7 @@ class Service(Generic[_S]):
         _log.error("Error processing request: %s\n%s", error, text)
 
 
-class ServiceProxy(Generic[_S]):
+class ServiceProxy(Generic[_S_co]):
     """Calls a service: ``proxy(request)``, or with the request's fields as arguments.
 
     ``persistent`` keeps one connection for all calls; it is made again when the server has ended it. A proxy
@@ -172,7 +172,7 @@ class ServiceProxy(Generic[_S]):
     def __init__(
         self,
         name: str,
-        service_class: type[_S],
+        service_class: type[_S_co],
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> None:

@@ -10,7 +10,7 @@ import logging
 import re
 import threading
 from collections.abc import Callable, Coroutine
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.client.identity import Identity
 from minirospy.client.lifecycle import Lifecycle
@@ -57,7 +57,7 @@ class Session:
         """Whether the time is available: from init_node on, or once a program without a node has set it."""
         self.published: dict[str, Published] = {}
         self.subscribed: dict[str, Subscribed] = {}
-        self.offered: dict[str, Service[Any]] = {}
+        self.offered: dict[str, Service[object]] = {}
         self.parameters = ParameterCache()
         self.parameter_listeners: list[Callable[[str, object], object]] = (
             previous.parameter_listeners if previous else []

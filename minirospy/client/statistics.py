@@ -32,13 +32,13 @@ class WindowLimits(NamedTuple):
     ``min_size`` and ``max_size`` bound it, in seconds.
     """
 
-    min_elements: int = 10
-    max_elements: int = 100
+    min_elements: float = 10
+    max_elements: float = 100
     min_size: float = 4.0
     max_size: float = 64.0
 
     @classmethod
-    def read(cls, get: Callable[[str, object], Any]) -> WindowLimits:
+    def read(cls, get: Callable[[str, object], float]) -> WindowLimits:
         """Return the limits that the parameters /statistics_window_... set; ``get(key, default)`` reads one."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
