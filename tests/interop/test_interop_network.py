@@ -302,7 +302,7 @@ def test_a_subscriber_says_which_side_told_a_wrong_address(network: Network) -> 
 def test_a_node_on_loopback_for_a_master_elsewhere_says_so_itself(network: Network) -> None:
     start_master(network)
     line = network.peer("beta", "robot", ROS_IP="127.0.0.1").wait_for("set ROS_IP")
-    assert "tells everybody that it is at '127.0.0.1', but the master is on another machine" in line
+    assert "is registered at '127.0.0.1', but the master is on another machine" in line
 
 
 def test_the_doctor_sees_the_way_back_from_the_master(network: Network) -> None:
