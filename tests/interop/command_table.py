@@ -545,10 +545,38 @@ rosparam load values.yaml
 OTHER_WORDS = {
     "roslaunch nope nope.launch",
     "roslaunch nope.launch",
+    "rosmsg package nope",
+    "rosmsg show ''",
+    "rosmsg show -b nope.bag std_msgs/Bool",
+    "rosmsg show std_msgs/Bol",
+    "rosmsg show std_msgs/msg/Bool",
+    "rosmsg show std_srvs/SetBool",
+    "rosmsg-proto msg nope",
+    "rosnode cleanup <<< n\\n",
+    "rosnode cleanup <<< y\\n",
     "rosnode ping",
+    "rosnode ping -c 1 unresolved",
+    "rosparam load /etc/os-release",
     "rosrun nope nope",
+    "rosservice call /fail",
+    "rosservice call /ns/empty 5",
+    "rosservice call /scene/set_logger_level rosout",
+    "rosservice call /set_led_state 'dta: 1'",
+    "rosservice call /set_led_state 1 2",
+    "rossrv show -b nope.bag std_srvs/Empty",
+    "rossrv show nope",
+    "rostopic delay",
+    "rostopic echo -b nope.bag /tiny",
+    "rostopic list -b nope.bag",
+    "rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3",
+    "rostopic pub -1 -v /out geometry_msgs/Point 1 2",
+    "rostopic pub -1 /out std_msgs/Bol 1",
+    "rostopic pub -1 /out std_msgs/Bool 'data: [1'",
+    "rostopic pub -f nope.yaml /out std_msgs/Bool",
+    "rostopic type /scan /poly",
 }
-"""Lines whose error has ROS's paths or Python's texts in it, or is about something that is not an error here."""
+"""Lines whose error does not begin with ROS's words: those have ROS's paths or Python's texts in them, are about something that
+is not an error here, or are not printed yet."""
 
 _STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
 _CHANGING = [
