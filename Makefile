@@ -10,7 +10,7 @@ STAMP := $(VENV)/.installed
 
 # What needs no process of its own, and the first messages and calls between nodes: under a minute on two cores.
 CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
-  tests/runtime/test_master.py tests/runtime/test_topics.py tests/runtime/test_services.py \
+  tests/runtime/master/test_master.py tests/runtime/node/test_topics.py tests/runtime/node/test_services.py \
   tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
   tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
 

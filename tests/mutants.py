@@ -54,8 +54,8 @@ ROOMS = {
         ["graph/*.py"],
         [
             "tests/graph",
-            "tests/runtime/test_master.py",
-            "tests/runtime/test_master_journal.py",
+            "tests/runtime/master/test_master.py",
+            "tests/runtime/master/test_master_journal.py",
             "tests/actionlib/test_statuses.py",
         ],
         ["two_hundred_nodes", "double_start"],
@@ -64,7 +64,7 @@ ROOMS = {
     "journal": Room(
         ["runtime/master/journal.py", "private_files.py"],
         [
-            "tests/runtime/test_journal.py",
+            "tests/runtime/master/test_journal.py",
             "tests/test_private_files.py",
         ],
         ["roscore"],

@@ -2,7 +2,7 @@
 
 Pure: what a call makes the master do goes through :meth:`MasterApi.act` and :attr:`MasterApi.note`. An answer that takes
 long comes in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; texts
-and corner cases are those of real rosmaster (tests/runtime/master_calls.py).
+and corner cases are those of real rosmaster (tests/runtime/master/master_calls.py).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-RUNTIME = Path(__file__).parents[1] / "runtime"
+RUNTIME = Path(__file__).parents[1] / "runtime" / "master"
 
 
 def load_test_master() -> Any:

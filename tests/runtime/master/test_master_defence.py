@@ -26,7 +26,7 @@ from minirospy.runtime.transport.loop import LoopThread
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import parse_response, serialize_response
 
-DOCS = Path(__file__).parents[2] / "docs" / "master.md"
+DOCS = Path(__file__).parents[3] / "docs" / "master.md"
 
 
 def post(body: bytes, headers: bytes = b"") -> bytes:

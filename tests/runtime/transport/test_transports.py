@@ -32,7 +32,7 @@ from minirospy.runtime.transport.tcp import Listener
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import InterfaceType, service_client_header
-from tests.runtime.test_topics import STRING, Box, eventually, graph, listen, publish, run
+from tests.runtime.node.test_topics import STRING, Box, eventually, graph, listen, publish, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="abstract Unix sockets are Linux'")
 

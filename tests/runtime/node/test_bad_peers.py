@@ -16,7 +16,7 @@ from xmlrpc.client import ServerProxy
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "bad_peers.py"
+SCRIPT = Path(__file__).parents[3] / "benchmarks" / "bad_peers.py"
 PEERS = 200
 
 
