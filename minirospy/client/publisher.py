@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from minirospy.client.session import Session
 from minirospy.client.topic import (
     AnyMsg,
-    Shared,
+    SharedTopic,
     Topic,
     register_with_master,
     unregister_from_master,
@@ -30,7 +30,7 @@ from minirospy.wire.tcpros import ANY, InterfaceType
 if TYPE_CHECKING:
     from minirospy.runtime.transport.links import OutLink
 
-__all__ = ["Published", "Publisher", "SubscribeListener"]
+__all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
@@ -58,7 +58,7 @@ class Publisher(Topic[_M_co]):
     or queue_size.
     """
 
-    impl: Published | None
+    impl: PublishedTopic | None
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class Publisher(Topic[_M_co]):
         with self._session.lock:
             state = self._session.published.get(self.resolved_name)
             if state is None:
-                state = self._session.published[self.resolved_name] = Published(
+                state = self._session.published[self.resolved_name] = PublishedTopic(
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
@@ -120,7 +120,7 @@ class Publisher(Topic[_M_co]):
         return self.impl.wait_for_subscribers(count, timeout)
 
 
-class Published(Shared):
+class PublishedTopic(SharedTopic):
     """One published topic of the process: what its Publishers share."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:

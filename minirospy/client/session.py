@@ -22,9 +22,9 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     # A program that has no node yet does not pay for asyncio.
-    from minirospy.client.publisher import Published
+    from minirospy.client.publisher import PublishedTopic
     from minirospy.client.services import Service
-    from minirospy.client.subscriber import Subscribed
+    from minirospy.client.subscriber import SubscribedTopic
     from minirospy.runtime.node.node import Node
     from minirospy.runtime.transport.loop import LoopThread
 
@@ -55,8 +55,8 @@ class Session:
         """Notified of each simulated time."""
         self.has_time: bool = bool(previous and previous.has_time)
         """Whether the time is available: from init_node on, or once a program without a node has set it."""
-        self.published: dict[str, Published] = {}
-        self.subscribed: dict[str, Subscribed] = {}
+        self.published: dict[str, PublishedTopic] = {}
+        self.subscribed: dict[str, SubscribedTopic] = {}
         self.offered: dict[str, Service[object]] = {}
         self.parameters = ParameterCache()
         self.parameter_listeners: list[Callable[[str, object], object]] = (

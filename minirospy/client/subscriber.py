@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from minirospy.client.session import Session, current_session
-from minirospy.client.topic import Shared, Topic, register_with_master, unregister_from_master
+from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.idl.protocols import Message
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from minirospy.client.statistics import StatisticsPublisher
     from minirospy.runtime.node.topics import InLink, Subscription
 
-__all__ = ["Subscribed", "Subscriber", "wait_for_message"]
+__all__ = ["SubscribedTopic", "Subscriber", "wait_for_message"]
 
 _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
@@ -44,7 +44,7 @@ class Subscriber(Topic[_M_co]):
     ROSException on a bad size.
     """
 
-    impl: Subscribed | None
+    impl: SubscribedTopic | None
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Subscriber(Topic[_M_co]):
         with self._session.lock:
             state = self._session.subscribed.get(self.resolved_name)
             if state is None:
-                state = self._session.subscribed[self.resolved_name] = Subscribed(
+                state = self._session.subscribed[self.resolved_name] = SubscribedTopic(
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, tcp_nodelay)
@@ -135,7 +135,7 @@ class _Receiver(NamedTuple):
     callbacks: tuple[_Callback, ...]
 
 
-class Subscribed(Shared):
+class SubscribedTopic(SharedTopic):
     """One subscribed topic of the process: what its Subscribers share."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:

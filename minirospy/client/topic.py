@@ -16,7 +16,7 @@ from minirospy.idl import protocols
 from minirospy.idl.message import Message
 from minirospy.wire.tcpros import ANY
 
-__all__ = ["AnyMsg", "Shared", "Topic", "register_with_master", "unregister_from_master"]
+__all__ = ["AnyMsg", "SharedTopic", "Topic", "register_with_master", "unregister_from_master"]
 
 _log = logging.getLogger("rosout")
 _M_co = TypeVar("_M_co", bound=protocols.Message, covariant=True)
@@ -56,7 +56,7 @@ class Topic(Generic[_M_co]):
     ``impl`` is what all handles of the topic in this process share, None once unregistered.
     """
 
-    impl: Shared | None
+    impl: SharedTopic | None
 
     def __init__(self, name: str, data_class: type[_M_co], reg_type: str) -> None:
         if not name or not isinstance(name, str):
@@ -92,7 +92,7 @@ class Topic(Generic[_M_co]):
             self.resolved_name = self.type = self.md5sum = self.data_class = None  # type: ignore[assignment]
 
 
-class Shared:
+class SharedTopic:
     """What the handles of one topic in this process share: the ``impl`` that user code sees of rospy's."""
 
     def __init__(self, session: Session, topic: str, data_class: type[protocols.Message]) -> None:

@@ -326,7 +326,7 @@ def test_several_threads_may_be_the_first_of_a_topic(start: Start, begin: str) -
 
 
 LATCHED_MEANWHILE = """
-from minirospy.client.subscriber import Subscribed
+from minirospy.client.subscriber import SubscribedTopic
 
 rospy.init_node("n")
 publisher = rospy.Publisher("/t", Int32, latch=True, queue_size=1)
@@ -334,16 +334,16 @@ publisher.publish(1)
 early, late = [], []
 rospy.Subscriber("/t", Int32, early.append)
 eventually(lambda: early)
-join = Subscribed.join
+join = SubscribedTopic.join
 
 def join_a_moment_later(*args):
     publisher.publish(2)
     eventually(lambda: len(early) == 2)
     join(*args)
 
-Subscribed.join = join_a_moment_later
+SubscribedTopic.join = join_a_moment_later
 rospy.Subscriber("/t", Int32, late.append)
-Subscribed.join = join
+SubscribedTopic.join = join
 print([message.data for message in late])
 
 def on_message(message):
@@ -401,18 +401,18 @@ def test_subscriber_joining_a_connecting_latched_publisher_gets_message(start: S
     """The publisher connects, and its message arrives, between the two halves of the constructor."""
     output, _ = finished(
         start("""
-from minirospy.client.subscriber import Subscribed
+from minirospy.client.subscriber import SubscribedTopic
 rospy.init_node("n")
 first, second = threading.Event(), threading.Event()
 rospy.Subscriber("/t", String, lambda _: first.set())
-join = Subscribed.join
+join = SubscribedTopic.join
 def join_late(*args):
     global publisher
     publisher = rospy.Publisher("/t", String, latch=True, queue_size=1)
     publisher.publish("latched")
     assert first.wait(30)
     join(*args)
-Subscribed.join = join_late
+SubscribedTopic.join = join_late
 rospy.Subscriber("/t", String, lambda _: second.set())
 print(second.wait(5))
 """)
