@@ -21,7 +21,7 @@ from minirospy.idl.message import args_kwds_to_message
 from minirospy.idl.protocols import Message
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
-from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import CHUNK, Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -49,7 +49,7 @@ class Subscription(Handle, Generic[_M_co]):
         """How many messages gave way to newer ones."""
         self._node = node
         self._message_class = message_class
-        self._misfits = Complaints(node.log)
+        self._misfits = RateLimitedLogger(node.log)
         self._takes_memoryview = getattr(message_class, "_takes_memoryview", False)
         self._queue: deque[tuple[bytes | memoryview, Header]] = deque(maxlen=queue_size)
         self._arrived = asyncio.Event()

@@ -15,7 +15,7 @@ from minirospy.client.topic import SharedTopic, Topic, register_with_master, unr
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
 from minirospy.idl.protocols import Message
-from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -146,7 +146,7 @@ class SubscribedTopic(SharedTopic):
         self._added: list[_Callback] = []
         self._receivers: tuple[_Receiver, ...] = ()
         self._statistics: StatisticsPublisher | None = None
-        self._misfits = Complaints(_log)
+        self._misfits = RateLimitedLogger(_log)
         self._registered = False
 
     @property

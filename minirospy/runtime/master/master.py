@@ -27,7 +27,7 @@ from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
-from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.steps import Steps, finish
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.journal import unpack
@@ -106,7 +106,7 @@ class Master(MasterApi):
             known_as=_names_of(host, bind_host) if same_host else (),
         )
         self._notifier = Notifier(self, self._server.turns, timeout, same_host=same_host)
-        self._replaced = Complaints(_log, 10)
+        self._replaced = RateLimitedLogger(_log, 10)
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None

@@ -19,9 +19,9 @@ from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadL
 from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
-from minirospy.runtime.transport.complaints import Complaints
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.links import OutLink, ReaderSet, read_frames, watch_frames
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.workers import Workers
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.wire.header import Header, serialize_header
@@ -237,7 +237,7 @@ class Subscription:
         self._settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         # /rosout has as many publishers as there are nodes.
-        self._complaints = Complaints(_log, _REFUSALS_LOGGED)
+        self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
         self.on_connected: list[Callable[[], object]] = []
         """Called on the loop when a publisher is connected."""
@@ -273,7 +273,7 @@ class Subscription:
     def close(self) -> None:
         """End all links (on the loop)."""
         self._closed = True
-        self._complaints.close()
+        self._limited_log.close()
         if self._settling:
             self._settling.cancel()
         for task in self._connecting.values():
@@ -325,7 +325,7 @@ class Subscription:
                 # The next list, perhaps the last one, is older than this refusal: the publisher may accept by now.
                 self._retry(uri, error)
         except _NoPublisher as error:
-            self._complaints.warning("no connection for %s: %s", self.topic, error)
+            self._limited_log.warning("no connection for %s: %s", self.topic, error)
         except (RpcError, WireError, OSError) as error:
             self._retry(uri, error)
         else:
@@ -347,7 +347,7 @@ class Subscription:
                 except ThreadLimitError as error:
                     del self._links[uri]
                     link.sock.close()
-                    self._complaints.error("messages of %s are not received: %s", self.topic, error)
+                    self._limited_log.error("messages of %s are not received: %s", self.topic, error)
                     self._retry(uri, error)
                     return
             for notify in self.on_connected:
@@ -441,7 +441,7 @@ class Subscription:
         if isinstance(error, ThreadLimitError) or is_file_limit(cause):
             # A limit of this process, and no fault of the publisher.
             if is_file_limit(cause):
-                self._complaints.error("no connection for %s: %s", self.topic, explain(cause))
+                self._limited_log.error("no connection for %s: %s", self.topic, explain(cause))
             self._start_connecting(action)
             return
 

@@ -26,9 +26,9 @@ from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.access import Access
-from minirospy.runtime.transport.complaints import Complaints
 from minirospy.runtime.transport.deadlines import Deadlines
 from minirospy.runtime.transport.limits import explain
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import (
     MAX_BODY,
@@ -149,9 +149,9 @@ class RpcServer:
         self._listening: list[socket.socket] = []
         self.deadlines: Deadlines[_Connection] = Deadlines(_Connection.end)
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
-        self._complaints = Complaints(_log)
-        self._strangers = Complaints(_log, 10)
-        self._unaccepted = Complaints(_log)
+        self._limited_log = RateLimitedLogger(_log)
+        self._strangers = RateLimitedLogger(_log, 10)
+        self._unaccepted = RateLimitedLogger(_log)
 
     @property
     def clients(self) -> int:
@@ -200,7 +200,7 @@ class RpcServer:
             connection.end()
         self.turns.close()
         self.deadlines.close()
-        self._complaints.close()
+        self._limited_log.close()
         self._strangers.close()
         self._unaccepted.close()
 
@@ -254,7 +254,7 @@ class RpcServer:
             name = sock.getpeername()[0] if sock.family in sockets.FAMILIES else "this machine"
         except OSError:
             name = "a client"
-        self._complaints.warning("a request from %s was refused: %s", name, why)
+        self._limited_log.warning("a request from %s was refused: %s", name, why)
 
     def limit_held(self, connection: _Connection) -> bool:
         """Refuse the largest requests where all together hold too much; return whether ``connection`` remains."""

@@ -18,8 +18,8 @@ from typing import Any
 
 from minirospy.errors import WireError
 from minirospy.runtime.transport import sockets
-from minirospy.runtime.transport.complaints import Complaints
 from minirospy.runtime.transport.limits import explain, is_file_limit
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [
@@ -117,7 +117,7 @@ class Listener:
         self._sock: socket.socket | None = None
         # In the order of their start, with the address of the peer.
         self._handshakes: dict[asyncio.Task[None], str] = {}
-        self._complaints = Complaints(_log, _REFUSALS_LOGGED)
+        self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
@@ -146,11 +146,11 @@ class Listener:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        self._complaints.close()
+        self._limited_log.close()
 
     def log_refusal(self, line: str) -> None:
         """Log why a connection was refused; a flood of such lines is counted."""
-        self._complaints.warning("%s", line)
+        self._limited_log.warning("%s", line)
 
     def _watch(self) -> None:
         if self._sock is not None:

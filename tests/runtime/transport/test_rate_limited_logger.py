@@ -1,44 +1,46 @@
-"""runtime/transport/complaints: the first of a flood of lines is told, and then how many there were."""
+"""runtime/transport/rate_limited_logger: the first of a flood of lines is logged, then how many there were."""
 
 from __future__ import annotations
 
+import logging
+
 import pytest
 
-from minirospy.runtime.transport import complaints
-from minirospy.runtime.transport.complaints import Complaints
+from minirospy.runtime.transport import rate_limited_logger
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 
 def test_a_flood_is_logged_as_its_first_line_and_a_count(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
-    monkeypatch.setattr(complaints.time, "monotonic", lambda: now[0])
-    log = complaints.logging.getLogger("test-complaints")
-    told = Complaints(log)
+    monkeypatch.setattr(rate_limited_logger.time, "monotonic", lambda: now[0])
+    logger = logging.getLogger("test-rate-limit")
+    limited = RateLimitedLogger(logger)
     for number in range(1000):
-        told.warning("%s is bad", number)
+        limited.warning("%s is bad", number)
         now[0] += 0.001
     now[0] += 10.0
-    told.error("%s is worse", "this")
+    limited.error("%s is worse", "this")
     now[0] += 10.0
-    told.error("%s too", "that")
+    limited.error("%s too", "that")
     assert [record.getMessage() for record in caplog.records] == [
         "0 is bad",
         "this is worse (and 999 more like it before)",
         "that too",
     ]
     assert [record.levelname for record in caplog.records] == ["WARNING", "ERROR", "ERROR"]
-    assert all(record.filename == "test_complaints.py" for record in caplog.records)
+    assert all(record.filename == "test_rate_limited_logger.py" for record in caplog.records)
 
 
 def test_the_requested_number_of_lines_and_a_count_of_the_others(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    told = Complaints(complaints.logging.getLogger("test-complaints"), 3)
+    limited = RateLimitedLogger(logging.getLogger("test-rate-limit"), 3)
     for number in range(8):
-        told.warning("%s", f"100 % {number}")
-    told.close()
-    told.close()
+        limited.warning("%s", f"100 % {number}")
+    limited.close()
+    limited.close()
     assert [record.getMessage() for record in caplog.records] == [
         "100 % 0",
         "100 % 1",
@@ -48,6 +50,6 @@ def test_the_requested_number_of_lines_and_a_count_of_the_others(
 
 
 def test_text_of_a_peer_does_not_start_another_line(caplog: pytest.LogCaptureFixture) -> None:
-    log = Complaints(complaints.logging.getLogger("test-complaints"), 3)
+    log = RateLimitedLogger(logging.getLogger("test-rate-limit"), 3)
     log.warning("%s: %s, %d", "/a\nWARN forged\x1b[2J", OSError("x\ny"), 1)
     assert caplog.records[0].getMessage() == "/a\\nWARN forged\\x1b[2J: x\\ny, 1"

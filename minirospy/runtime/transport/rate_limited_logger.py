@@ -1,0 +1,53 @@
+"""A logger for what may fail a thousand times a second."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+from minirospy.escape import escaped
+
+__all__ = ["RateLimitedLogger"]
+
+_SECONDS = 10.0
+
+
+class RateLimitedLogger:
+    """Logs ``lines`` warnings and errors every ten seconds, and counts the others."""
+
+    def __init__(self, log: logging.Logger, lines: int = 1) -> None:
+        self._log = log
+        self._limit = lines
+        self._logged = 0
+        self._omitted = 0
+        self._end = 0.0
+        """When the current ten seconds are over."""
+
+    def close(self) -> None:
+        """Log how many were omitted last. Idempotent."""
+        if self._omitted:
+            self._log.warning("%d more like the last ones", self._omitted)
+            self._omitted = 0
+
+    def error(self, text: str, *args: object) -> None:
+        """Log an error, or count it."""
+        self._write(logging.ERROR, text, args)
+
+    def warning(self, text: str, *args: object) -> None:
+        """Log a warning, or count it."""
+        self._write(logging.WARNING, text, args)
+
+    def _write(self, level: int, text: str, args: tuple[object, ...]) -> None:
+        now = time.monotonic()
+        if now >= self._end:
+            if self._omitted:
+                text, args = text + " (and %d more like it before)", (*args, self._omitted)
+            self._end, self._logged, self._omitted = now + _SECONDS, 0, 0
+        elif self._logged == self._limit:
+            self._omitted += 1
+            return
+
+        self._logged += 1
+        # Names and errors of peers: what is not text is ours.
+        shown = [escaped(str(arg)) if isinstance(arg, str | Exception) else arg for arg in args]
+        self._log.log(level, text, *shown, stacklevel=3)
