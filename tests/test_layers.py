@@ -17,7 +17,7 @@ LAYERS = [
     {"launch"},
     {"introspect", "actionlib"},
     {"workspace"},
-    {"client", "aio"},
+    {"client", "aio", "rosout"},
     {"runtime"},
     {"graph", "wire", "idl", "gpio"},
     {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},

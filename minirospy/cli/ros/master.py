@@ -25,9 +25,9 @@ from minirospy.cli.parser import Misuse, Parser, attach_completer
 from minirospy.cli.verbs import Command
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
+from minirospy.rosout import RosoutNode
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.master.master import Master
-from minirospy.runtime.master.rosout import RosoutNode
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.rpc.server import is_address_in_use

@@ -40,7 +40,7 @@ _LOGGER_LEVELS = {
 
 
 class RosoutNode:
-    """Runs on the loop of whoever starts it; a message is passed on as it came, bytes for bytes."""
+    """Runs on the loop that starts it; a message is republished as it came, bytes for bytes."""
 
     def __init__(
         self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
