@@ -27,6 +27,7 @@ DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITH_CYCLES = {"idl"}
 """Rooms whose modules still import each other in cycles."""
 PURE = {"graph", "wire", "idl"}
+BYTES_ONLY = {"runtime", "wire"}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
 FILES = sorted(
@@ -95,6 +96,17 @@ def test_imports_go_downwards(path: Path) -> None:
 )
 def test_pure_rooms_touch_no_outside(path: Path) -> None:
     assert not {module.split(".")[0] for module in imports(path)} & IMPURE_MODULES
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if path.relative_to(PACKAGE).parts[0] in BYTES_ONLY],
+    ids=lambda path: path.name,
+)
+def test_runtime_and_wire_know_no_messages(path: Path) -> None:
+    generated = {each.parent.parent.name for each in (PACKAGE / "overlay").glob("*/msg/__init__.py")}
+    assert "rosgraph_msgs" in generated
+    assert not {module.split(".")[0] for module in imports(path)} & generated
 
 
 @pytest.mark.parametrize("room", sorted(DEPTH.keys() - WITH_CYCLES))
