@@ -21,6 +21,12 @@
     |   |   +-- ManifestError           a package.xml that does not read
     |   |   +-- BuildError              a workspace or package that cannot be built
     |   |   +-- LaunchError             a launch file that does not load
+    |   +-- BagError                    a bag that cannot be read or written
+    |   |   +-- BagFormatError          bytes that are not what the bag format prescribes
+    |   |   +-- BagVersionError         a version of the format that cannot be read
+    |   |   +-- BagUnindexedError       a bag without its index: it was not closed, or its end is missing
+    |   |   +-- BagEncryptedError       the bag is encrypted
+    |   |   +-- BagCompressionError     a compression that is unknown, or whose library is missing
     |   +-- BoardError                  the virtual board cannot be reached
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit its target
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
@@ -44,6 +50,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 __all__ = [
+    "BagCompressionError",
+    "BagEncryptedError",
+    "BagError",
+    "BagFormatError",
+    "BagUnindexedError",
+    "BagVersionError",
     "BoardError",
     "BuildError",
     "CallFailed",
@@ -244,6 +256,72 @@ class BuildError(SourceError):
 
 class LaunchError(SourceError):
     """A launch file does not load."""
+
+
+class BagError(MinirospyError):
+    """A bag cannot be read or written; ``str()`` does not name the file, which the caller knows."""
+
+
+class BagFormatError(BagError):
+    """The bytes at ``position`` are not what the bag format prescribes; None: of the whole file."""
+
+    def __init__(self, why: str, position: int | None = None) -> None:
+        super().__init__(why, position)
+        self.why = why
+        self.position = position
+
+    def __str__(self) -> str:
+        return self.why if self.position is None else f"{self.why} (at byte {self.position})"
+
+
+class BagVersionError(BagError):
+    """The bag has a ``version`` (101 is 1.1) that cannot be read, or not be used for this purpose."""
+
+    def __init__(self, version: int, why: str) -> None:
+        super().__init__(version, why)
+        self.version = version
+        self.why = why
+
+    def __str__(self) -> str:
+        return self.why
+
+
+class BagUnindexedError(BagError):
+    """The bag was not closed, or its index is damaged; ``why`` is the fault that was found, if one was."""
+
+    def __init__(self, why: str = "") -> None:
+        super().__init__(why)
+        self.why = why
+
+    def __str__(self) -> str:
+        return "Unindexed bag"
+
+
+class BagEncryptedError(BagError):
+    """The bag is encrypted by ``encryptor``, a plugin of rosbag that is not supported."""
+
+    def __init__(self, encryptor: str) -> None:
+        super().__init__(encryptor)
+        self.encryptor = encryptor
+
+    def __str__(self) -> str:
+        return (
+            f"the bag is encrypted by [{self.encryptor}], which is not supported: "
+            "decrypt it by `rosbag decrypt` of ROS where its key is installed"
+        )
+
+
+class BagCompressionError(BagError):
+    """Chunks with this ``compression`` cannot be read or written; ``why`` states the reason."""
+
+    def __init__(self, compression: str, why: str = "") -> None:
+        super().__init__(compression, why)
+        self.compression = compression
+        self.why = why
+
+    def __str__(self) -> str:
+        text = f"unsupported compression type: {self.compression}"
+        return f"{text} ({self.why})" if self.why else text
 
 
 class BoardError(MinirospyError):

@@ -19,7 +19,7 @@ LAYERS = [
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
-    {"graph", "wire", "idl", "gpio"},
+    {"graph", "wire", "idl", "gpio", "bag"},
     {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},
     {"errors", "escape"},
 ]
