@@ -21,6 +21,7 @@
     |   |   +-- ManifestError           a package.xml that does not read
     |   |   +-- BuildError              a workspace or package that cannot be built
     |   |   +-- LaunchError             a launch file that does not load
+    |   |   +-- UrdfError               a robot description that does not read
     |   +-- BagError                    a bag that cannot be read or written
     |   |   +-- BagFormatError          bytes that are not what the bag format prescribes
     |   |   +-- BagVersionError         a version of the format that cannot be read
@@ -87,6 +88,7 @@ __all__ = [
     "TransportException",
     "TransportInitError",
     "TransportTerminated",
+    "UrdfError",
     "UsageError",
     "ValueTextError",
     "WireError",
@@ -256,6 +258,14 @@ class BuildError(SourceError):
 
 class LaunchError(SourceError):
     """A launch file does not load."""
+
+
+class UrdfError(SourceError):
+    """A robot description does not read. ``context``: in what, as ROS's reader has it, from the inside to the outside."""
+
+    def __init__(self, file: str, line: int, text: str, context: tuple[str, ...] = ()) -> None:
+        super().__init__(file, line, ": ".join((text, *context[:1])))
+        self.trail = (text, *context)
 
 
 class BagError(MinirospyError):

@@ -19,15 +19,15 @@ LAYERS = [
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
-    {"graph", "wire", "idl", "gpio", "bag"},
+    {"graph", "wire", "idl", "gpio", "bag", "urdf"},
     {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITH_CYCLES = {"idl"}
 """Rooms whose modules still import each other in cycles."""
-PURE = {"graph", "wire", "idl"}
 BYTES_ONLY = {"runtime", "wire"}
+PURE = {"graph", "wire", "idl", "urdf"}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
 FILES = sorted(

@@ -1,0 +1,45 @@
+"""Attributes -> numbers and vectors, refused in the words of ROS's reader."""
+
+from __future__ import annotations
+
+import math
+import re
+
+__all__ = ["NotANumberError", "as_float", "parse_numbers", "parse_vector"]
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+class NotANumberError(ValueError):
+    """A text that is not the number or the vector that it has to be; the text says why."""
+
+
+def as_float(text: str) -> float:
+    """Return a number. Raises NotANumberError, also for hexadecimal, infinite and not-a-number values, as ROS refuses them."""
+    stripped = text.strip()
+    value = float(stripped) if _NUMBER.fullmatch(stripped) else math.nan
+    if not math.isfinite(value):
+        raise NotANumberError(text)
+    return value
+
+
+def parse_numbers(text: str, what: str = "vector") -> tuple[float, ...]:
+    """Return the numbers of a text. Raises NotANumberError."""
+    numbers = []
+    for part in text.split():
+        try:
+            numbers.append(as_float(part))
+        except NotANumberError:
+            why = f"Unable to parse component [{part}] to a double (while parsing a {what} value)"
+            raise NotANumberError(why) from None
+    return tuple(numbers)
+
+
+def parse_vector(text: str) -> tuple[float, float, float]:
+    """Return the three numbers of a text. Raises NotANumberError."""
+    numbers = parse_numbers(text)
+    if len(numbers) != 3:
+        raise NotANumberError(
+            f"Parser found {len(numbers)} elements but 3 expected while parsing vector [{text}]"
+        )
+    return numbers[0], numbers[1], numbers[2]
