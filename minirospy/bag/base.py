@@ -1,0 +1,66 @@
+"""What can be read from a bag, whatever its version."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from typing import BinaryIO, NamedTuple
+
+from minirospy.bag.chunks import StoredChunk, size_of
+from minirospy.bag.index import ConnectionIndex
+from minirospy.bag.records import ChunkInfo, Connection
+
+__all__ = ["BagReader", "Position", "StoredMessage"]
+
+Position = int | tuple[int, int]
+"""Where a message's record is: its chunk's position and its offset in there; in version 1.2 its position in the file."""
+
+
+class StoredMessage(NamedTuple):
+    """A message: its connection, the time of its reception in nanoseconds, its bytes, and its place."""
+
+    connection: Connection
+    time: int
+    body: bytes
+    position: Position
+
+
+class BagReader(ABC):
+    """What can be read from a bag, of each version."""
+
+    version: int
+    """200 for 2.0."""
+    stream: BinaryIO
+    connections: dict[int, Connection]
+    chunks: Sequence[ChunkInfo]
+    """The chunks in the order of the file; none in bags of version 1.2."""
+
+    @abstractmethod
+    def messages(
+        self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
+    ) -> Iterator[StoredMessage]:
+        """Yield the messages of these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
+
+        They come in the order of time; those of one time in the order of the connections. Raise BagFormatError where
+        the bag is damaged, when the messages before the damage have been yielded.
+        """
+
+    @abstractmethod
+    def message_at(self, position: Position) -> StoredMessage:
+        """Return the message at a position, as an entry or another message has it. Raise BagFormatError."""
+
+    @abstractmethod
+    def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
+        """Return the indexes of these connections, and read those that have not been read. Raise BagFormatError."""
+
+    def chunk_headers(self) -> dict[int, StoredChunk]:
+        """Return the headers of the chunks by their positions. Raise BagFormatError."""
+        return {}
+
+    def size(self) -> int:
+        """Return the stream's size in bytes."""
+        return size_of(self.stream)
+
+    def close(self) -> None:
+        """End what helps reading; the stream stays open."""
+        return

@@ -1,0 +1,193 @@
+"""The chunks of a bag's stream: their headers, their decompressed data, and the messages in it.
+
+Messages are found by scanning a chunk's data, not by its index records: that costs no more, and a damaged index cannot
+lead to a wrong message. The next chunks are decompressed ahead in threads, as bz2 and lz4 release the GIL.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections import OrderedDict
+from collections.abc import Container, Iterable, Mapping
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+
+from minirospy.bag import compression, records
+from minirospy.bag.records import Chunk, Connection
+from minirospy.errors import BagFormatError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+__all__ = ["ChunkStream", "Found", "StoredChunk", "scan", "scan_connections", "size_of"]
+
+
+class StoredChunk(NamedTuple):
+    """A chunk's header, and where its data is in the file."""
+
+    chunk: Chunk
+    data_position: int
+
+    @property
+    def end(self) -> int:
+        """The position after the chunk, where its index records are."""
+        return self.data_position + self.chunk.compressed_size
+
+
+Found = tuple[int, int, int, int, int]
+"""A message in a chunk's data: time, rank of its connection, offset of its record, start and end of its body.
+
+As plain tuples they sort as rosbag orders messages: by time, those of one time by connection, then by place.
+"""
+
+
+class ChunkStream:
+    """The chunks of a seekable stream, which may grow while it is read."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self.stream = stream
+        self._headers: dict[int, StoredChunk] = {}
+        self._ahead: OrderedDict[int, Future[bytes]] = OrderedDict()
+        self._executor: Executor | None = None
+
+    def header(self, position: int) -> StoredChunk:
+        """Return the header of the chunk at a position. Raise BagFormatError."""
+        if position not in self._headers:
+            limit = size_of(self.stream)
+            if position > limit:
+                raise BagFormatError("the position of a chunk is behind the file's end", position)
+            self.stream.seek(position)
+            record = records.read_record(self.stream, limit)
+            self._headers[position] = StoredChunk(records.parse_chunk_header(record), record.data_position)
+        return self._headers[position]
+
+    def data(self, position: int) -> bytes:
+        """Return the decompressed data of the chunk at a position. Raise BagFormatError, BagCompressionError."""
+        if future := self._ahead.pop(position, None):
+            return future.result()
+        chunk = self.header(position).chunk
+        try:
+            return compression.decompress(chunk.compression, self._read(position), chunk.size)
+        except BagFormatError as error:
+            raise BagFormatError(error.why, position) from error
+
+    def prepare(self, positions: Iterable[int]) -> None:
+        """Start to decompress the chunks at these positions; forget others that were started."""
+        wanted = [
+            position
+            for position in positions
+            if self.header(position).chunk.compression in (compression.BZ2, compression.LZ4)
+        ]
+        for position in self._ahead.keys() - set(wanted):
+            self._ahead.pop(position).cancel()
+
+        for position in wanted:
+            if position not in self._ahead:
+                chunk, data = self.header(position).chunk, self._read(position)
+                self._ahead[position] = self._start().submit(
+                    compression.decompress, chunk.compression, data, chunk.size
+                )
+
+    def close(self) -> None:
+        """End the threads; the stream stays open."""
+        self._ahead.clear()
+        if self._executor is not None:
+            self._executor.shutdown(wait=True, cancel_futures=True)
+            self._executor = None
+
+    def _read(self, position: int) -> bytes:
+        header = self.header(position)
+        self.stream.seek(header.data_position)
+        data = self.stream.read(header.chunk.compressed_size)
+        if len(data) != header.chunk.compressed_size:
+            raise BagFormatError(
+                f"expecting {header.chunk.compressed_size} bytes, read {len(data)}", header.data_position
+            )
+        return data
+
+    def _start(self) -> Executor:
+        if self._executor is None:
+            from concurrent.futures import ThreadPoolExecutor
+
+            self._executor = ThreadPoolExecutor(THREADS, "decompress")
+        return self._executor
+
+
+THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
+"""Threads that decompress ahead, and chunks that they are ahead: the reader's own thread needs a core, too."""
+
+
+def size_of(stream: BinaryIO) -> int:
+    """Return the size of a stream in bytes; its position changes."""
+    return stream.seek(0, os.SEEK_END)
+
+
+class _Layout(NamedTuple):
+    """A message's header as one of the writers orders its fields: 46 bytes with two constant parts."""
+
+    form: struct.Struct
+    first: bytes
+    second: bytes
+
+
+_OP = b"\x04\0\0\0op=\x02"
+_CONN = b"\x09\0\0\0conn="
+_TIME = b"\x0d\0\0\0time="
+_PYTHON = _Layout(struct.Struct("<21sI9sIII"), b"\x26\0\0\0" + _OP + _CONN, _TIME)
+_CPP = _Layout(struct.Struct("<13sI17sIII"), b"\x26\0\0\0" + _CONN, _OP + _TIME)
+_HEAD = 46
+
+
+def scan(data: bytes, ranks: Mapping[int, int], known: Container[int]) -> list[Found]:
+    """Return the messages of a chunk's data whose connections have ``ranks``, in the order of the data.
+
+    ``known`` are all connections of the bag: a message of another one is damage. Raise BagFormatError.
+    """
+    found: list[Found] = []
+    add = found.append
+    end, last_head = len(data), len(data) - _HEAD
+    (form, first, second), other = _PYTHON, _CPP
+    unpack = form.unpack_from
+
+    at = 0
+    while at < end:
+        if at <= last_head:
+            one, number, two, seconds, nanoseconds, size = unpack(data, at)
+            if one == first and two == second:
+                body = at + 46
+                if (after := body + size) > end:
+                    raise BagFormatError(f"a message of {size} bytes does not fit into its chunk", at)
+                rank = ranks.get(number)
+                if rank is not None:
+                    add((seconds * 1_000_000_000 + nanoseconds, rank, at, body, after))
+                elif number not in known:
+                    raise BagFormatError(f"a message's connection {number} is not in the bag", at)
+                at = after
+                continue
+
+            one, number, two, *_ = other.form.unpack_from(data, at)
+            if one == other.first and two == other.second:
+                (form, first, second), other = other, _Layout(form, first, second)
+                unpack = form.unpack_from
+                continue
+
+        record = records.parse_record(data, at)
+        if record.op == records.OP_MESSAGE_DATA:
+            number = record.uint32("conn")
+            rank = ranks.get(number)
+            if rank is not None:
+                add((record.time("time"), rank, at, record.data_position, record.end))
+            elif number not in known:
+                raise BagFormatError(f"a message's connection {number} is not in the bag", at)
+        at = record.end
+    return found
+
+
+def scan_connections(data: bytes) -> dict[int, Connection]:
+    """Return the connections whose records are in a chunk's data. Raise BagFormatError."""
+    found: dict[int, Connection] = {}
+    for record in records.parse_records(data):
+        if record.op == records.OP_CONNECTION:
+            connection = records.parse_connection(record, data[record.data_position : record.end])
+            found.setdefault(connection.id, connection)
+    return found
