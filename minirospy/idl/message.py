@@ -42,6 +42,7 @@ _INTEGERS = {
     "byte": (-128, 128),
     "char": (0, 256),
 }
+_SEQUENCES = (list, tuple)
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.]*", re.ASCII)
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 # From this length on YAML folds a text with spaces in it.
@@ -123,7 +124,7 @@ class Message:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):
             return False
-        return all(getattr(self, name) == getattr(other, name) for name in self.__slots__)
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in self.__slots__)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -131,6 +132,13 @@ class Message:
         return strify_message(self)
 
     __repr__ = __str__
+
+
+def _equal(value: object, other: object) -> bool:
+    """Return whether two values of a field are equal, as genpy compares: a list equals a tuple of the same items."""
+    if type(value) is not type(other) and type(value) in _SEQUENCES and type(other) in _SEQUENCES:
+        return tuple(cast("Sequence[object]", value)) == tuple(cast("Sequence[object]", other))
+    return bool(value == other)
 
 
 def check_type(field_name: str, field_type: str, field_val: object) -> None:

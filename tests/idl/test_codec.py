@@ -232,3 +232,18 @@ def test_a_buffer_is_not_held() -> None:
     message = data_class().deserialize(memoryview(buffer))
     buffer[:] = bytes(len(buffer))
     assert (message.c, message.a) == (b"12", (5,))
+
+
+def test_lists_and_tuples_of_equal_items_are_equal() -> None:
+    """genpy reads arrays of numbers as tuples, and compares them with the lists that a program wrote."""
+    message_class = class_from_text("p/Numbers", "float64[] position\nstring[] names\n")
+    written = message_class(position=[1.0, 2.0], names=["a"])
+    buffer = BytesIO()
+    written.serialize(buffer)
+    read = message_class().deserialize(buffer.getvalue())
+
+    assert written == read
+    assert read == written
+    assert message_class(position=(1.0,)) == message_class(position=[1.0])
+    assert message_class(position=(1.0,)) != message_class(position=[2.0])
+    assert message_class(names="a") != message_class(names=["a"])
