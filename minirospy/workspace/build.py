@@ -6,7 +6,6 @@ it. What did not change is not made again. Source: http://wiki.ros.org/catkin/wo
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 import re
@@ -228,6 +227,7 @@ class _Builder:
         warnings = self._check_needs(plan) + plan.warnings
         stamp = self._stamps / f"{plan.name}.json"
         setup = read_python_setup(plan.folder) if plan.has_setup else None
+        warnings += setup.warnings if setup else ()
 
         relays = {**_relays(setup, self._workspace.devel), **_programs(plan, setup, self._workspace.devel)}
         changed = [path for path, text in relays.items() if write_if_changed(path, text)]
@@ -316,24 +316,16 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return warnings of packages that find_package names and that do not exist; raise where it looks like a typing error."""
+        """Return a warning for each package that find_package names and that does not exist."""
         warnings = []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
             if name not in known:
-                self._check_typing(plan, name, known, line)
                 warnings.append(
                     f"{plan.cmake_lists}:{line}: package [{name}] is not installed; going on without it"
                     + did_you_mean(name, sorted(known), 1)
                 )
         return tuple(warnings)
-
-    def _check_typing(self, plan: Plan, name: str, known: Collection[str], line: int) -> None:
-        near = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.85)
-        if near:
-            raise BuildError(
-                str(plan.cmake_lists), line, f"package [{name}] not found; did you mean {near[0]}?"
-            )
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
         """Check that every type in a package's definitions exists, and that its package is named where catkin wants it."""

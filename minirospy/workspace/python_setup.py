@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from minirospy.errors import BuildError
-from minirospy.workspace.manifest import read_manifest
+from minirospy.workspace.manifest import VARIABLES, read_manifest
 
 __all__ = ["PythonSetup", "read_python_setup"]
 
@@ -29,11 +29,15 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Names -> their paths: top-level packages (folders), modules (files); scripts (files)."""
+    """Names -> their paths: top-level packages (folders), modules (files); scripts (files).
+
+    ``warnings`` has a line for each package whose folder is missing, which catkin builds without.
+    """
 
     packages: dict[str, Path]
     modules: dict[str, Path]
     scripts: tuple[Path, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
@@ -49,10 +53,20 @@ def read_python_setup(folder: Path) -> PythonSetup:
         if "." not in name
     }
     scripts = tuple(folder / name for name in _names(file, given, "scripts"))
-    for name, path in [*packages.items(), *modules.items(), *((path.name, path) for path in scripts)]:
+    for name, path in [*modules.items(), *((path.name, path) for path in scripts)]:
         if not path.exists():
             raise BuildError(str(file), 0, f"[{name}] is named, but there is no {path}")
-    return PythonSetup(packages, modules, scripts)
+
+    missing = {name: path for name, path in packages.items() if not path.exists()}
+    return PythonSetup(
+        {name: path for name, path in packages.items() if name not in missing},
+        modules,
+        scripts,
+        tuple(
+            f"{file}: packages=[...] names [{name}], but there is no folder {path}"
+            for name, path in missing.items()
+        ),
+    )
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
@@ -167,15 +181,20 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
         }
     )
     before, path_before, modules_before = os.getcwd(), sys.path[:], sys.modules.copy()
+    unset = VARIABLES.keys() - os.environ.keys()
     for name in modules_before:
         if name.split(".")[0] in _TOOLS:
             del sys.modules[name]
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
+    # A terminal in which no setup.bash was sourced has none of them; catkin's own build sets them.
+    os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield
     finally:
+        for name in unset:
+            os.environ.pop(name, None)
         os.chdir(before)
         sys.path[:] = path_before
         sys.meta_path.remove(finder)

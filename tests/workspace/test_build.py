@@ -309,11 +309,6 @@ def good(cmake: str) -> str:
             4,
             "did you mean std_msgs?",
         ),
-        (
-            "find_package(catkin REQUIRED COMPONENTS\n std_msg)",
-            3,
-            "package [std_msg] not found; did you mean std_msgs?",
-        ),
         ("catkin_python_setup()", 3, "needs a setup.py"),
         ("catkin_install_python(PROGRAMS scripts/x.py DESTINATION lib)", 3, "there is no [scripts/x.py]"),
         ("if(A", 3, "if( is not closed"),
@@ -418,7 +413,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
         f"{folder / 'setup.py'}:1: ModuleNotFoundError: No module named 'nothing_of_this_name'"
     )
     (folder / "setup.py").write_text(
-        "from setuptools import setup\nsetup(packages=['q'], package_dir={'': 'src'})\n"
+        "from setuptools import setup\nsetup(py_modules=['q'], package_dir={'': 'src'})\n"
     )
     assert "[q] is named, but there is no" in mistakes(scene).text
     (folder / "setup.py").write_text("x = (\n")
@@ -458,6 +453,49 @@ def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: 
     assert error.line == 3 + cmake.count("\n")
     assert "package.xml does not name it" in error.text
     assert text in error.text
+
+
+def test_missing_package_with_a_similar_name_is_a_warning(scene: Scene) -> None:
+    """As with catkin, other packages of the workspace and the rest of this one are built."""
+    folder = scene.package("p", "find_package(catkin REQUIRED COMPONENTS\n std_msg)")
+    scene.messages("q", {"msg/A.msg": "int8 a\n"})
+
+    reports = scene.build()
+
+    assert reports["q"].made == "1 message"
+    assert reports["p"].warnings == (
+        f"{folder / 'CMakeLists.txt'}:3: package [std_msg] is not installed; going on without it;"
+        " did you mean std_msgs?",
+    )
+
+
+def test_missing_folder_of_a_python_package_is_a_warning(scene: Scene) -> None:
+    folder = scene.package(
+        "tools",
+        "catkin_python_setup()",
+        "",
+        {
+            "setup.py": SETUP.format("packages=['tools', 'gone'], package_dir={'': 'src'}"),
+            "src/tools/__init__.py": "VALUE = 3\n",
+        },
+    )
+
+    report = scene.build()["tools"]
+
+    assert report.made == "Python package tools"
+    assert report.warnings == (
+        f"{folder / 'setup.py'}: packages=[...] names [gone], but there is no folder {folder / 'src' / 'gone'}",
+    )
+
+
+def test_setup_py_sees_the_variables_of_ros(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION"):
+        monkeypatch.delenv(name, raising=False)
+    check = "import os\nassert (os.environ['ROS_VERSION'], os.environ['ROS_DISTRO']) == ('1', 'noetic')\n"
+    scene.package("tools", "catkin_python_setup()", "", {"setup.py": check + SETUP.format("packages=[]")})
+
+    assert scene.build()["tools"].warnings == ()
+    assert "ROS_VERSION" not in os.environ
 
 
 def test_warnings(scene: Scene) -> None:
