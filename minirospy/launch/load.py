@@ -492,7 +492,8 @@ class _File:
         for key in ("output", "respawn"):
             if tag.has(key):
                 raise tag.error(f"<test> tags cannot have '{key}' attribute")
-        test_name = tag.required("test-name")
+        # rostest runs a test without a name under the name of its tag.
+        test_name = tag.required("test-name", may_be_empty=True) or "test"
         name = tag.optional("name") or test_name
         if "/" in name:
             raise tag.error(f"<test> name [{name}] cannot contain a namespace: use ns")

@@ -59,7 +59,7 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
         value = parse_value(text) if text.strip() else None
         if value is None:
             return
-        if not param and not isinstance(value, dict):
+        if not param and not isinstance(value, dict) and not tag.optional("ns"):
             raise tag.error(f"<rosparam> {where}: 'param' attribute must be set for non-dictionary values")
         name = names.join(namespace, param) if param else namespace
         check_parameter(value, name)

@@ -94,6 +94,11 @@ def test_rosparam_sets_leaves_and_leaves_siblings_alone(packages: Packages) -> N
     assert (spec.clear, spec.commands) == ([], [ParameterCommand("/gone")])
 
 
+def test_rosparam_with_ns_takes_any_value(packages: Packages) -> None:
+    body = '<rosparam ns="chain">[1, 2]</rosparam><group ns="g"><rosparam ns="n">5</rosparam></group>'
+    assert load(packages, body).params == {"/chain": [1, 2], "/g/n": 5}
+
+
 def test_if_and_unless(packages: Packages) -> None:
     body = '<arg name="on"/><param name="a" value="1" if="$(arg on)"/><param name="b" value="1" unless="$(arg on)"/>'
     assert set(load(packages, body, on="true").params) == {"/a"}

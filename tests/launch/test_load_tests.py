@@ -71,3 +71,9 @@ def test_a_test_may_be_called_as_a_node() -> None:
 def test_a_name_is_required() -> None:
     with pytest.raises(LaunchError, match="missing required attribute: 'test-name'"):
         load_text('<launch><test pkg="p" type="t"/></launch>', {}, Packages.below(), {})
+
+
+def test_empty_name_is_that_of_the_tag() -> None:
+    """As with rostest, which runs it under the name ``test``."""
+    spec = load_text('<launch><test test-name="" pkg="p" type="t"/></launch>', {}, Packages.below(), {})
+    assert [(test.test_name, test.node.name) for test in spec.tests] == [("test", "/test")]
