@@ -205,9 +205,7 @@ class ServiceProxy(Generic[_S_co]):
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
-        buffer = BytesIO()
-        request.serialize(buffer)
-        body = buffer.getvalue()
+        body = self._serialize(request)
         if not self.persistent:
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
@@ -226,6 +224,17 @@ class ServiceProxy(Generic[_S_co]):
         client, self._client = self._client, None
         if client:
             client.close()
+
+    def _serialize(self, request: Message) -> bytes:
+        buffer = BytesIO()
+        try:
+            request.serialize(buffer)
+        except SerializationError:
+            # rospy connects first: a service that is missing or of another type is the error that it raises.
+            if self._client is None:
+                self._connect_by_master(None, b"").close()
+            raise
+        return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
         """Return a connection for the call of ``request``, which may have been sent by then."""

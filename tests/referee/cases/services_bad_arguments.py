@@ -65,3 +65,7 @@ outcome(
     "twice of another type",
     lambda: rospy.Service("b1", SetBool, lambda request: [True, "second"]).resolved_name,
 )
+outcome("unfit request, server of another type", lambda: rospy.ServiceProxy("h2", SetBool)("no bool"))
+outcome("unfit request, no server", lambda: rospy.ServiceProxy("absent", SetBool)("no bool"))
+rospy.Service("fit", SetBool, lambda request: [True, "fit"])
+outcome("unfit request, its server", lambda: rospy.ServiceProxy("fit", SetBool)("no bool"))
