@@ -70,7 +70,8 @@ _HEAD = "# Made by minirospy: `source` it to work with the packages of this work
 
 _BASH = (
     _HEAD
-    + """if [ "${{BASH_SOURCE[0]}}" = "$0" ]; then
+    # `return` outside a function succeeds only in a file that is sourced; $0 may have any value.
+    + """if ! (return 0 2>/dev/null); then
   echo "a program sets nothing in your terminal; type: source '$0'" >&2
 fi
 _minirospy_prefix=$(builtin cd "$(dirname "${{BASH_SOURCE[0]}}")" >/dev/null && pwd)

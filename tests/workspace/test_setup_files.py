@@ -107,6 +107,16 @@ def test_run_instead_of_sourced(scene: Scene) -> None:
     )
 
 
+def test_sourced_file_whose_path_is_argument_zero(scene: Scene) -> None:
+    scene.build()
+    script = 'set -eu; source "$0"; echo "$ROS_PACKAGE_PATH"'
+    done = subprocess.run(
+        ["bash", "-c", script, str(scene.devel / "setup.bash")], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(str(scene.source))
+
+
 @pytest.mark.parametrize(("shell", "ending"), SHELLS)
 def test_variables_set_before_stay(scene: Scene, shell: str, ending: str) -> None:
     scene.build()
