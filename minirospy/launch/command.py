@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,9 @@ from minirospy.launch.spec import NodeSpec
 from minirospy.workspace.packages import NotExecutableError, Packages
 
 __all__ = ["node_command", "node_environment", "node_folder", "node_program", "shell_line"]
+
+# Prefixes that run a Python file themselves, so that the interpreter in front of the file is left out.
+_RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
@@ -30,6 +34,8 @@ def node_command(node: NodeSpec, packages: Packages) -> list[str]:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
     except ValueError as error:
         raise _fault(node, f"args or launch-prefix: {error}") from None
+    if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
+        program = program[-1:]
     remaps = [f"{a}:={b}" for a, b in node.remaps]
     return [*prefix, *program, *args, *remaps, f"__name:={node.base_name}"]
 
