@@ -66,6 +66,26 @@ def test_a_plan_has_what_the_files_name(scene: Scene) -> None:
     assert plan.skipped == ("hardware_test",)
 
 
+def test_folders_of_tests_are_the_working_directory(
+    scene: Scene, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """As with catkin's nosetests; a single file runs in the package's build folder."""
+    record = (
+        f"import os\ndef test_it():\n    open({str(tmp_path / 'log')!r}, 'a').write(os.getcwd() + '\\n')\n"
+    )
+    folder = scene.package(
+        "p",
+        "catkin_add_nosetests(test)\ncatkin_add_nosetests(more/test_two.py)",
+        "",
+        {"test/test_one.py": record, "more/test_two.py": record},
+    )
+
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0, capfd.readouterr().out
+
+    build = scene.root / "build" / "p"
+    assert (tmp_path / "log").read_text(encoding="utf-8").splitlines() == [str(folder / "test"), str(build)]
+
+
 def test_all_are_run(
     scene: Scene, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

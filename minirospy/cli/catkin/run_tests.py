@@ -56,7 +56,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             results.mkdir(parents=True, exist_ok=True)
             command = _COMMANDS[test.kind](plan, test, results)
             print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)
-            status = _run(command, _environment(workspace), test.folder or plan.folder)
+            status = _run(command, _environment(workspace), _folder_of(test, plan, workspace))
             # 5: pytest found no tests in there.
             worst |= status not in ((0, 5) if test.kind == "pytest" else (0,))
         for _, counts in results_below(results):
@@ -83,6 +83,22 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         raise MinirospyError("interrupted: the tests that were left have not run")
     assert status is not None
     return status
+
+
+def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
+    """Return the folder in which a test runs; make it where it is the package's build folder.
+
+    As catkin's: ``nosetests --where=FOLDER`` changes into a folder of tests, other programs run in the build folder.
+    """
+    if test.folder:
+        return Path(test.folder)
+    if test.kind == "pytest" and (plan.folder / test.path).is_dir():
+        return plan.folder / test.path
+    if test.kind == "pytest":
+        build = workspace.build / plan.name
+        build.mkdir(parents=True, exist_ok=True)
+        return build
+    return plan.folder
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
