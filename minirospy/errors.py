@@ -41,6 +41,12 @@
     |           +-- TransportInitError
     |           +-- TransportTerminated
     +-- ServiceException                a service call failed, here or there
+    +-- TransformException              tf2's tree (http://wiki.ros.org/tf2/Errors)
+    |   +-- ConnectivityException       the two frames are in different trees
+    |   +-- LookupException             a frame that no transform has named, or a loop
+    |   +-- ExtrapolationException      a time for which there is no data
+    |   +-- InvalidArgumentException    a frame's name that is empty or starts with a slash
+    |   +-- TimeoutException            a buffer server that does not answer
     +-- MessageException                genpy's tree: values and bytes that do not fit a message
         +-- SerializationError
         +-- DeserializationError
@@ -60,10 +66,14 @@ __all__ = [
     "BoardError",
     "BuildError",
     "CallFailed",
+    "ConnectivityException",
     "DefinitionError",
     "DeserializationError",
+    "ExtrapolationException",
     "HandshakeRefused",
+    "InvalidArgumentException",
     "LaunchError",
+    "LookupException",
     "ManifestError",
     "MasterUnreachableError",
     "MessageException",
@@ -85,6 +95,8 @@ __all__ = [
     "ServiceException",
     "SourceError",
     "ThreadLimitError",
+    "TimeoutException",
+    "TransformException",
     "TransportException",
     "TransportInitError",
     "TransportTerminated",
@@ -409,6 +421,42 @@ class TransportTerminated(TransportException):
 
 class ServiceException(Exception):
     """A service call failed: no provider, a broken link, or the handler's own error."""
+
+
+class TransformException(Exception):
+    """The root of tf2's errors. Source: http://wiki.ros.org/tf2/Errors."""
+
+    __module__ = "tf2"
+
+
+class ConnectivityException(TransformException):
+    """Two frames are not connected by transforms."""
+
+    __module__ = "tf2"
+
+
+class LookupException(TransformException):
+    """A frame does not exist, or the transforms form a loop."""
+
+    __module__ = "tf2"
+
+
+class ExtrapolationException(TransformException):
+    """There is no data for the time of a lookup."""
+
+    __module__ = "tf2"
+
+
+class InvalidArgumentException(TransformException):
+    """A frame's name is empty, or starts with a slash."""
+
+    __module__ = "tf2"
+
+
+class TimeoutException(TransformException):
+    """A buffer server did not answer in time."""
+
+    __module__ = "tf2"
 
 
 class MessageException(Exception):
