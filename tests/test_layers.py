@@ -19,7 +19,7 @@ LAYERS = [
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
-    {"graph", "wire", "idl", "gpio", "bag", "urdf"},
+    {"graph", "wire", "idl", "tf2", "gpio", "bag", "urdf"},
     {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},
     {"errors", "escape"},
 ]
@@ -27,7 +27,7 @@ DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 WITH_CYCLES = {"idl"}
 """Rooms whose modules still import each other in cycles."""
 BYTES_ONLY = {"runtime", "wire"}
-PURE = {"graph", "wire", "idl", "urdf"}
+PURE = {"graph", "wire", "idl", "tf2", "urdf"}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
 FILES = sorted(

@@ -1,0 +1,219 @@
+"""TFMessages as they came -> the samples of one frame, decoded when that frame is looked up.
+
+A publisher sends the same frames in the same order again and again: two messages of one layout differ only in
+sequence numbers, stamps and transforms, which are at the same offsets. So a message of a known layout is recognised
+without decoding it, and kept as bytes. What may be dropped without decoding it is what the caches would have
+forgotten by now.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from minirospy.errors import DeserializationError
+from minirospy.tf2.rotation import Quaternion, Vector
+
+__all__ = ["Arrival", "Layout", "Layouts", "TransformSample", "read_transforms", "without_slash"]
+
+_COUNT = struct.Struct("<I")
+_HEAD = struct.Struct("<4I")
+_STAMP = struct.Struct("<2I")
+_BODY = struct.Struct("<7d")
+_BLOCK = 64
+"""After so many messages a layout drops what has expired, so many at a time."""
+_MOST_MESSAGES = 16_384
+_MOST_LAYOUTS = 16_384
+_MOST_SAME_LENGTH = 8
+
+
+class TransformSample(NamedTuple):
+    """One transform of a message; the stamp in nanoseconds."""
+
+    parent: str
+    child: str
+    stamp: int
+    translation: Vector
+    rotation: Quaternion
+
+
+class Arrival(NamedTuple):
+    """A message that is kept: which one it was in the order of all, who sent it, and its bytes."""
+
+    number: int
+    authority: str
+    data: bytes
+
+
+class _Place(NamedTuple):
+    """Where a transform is in a message: the offsets of its header, and of its seven numbers."""
+
+    parent: str
+    child: str
+    header: int
+    body: int
+
+
+def read_transforms(data: bytes) -> list[TransformSample]:
+    """Return the transforms of a serialised tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
+    return [_sample(data, place) for place in _places(data)]
+
+
+class Layout:
+    """The messages with the same frames in the same order."""
+
+    def __init__(self, places: list[_Place]) -> None:
+        self._places = places
+        self._index = {place.child: index for index, place in enumerate(places)}
+        self._arrivals: list[Arrival] = []
+        self._dropped = 0
+        """How many messages came before the first of the list."""
+        self._decoded = [0] * len(places)
+        """Of each transform: how many messages, counted from the first that ever came, have been decoded."""
+
+    @property
+    def children(self) -> list[str]:
+        """The child frames, in the order of the messages."""
+        return [place.child for place in self._places]
+
+    def keep(self, arrival: Arrival, span: int) -> bool:
+        """Keep a message; return False where so many are kept that they have to be decoded."""
+        self._arrivals.append(arrival)
+        if len(self._arrivals) % _BLOCK:
+            return True
+        return self._drop_expired(span) and len(self._arrivals) < _MOST_MESSAGES
+
+    def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
+        """Decode what has come of a frame since the last time: (number of the arrival, authority, sample)."""
+        index = self._index[child]
+        start = max(0, self._decoded[index] - self._dropped)
+        self._decoded[index] = self._dropped + len(self._arrivals)
+        place = self._places[index]
+        for arrival in self._arrivals[start:]:
+            yield arrival.number, arrival.authority, _sample(arrival.data, place)
+
+    def forget(self) -> None:
+        """Drop all messages."""
+        self._dropped += len(self._arrivals)
+        self._arrivals.clear()
+
+    def _drop_expired(self, span: int) -> bool:
+        """Drop the oldest blocks that every cache would have forgotten; False where that cannot be said unread.
+
+        The newest message has moved each cache on only if each of its transforms is a valid one.
+        """
+        newest = [_sample(self._arrivals[-1].data, place) for place in self._places]
+        if not all(_is_valid(sample) for sample in newest):
+            return False
+
+        count = 0
+        while count + _BLOCK < len(self._arrivals):
+            last = self._arrivals[count + _BLOCK - 1].data
+            if any(
+                _stamp(last, place) >= sample.stamp - span
+                for place, sample in zip(self._places, newest, strict=True)
+            ):
+                break
+            count += _BLOCK
+        del self._arrivals[:count]
+        self._dropped += count
+        return True
+
+
+class Layouts:
+    """Every layout that has come, found by a message's bytes."""
+
+    def __init__(self) -> None:
+        self._single: dict[bytes, Layout] = {}
+        """Of messages with one transform: by the names' bytes, which are in one piece."""
+        self._several: dict[int, list[tuple[int, int, Layout]]] = {}
+        """By a message's length: a mask of the bytes that do not change, their value, the layout."""
+        self._count = 0
+
+    def __iter__(self) -> Iterator[Layout]:
+        yield from self._single.values()
+        for found in self._several.values():
+            for _, _, layout in found:
+                yield layout
+
+    def find(self, data: bytes) -> Layout | None:
+        """Return the layout of a message; None where it is a new one, or no message."""
+        if data[:4] == b"\1\0\0\0":
+            return self._single.get(data[16:-56])
+        candidates = self._several.get(len(data))
+        if candidates is None:
+            return None
+        number = int.from_bytes(data, "little")
+        for mask, value, layout in candidates:
+            if number & mask == value:
+                return layout
+        return None
+
+    def add(self, data: bytes) -> Layout | None:
+        """Make the layout of a message; None where it has no frame, one twice, or there are too many layouts."""
+        places = _places(data)
+        children = {place.child for place in places}
+        if not places or len(children) < len(places) or self._count >= _MOST_LAYOUTS:
+            return None
+
+        layout = Layout(places)
+        if len(places) == 1:
+            self._single[data[16:-56]] = layout
+        else:
+            same_length = self._several.setdefault(len(data), [])
+            if len(same_length) >= _MOST_SAME_LENGTH:
+                return None
+            mask = bytearray(b"\xff" * len(data))
+            for place in places:
+                mask[place.header : place.header + 12] = bytes(12)
+                mask[place.body : place.body + _BODY.size] = bytes(_BODY.size)
+            unchanged = int.from_bytes(mask, "little")
+            same_length.append((unchanged, int.from_bytes(data, "little") & unchanged, layout))
+        self._count += 1
+        return layout
+
+
+def _places(data: bytes) -> list[_Place]:
+    places = []
+    try:
+        (count,) = _COUNT.unpack_from(data)
+        end = 4
+        for _ in range(count):
+            header = end
+            *_, length = _HEAD.unpack_from(data, end)
+            end += 16
+            parent = data[end : end + length].decode("utf-8", "replace")
+            end += length
+            (length,) = _COUNT.unpack_from(data, end)
+            end += 4
+            child = data[end : end + length].decode("utf-8", "replace")
+            end += length
+            places.append(_Place(without_slash(parent), without_slash(child), header, end))
+            end += _BODY.size
+    except struct.error as error:
+        raise DeserializationError(error) from error
+    if end > len(data):
+        raise DeserializationError("the message ends too early")
+    return places
+
+
+def without_slash(name: str) -> str:
+    """Return a frame's name as tf2 knows it: without one leading slash."""
+    return name[1:] if name.startswith("/") else name
+
+
+def _sample(data: bytes, place: _Place) -> TransformSample:
+    x, y, z, qx, qy, qz, qw = _BODY.unpack_from(data, place.body)
+    return TransformSample(place.parent, place.child, _stamp(data, place), (x, y, z), (qx, qy, qz, qw))
+
+
+def _stamp(data: bytes, place: _Place) -> int:
+    secs, nsecs = _STAMP.unpack_from(data, place.header + 4)
+    return int(secs * 1_000_000_000 + nsecs)
+
+
+def _is_valid(sample: TransformSample) -> bool:
+    x, y, z, w = sample.rotation
+    return abs(x * x + y * y + z * z + w * w - 1.0) < 0.01 and not math.isnan(sum(sample.translation))
