@@ -15,7 +15,7 @@ LAYERS = [
     {"cli"},
     {"testing"},
     {"launch"},
-    {"introspect", "actionlib"},
+    {"introspect", "actionlib", "robots"},
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},

@@ -1,0 +1,41 @@
+"""The parameter robot_description, found as ROS's nodes find it."""
+
+from __future__ import annotations
+
+from minirospy import client as rospy
+from minirospy.errors import MinirospyError, UrdfError
+from minirospy.urdf.model import Robot
+from minirospy.urdf.read import parse_robot
+
+__all__ = ["DescriptionError", "robot_of_parameter"]
+
+NAME = "robot_description"
+
+
+class DescriptionError(MinirospyError):
+    """No robot can be had from the parameter server; the lines are those of ROS's reader."""
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__(*lines)
+        self.lines = lines
+
+    def __str__(self) -> str:
+        return "; ".join(self.lines)
+
+
+def robot_of_parameter(name: str = NAME) -> Robot:
+    """Return the robot of a parameter, which is searched from the node's namespace upwards. Raises DescriptionError."""
+    key = rospy.resolve_name(name)
+    if not rospy.has_param(key):
+        found = rospy.search_param(name)
+        if found is None:
+            raise DescriptionError(f"Could not find parameter {name} on parameter server")
+        key = found
+    text = rospy.get_param(key, None)
+    if not isinstance(text, str):
+        raise DescriptionError(f"Could not read parameter {key} on parameter server")
+    try:
+        return parse_robot(text, key)
+    except UrdfError as error:
+        place = f" ({error.file}:{error.line})" if error.line else f" ({error.file})"
+        raise DescriptionError(error.trail[0] + place, *error.trail[1:]) from error

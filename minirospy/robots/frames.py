@@ -1,0 +1,72 @@
+"""Positions of joints -> poses of links. Pure.
+
+Source: http://wiki.ros.org/robot_state_publisher.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from minirospy.urdf.model import JointType, Robot
+from minirospy.urdf.poses import Pose, Segment
+
+__all__ = ["LinkPose", "RobotFrames", "prefixed"]
+
+
+class LinkPose(NamedTuple):
+    """The frame ``child`` in the frame ``parent``."""
+
+    parent: str
+    child: str
+    pose: Pose
+
+
+class RobotFrames:
+    """The frames of a robot: those that move with a joint, and those that are fixed, both in the order of joints' names.
+
+    Planar joints are fixed, as KDL has them; floating ones have no frame, since a JointState cannot hold their pose.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        segments = {
+            joint.name: Segment(joint)
+            for name in sorted(robot.joints)
+            if (joint := robot.joints[name]).type is not JointType.FLOATING
+            and robot.parent_joint(joint.child) is joint
+        }
+        self._moving = {name: segment for name, segment in segments.items() if segment.is_moving}
+        self._fixed = [segment for segment in segments.values() if not segment.is_moving]
+        self._mimics = {name: joint.mimic for name, joint in sorted(robot.joints.items()) if joint.mimic}
+        self._names = robot.joints.keys()
+
+    def fixed(self) -> Iterator[LinkPose]:
+        """Yield the frames of fixed joints."""
+        return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
+
+    def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
+        """Yield the frames of the joints whose positions are given, and of those that mimic them."""
+        known = {
+            name: position if math.isfinite(position) else math.nan for name, position in positions.items()
+        }
+        # A joint may mimic one that mimics another.
+        waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
+        while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
+            for name in found:
+                mimic = waiting.pop(name)
+                known[name] = known[mimic.joint] * mimic.multiplier + mimic.offset
+        for name in sorted(known.keys() & self._moving.keys()):
+            segment = self._moving[name]
+            yield LinkPose(segment.joint.parent, segment.joint.child, segment.pose(known[name]))
+
+    def unknown(self, names: Mapping[str, float]) -> list[str]:
+        """Return the joints that the robot does not have."""
+        return sorted(names.keys() - self._names)
+
+
+def prefixed(prefix: str, frame: str) -> str:
+    """Return a frame's name with the tf_prefix; a frame with a slash in front is taken as it is, without the slash."""
+    if frame.startswith("/"):
+        return frame[1:]
+    return f"{prefix.removeprefix('/')}/{frame}" if prefix else frame
