@@ -1,8 +1,15 @@
 """actionlib, provided by minirospy.
 
-Without a list of its names, as in ROS: `from actionlib import *` brings GoalStatus and the modules, too.
+Without a list of its names, as in ROS: `from actionlib import *` brings GoalStatus and the modules, too, those of the
+standard library and rospy included, on which programs have come to rely.
 """
 
+import threading as threading
+import time as time
+import traceback as traceback
+import weakref as weakref
+
+import rospy as rospy
 from actionlib_msgs.msg import GoalID as GoalID
 from actionlib_msgs.msg import GoalStatus as GoalStatus
 from actionlib_msgs.msg import GoalStatusArray as GoalStatusArray

@@ -24,3 +24,4 @@ names = (
 for name in names.split():
     show(name, getattr(actionlib, name).__name__)
 show(actionlib.exceptions.ActionException is actionlib.ActionException, rospy.is_shutdown())
+show(*(name for name in ("rospy", "threading", "time", "traceback", "weakref") if name in globals()))
