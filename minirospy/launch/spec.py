@@ -12,17 +12,20 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` hold those of the groups around it too."""
+    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` hold those of the groups around it too.
+
+    ``output`` and ``cwd`` are empty where the file does not set them, which means ``log`` and ``ROS_HOME``.
+    """
 
     name: str
     package: str
     type: str
     args: str = ""
-    output: str = "log"
+    output: str = ""
     respawn: bool = False
     respawn_delay: float = 0.0
     required: bool = False
-    cwd: str = "ROS_HOME"
+    cwd: str = ""
     launch_prefix: str = ""
     machine: str = ""
     remaps: tuple[tuple[str, str], ...] = ()
@@ -51,8 +54,8 @@ class NodeSpec:
             "name": self.base_name,
             "ns": self.namespace,
             "args": self.args,
-            "output": self.output,
-            "cwd": self.cwd,
+            "output": self.output or "log",
+            "cwd": self.cwd or "ROS_HOME",
             "respawn": str(self.respawn).lower(),
             "respawn_delay": f"{self.respawn_delay:g}",
             "required": str(self.required).lower(),

@@ -97,7 +97,7 @@ class ROSLaunchConfig:
     def summary(self, local: bool = False) -> str:
         """Return what roslaunch shows before it starts anything."""
         return summary(
-            self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.clear_params
+            self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.spec.clear
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
@@ -130,7 +130,7 @@ class ROSLaunchConfig:
                 each.name, each.address, each.env_loader or None, each.ssh_port, each.user or None, each.password or None,
                 timeout=each.timeout,
             )  # fmt: skip
-        self.clear_params += spec.clear
+        self.clear_params += [f"{name.rstrip('/')}/" for name in spec.clear]
         self.roslaunch_files += [file for file in spec.files if file not in self.roslaunch_files]
         self.config_errors += map(str, spec.warnings)
 
@@ -140,7 +140,7 @@ class ROSLaunchConfig:
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
             params={name: param.value for name, param in self.params.items()},
-            clear=self.clear_params,
+            clear=[name.rstrip("/") or "/" for name in self.clear_params],
             commands=self._spec.commands,
             files=self.roslaunch_files,
             machines={name: machine.spec for name, machine in self.machines.items() if name},

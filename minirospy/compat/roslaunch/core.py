@@ -218,7 +218,7 @@ class Node:
         """Return the node of a launch file."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
-            spec.respawn_delay, spec.remaps, spec.env, spec.output, spec.cwd, spec.launch_prefix, spec.required,
+            spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
             spec.file,
         )  # fmt: skip
 
@@ -239,11 +239,11 @@ class Node:
             package=self.package,
             type=self.type,
             args=self.args,
-            output=self.output or "log",
+            output=self.output or "",
             respawn=self.respawn,
             respawn_delay=self.respawn_delay,
             required=self.required,
-            cwd=self.cwd or "ROS_HOME",
+            cwd=self.cwd or "",
             launch_prefix=self.launch_prefix or "",
             machine=self.machine_name or "",
             remaps=tuple((a, b) for a, b in self.remap_args),
@@ -286,7 +286,7 @@ class Test(Node):
         node = spec.node
         return cls(
             spec.test_name, node.package, node.type, node.base_name, node.namespace, None, node.args, node.remaps,
-            node.env, spec.time_limit, node.cwd, node.launch_prefix, spec.retry, node.file,
+            node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
         )  # fmt: skip
 
 

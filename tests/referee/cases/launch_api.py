@@ -392,3 +392,14 @@ show(
     issubclass(roslaunch.Test, roslaunch.Node),
     roslaunch.nodeprocess.DEFAULT_TIMEOUT_SIGINT,
 )
+
+# What a file leaves unset.
+with open(os.path.join(ROOT, "unset.launch"), "w") as file:
+    file.write(
+        '<launch><group ns="g" clear_params="true"><node name="a" pkg="robot" type="t" clear_params="true"/></group>'
+        '<node name="b" pkg="robot" type="t" output="log" cwd="ROS_HOME"/></launch>'
+    )
+unset = roslaunch.config.load_config_default([os.path.join(ROOT, "unset.launch")], None, verbose=False)
+for node in unset.nodes:
+    show(node.name, node.output, node.cwd, node.launch_prefix, node.machine_name, node.args)
+show(unset.clear_params)
