@@ -23,7 +23,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.wire.framing import Frame
+from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
@@ -292,8 +292,7 @@ class TopicPublisher:
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
-        body = serialize(message)
-        self._publication.publish(len(body).to_bytes(4, "little") + body)
+        self._publication.publish(serialize_frame(serialize(message)))
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:

@@ -19,6 +19,7 @@ from minirospy.errors import WireError
 
 __all__ = [
     "CHUNK",
+    "LENGTH_BYTES",
     "MAX_FRAME",
     "SPLIT",
     "Frame",
@@ -27,12 +28,16 @@ __all__ = [
     "Pieces",
     "SplitFrame",
     "begins_split",
+    "parse_length",
     "serialize_frame",
     "split_sizes",
 ]
 
 CHUNK = 64 * 1024
 """Bytes that one receive asks for while messages are small."""
+
+LENGTH_BYTES = 4
+"""Bytes of the length in front of a frame or a connection header."""
 
 MAX_FRAME = 1024 * 1024 * 1024
 """A longer frame is refused: it is garbage, or not for us."""
@@ -48,6 +53,11 @@ _TWO_LENGTHS = struct.Struct("<II")
 def serialize_frame(body: bytes) -> bytes:
     """``body`` with its length in front."""
     return _LENGTH.pack(len(body)) + body
+
+
+def parse_length(data: bytes) -> int:
+    """Return the length that the first :data:`LENGTH_BYTES` of ``data`` announce."""
+    return int.from_bytes(data[:LENGTH_BYTES], "little")
 
 
 class LargeFrame(NamedTuple):

@@ -21,6 +21,7 @@ from minirospy.errors import ServiceException
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
+from minirospy.wire.framing import serialize_frame
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 BIN = Path(sys.executable).parent
@@ -39,7 +40,7 @@ class Robot(NamedTuple):
         buffer = BytesIO()
         message.serialize(buffer)
         body = buffer.getvalue()
-        self.node.publications[topic].publish(len(body).to_bytes(4, "little") + body)
+        self.node.publications[topic].publish(serialize_frame(body))
 
 
 @pytest.fixture

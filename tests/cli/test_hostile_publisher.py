@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import socket
-import struct
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -14,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.wire.framing import serialize_frame
+from minirospy.wire.header import serialize_header
 from tests.cli.conftest import BIN
 
 MARK = "OWNED"
@@ -23,9 +24,7 @@ class HostilePublisher:
     """A node of raw sockets: answers every XML-RPC call as requestTopic, every connection with its header."""
 
     def __init__(self, header: dict[str, str], messages: list[bytes]) -> None:
-        fields = b"".join(_field(f"{name}={value}") for name, value in header.items())
-        self._reply = struct.pack("<I", len(fields)) + fields
-        self._reply += b"".join(struct.pack("<I", len(body)) + body for body in messages)
+        self._reply = serialize_header(header) + b"".join(map(serialize_frame, messages))
         self._rpc = socket.create_server(("127.0.0.1", 0))
         self._data = socket.create_server(("127.0.0.1", 0))
         self._kept: list[socket.socket] = []
@@ -71,11 +70,6 @@ class HostilePublisher:
     def _stream(self, connection: socket.socket) -> None:
         connection.recv(65536)
         connection.sendall(self._reply)
-
-
-def _field(text: str) -> bytes:
-    data = text.encode()
-    return struct.pack("<I", len(data)) + data
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from minirospy.compat.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
 from minirospy.environment import Environment, is_local
 from minirospy.errors import WireError
+from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import parse_header, serialize_header
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ __all__ = [
     "use_ipv6",
     "write_ros_handshake_header",
 ]
-
-_LENGTH_BYTES = 4
 
 
 class ROSHandshakeException(Exception):
@@ -118,11 +117,11 @@ def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
     """Return the fields of a connection header, its length in front. Raises ROSHandshakeException."""
-    size = int.from_bytes(header_str[:_LENGTH_BYTES], "little")
-    body = header_str[_LENGTH_BYTES : _LENGTH_BYTES + size]
+    size = parse_length(header_str)
+    body = header_str[LENGTH_BYTES : LENGTH_BYTES + size]
     if len(body) < size:
         raise ROSHandshakeException(
-            f"Incomplete header. Expected {size + _LENGTH_BYTES} bytes but only have {len(header_str)}"
+            f"Incomplete header. Expected {size + LENGTH_BYTES} bytes but only have {len(header_str)}"
         )
     try:
         return dict(parse_header(body))
@@ -136,9 +135,7 @@ def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -
     Raises ROSHandshakeException where the peer ends before.
     """
     data = b.getvalue()
-    while len(data) < _LENGTH_BYTES or len(data) < _LENGTH_BYTES + int.from_bytes(
-        data[:_LENGTH_BYTES], "little"
-    ):
+    while len(data) < LENGTH_BYTES or len(data) < LENGTH_BYTES + parse_length(data):
         more = sock.recv(buff_size)
         if not more:
             raise ROSHandshakeException(
@@ -146,7 +143,7 @@ def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -
                 f"{len(data)} bytes were received. Please check sender for additional details."
             )
         data += more
-    end = _LENGTH_BYTES + int.from_bytes(data[:_LENGTH_BYTES], "little")
+    end = LENGTH_BYTES + parse_length(data)
     b.seek(0)
     b.truncate(0)
     b.write(data[end:])

@@ -109,7 +109,8 @@ class DoctorNode:
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
-        letter.publish(serialize_frame(len(body).to_bytes(4, "little") + body))
+        # A std_msgs/String is a length and a text, as is a frame.
+        letter.publish(serialize_frame(serialize_frame(body)))
         log = message_class("rosgraph_msgs/Log")
         type_ = InterfaceType.of(log)
         await self.node.advertise(letter)

@@ -24,6 +24,7 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.runtime.rpc.master_proxy import SlaveProxy
+from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
 
@@ -233,7 +234,7 @@ def _receive(sock: socket.socket, most: int) -> bytes:
             data += more
         return data
 
-    length = int.from_bytes(exactly(4), "little")
+    length = parse_length(exactly(LENGTH_BYTES))
     if length > most:
         raise WireError(f"{length} bytes are announced: that is not TCPROS")
     return exactly(length)

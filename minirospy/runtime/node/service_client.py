@@ -1,4 +1,4 @@
-"""A service's client that blocks its caller, and what both ends read and write.
+"""A service's client that blocks its caller, and exact reads from a socket.
 
 Without asyncio, which a command that calls one service would wait for. Source: http://wiki.ros.org/ROS/TCPROS
 ("Services").
@@ -9,24 +9,18 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
-import struct
 from collections.abc import Mapping
 from typing import Any
 
 from minirospy.environment import split_uri
 from minirospy.errors import CallFailed, WireError
 from minirospy.runtime.transport import local, sockets
-from minirospy.wire.framing import MAX_FRAME
+from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
+from minirospy.wire.service import RESPONSE_HEAD, parse_response_head, serialize_request
 from minirospy.wire.tcpros import check_service, service_client_header
 
-__all__ = ["ANSWER", "LENGTH", "PeerEndedError", "Reader", "ServiceClient", "checked", "parse_service_uri"]
-
-ANSWER = struct.Struct("<BI")
-"""Whether the call went well, and the length of what follows."""
-
-LENGTH = struct.Struct("<I")
-"""The length of a request."""
+__all__ = ["PeerEndedError", "Reader", "ServiceClient", "parse_service_uri"]
 
 _RECEIVE = 16 * 1024
 _MOST = 1024 * 1024
@@ -109,8 +103,9 @@ class ServiceClient:
             self._send(request)
         if not self._reader.rest:
             sockets.busy_poll(self._sock)
-        ok, length = ANSWER.unpack(self._reader.take(ANSWER.size))
-        body = self._reader.take(checked(length))
+
+        ok, length = parse_response_head(self._reader.take(RESPONSE_HEAD))
+        body = self._reader.take(length)
         if not ok:
             raise CallFailed(body)
         return body
@@ -130,12 +125,12 @@ class ServiceClient:
             self._sock.close()
 
     def _send(self, request: bytes) -> None:
-        self._sock.sendall(LENGTH.pack(len(request)) + request)
+        self._sock.sendall(serialize_request(request))
 
     def _receive_header(self) -> Header:
         sockets.busy_poll(self._sock)
         try:
-            (length,) = LENGTH.unpack(self._reader.take(4))
+            length = parse_length(self._reader.take(LENGTH_BYTES))
             if length > MAX_HEADER:
                 raise WireError(f"{self.uri} does not speak TCPROS")
             return parse_header(self._reader.take(length))
@@ -154,13 +149,6 @@ def parse_service_uri(uri: str) -> tuple[str, int]:
         raise WireError(f"protocol uri is invalid: {uri}") from None
     # "localhost" may name IPv6 first, where no server of ROS 1 listens.
     return ("127.0.0.1" if host == "localhost" else host), port
-
-
-def checked(length: int) -> int:
-    """Return the length of a request or response, where it is allowed. Raises WireError."""
-    if length > MAX_FRAME:
-        raise WireError(f"a body of {length} bytes is over the limit of {MAX_FRAME}")
-    return length
 
 
 class PeerEndedError(WireError):

@@ -14,17 +14,19 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
 from minirospy.errors import CallFailed, ServiceException, ThreadLimitError, WireError
-from minirospy.runtime.node.service_client import (
-    ANSWER,
-    LENGTH,
-    PeerEndedError,
-    Reader,
-    checked,
-    parse_service_uri,
-)
+from minirospy.runtime.node.service_client import PeerEndedError, Reader, parse_service_uri
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.workers import Workers
 from minirospy.wire.header import Header
+from minirospy.wire.service import (
+    REQUEST_HEAD,
+    RESPONSE_HEAD,
+    parse_request_head,
+    parse_response_head,
+    serialize_failure,
+    serialize_request,
+    serialize_response,
+)
 from minirospy.wire.tcpros import (
     InterfaceType,
     check_service,
@@ -98,9 +100,10 @@ class ServiceServer:
     async def _refuse_call(self, sock: socket.socket, error: Exception) -> None:
         """Answer a client's call with the reason why it is not served: its header has been answered already."""
         try:
-            length = await asyncio.wait_for(_receive_length(sock), sockets.HANDSHAKE_SECONDS)
+            head = await asyncio.wait_for(_receive(sock, REQUEST_HEAD), sockets.HANDSHAKE_SECONDS)
+            length = parse_request_head(head)
             await asyncio.wait_for(_receive(sock, length), sockets.HANDSHAKE_SECONDS)
-            await asyncio.get_running_loop().sock_sendall(sock, _refusal(error))
+            await asyncio.get_running_loop().sock_sendall(sock, serialize_failure(error))
         except (OSError, WireError, asyncio.TimeoutError):
             _log.debug("service %s: a client that cannot be served has not called", self.name)
         finally:
@@ -124,12 +127,12 @@ class ServiceServer:
             sock.setblocking(True)
             reader = Reader(sock)
             while not self._closed:
-                length = reader.take(4, at_end_ok=True)
-                if not length:
+                head = reader.take(REQUEST_HEAD, at_end_ok=True)
+                if not head:
                     return
 
                 connection.busy = True
-                request = reader.take(checked(LENGTH.unpack(length)[0]))
+                request = reader.take(parse_request_head(head))
                 sock.sendall(self._respond(memoryview(request), fields))
                 connection.busy = False
                 if not persistent:
@@ -143,10 +146,9 @@ class ServiceServer:
 
     def _respond(self, request: memoryview, fields: Header) -> bytes:
         try:
-            body = self._handler(request, fields)
+            return serialize_response(self._handler(request, fields))
         except ServiceException as error:
-            return _refusal(error)
-        return ANSWER.pack(1, len(body)) + body
+            return serialize_failure(error)
 
 
 class LoopServiceServer(ServiceServer):
@@ -192,14 +194,13 @@ class LoopServiceServer(ServiceServer):
 
         try:
             while not self._closed:
-                length = await _receive_length(sock)
+                head = await _receive(sock, REQUEST_HEAD)
                 connection.busy = True
-                request = await _receive(sock, length)
+                request = await _receive(sock, parse_request_head(head))
                 try:
-                    body = await self._async_handler(request, fields)
-                    answer = ANSWER.pack(1, len(body)) + body
+                    answer = serialize_response(await self._async_handler(request, fields))
                 except ServiceException as error:
-                    answer = _refusal(error)
+                    answer = serialize_failure(error)
                 await loop.sock_sendall(sock, answer)
                 connection.busy = False
                 if not persistent:
@@ -258,9 +259,9 @@ class AsyncServiceClient:
 
     async def call(self, request: bytes) -> bytes:
         """Return the response to ``request``. Raises CallFailed where the handler failed, OSError, WireError."""
-        await asyncio.get_running_loop().sock_sendall(self._sock, LENGTH.pack(len(request)) + request)
-        ok, length = ANSWER.unpack(await _receive(self._sock, ANSWER.size))
-        body = await _receive(self._sock, checked(length))
+        await asyncio.get_running_loop().sock_sendall(self._sock, serialize_request(request))
+        ok, length = parse_response_head(await _receive(self._sock, RESPONSE_HEAD))
+        body = await _receive(self._sock, length)
         if not ok:
             raise CallFailed(body)
         return body
@@ -278,19 +279,8 @@ def _is_persistent(fields: Header) -> bool:
     return fields.get("persistent", "").lower() in ("1", "true")
 
 
-def _refusal(error: Exception) -> bytes:
-    text = str(error).encode()
-    return ANSWER.pack(0, len(text)) + text
-
-
 def _never_called(_: memoryview, __: Header) -> bytes:
     raise AssertionError("a service on the loop has no worker")
-
-
-async def _receive_length(sock: socket.socket) -> int:
-    """Return the length of the request that follows. Raise WireError."""
-    (length,) = LENGTH.unpack(await _receive(sock, LENGTH.size))
-    return checked(length)
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:

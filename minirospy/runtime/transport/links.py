@@ -29,6 +29,7 @@ from minirospy.runtime.transport.sockets import (
 )
 from minirospy.wire.framing import (
     CHUNK,
+    LENGTH_BYTES,
     MAX_FRAME,
     SPLIT,
     Frame,
@@ -36,6 +37,7 @@ from minirospy.wire.framing import (
     LargeFrame,
     SplitFrame,
     begins_split,
+    parse_length,
     split_sizes,
 )
 
@@ -416,8 +418,8 @@ class _Source:
         reader = self._reader
         if self._was_large:
             # Another large one is likely: its first bytes are kept out of the small ones' buffer.
-            word = self._take(4)
-            length = int.from_bytes(word, "little")
+            word = self._take(LENGTH_BYTES)
+            length = parse_length(word)
             if length > CHUNK:
                 return (self._large(length),)
             self._was_large = False
@@ -456,7 +458,7 @@ class _Source:
         try:
             if not word & SPLIT:
                 return self._take(size)
-            head_size, tail_size = split_sizes(size, int.from_bytes(self._take(4), "little"))
+            head_size, tail_size = split_sizes(size, parse_length(self._take(LENGTH_BYTES)))
             head, tail = self._take(head_size), self._take(tail_size)
         except MemoryError:
             raise WireError(f"no memory for a message of {size} bytes") from None

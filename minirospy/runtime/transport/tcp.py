@@ -11,7 +11,6 @@ import contextlib
 import errno
 import logging
 import socket
-import struct
 import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from typing import Any
@@ -20,6 +19,7 @@ from minirospy.errors import WireError
 from minirospy.runtime.transport import sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+from minirospy.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_header
 
 __all__ = [
@@ -257,8 +257,9 @@ def _header_at_hand(sock: socket.socket) -> Header | None:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
         return None
-    end = 4 + int.from_bytes(seen[:4], "little")
-    return parse_header(sock.recv(end)[4:]) if 4 < end <= len(seen) else None
+    length = parse_length(seen)
+    end = LENGTH_BYTES + length
+    return parse_header(sock.recv(end)[LENGTH_BYTES:]) if 0 < length <= len(seen) - LENGTH_BYTES else None
 
 
 class _NothingSaidError(WireError):
@@ -266,7 +267,7 @@ class _NothingSaidError(WireError):
 
 
 async def _receive_header(sock: socket.socket) -> Header:
-    (length,) = struct.unpack("<I", await _receive_exactly(sock, 4, _NothingSaidError))
+    length = parse_length(await _receive_exactly(sock, LENGTH_BYTES, _NothingSaidError))
     if length > MAX_HEADER:
         raise WireError(f"a connection header of {length} bytes is not TCPROS")
     return parse_header(await _receive_exactly(sock, length))

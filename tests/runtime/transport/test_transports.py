@@ -20,7 +20,7 @@ import pytest
 from minirospy.environment import Environment
 from minirospy.errors import RpcUnreachable, UsageError, WireError
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.service_client import ANSWER, ServiceClient
+from minirospy.runtime.node.service_client import ServiceClient
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.slave import SlaveApi
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
@@ -31,6 +31,7 @@ from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.tcp import Listener
 from minirospy.wire.framing import Pieces, SplitFrame, serialize_frame
 from minirospy.wire.header import Header, serialize_header
+from minirospy.wire.service import serialize_response
 from minirospy.wire.tcpros import InterfaceType, service_client_header
 from tests.runtime.node.test_topics import STRING, Box, eventually, graph, listen, publish, run
 
@@ -550,7 +551,7 @@ def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(famil
                 sock.settimeout(10)
                 request = before or sock.recv(1000)
                 # An answer that comes with the header, or right behind it, is found.
-                sock.sendall(ANSWER.pack(1, len(request)) + request)
+                sock.sendall(serialize_response(request))
             return before
 
         with ThreadPoolExecutor() as pool:
