@@ -16,6 +16,7 @@ from typing import Any
 from minirospy.environment import Environment
 from minirospy.errors import DeserializationError, ServiceException
 from minirospy.escape import escaped
+from minirospy.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
@@ -29,14 +30,6 @@ __all__ = ["RosoutNode"]
 _log = logging.getLogger(__name__)
 
 _LOG_BYTES = 100 * 1024 * 1024
-_LEVELS = {1: "DEBUG", 2: "INFO", 4: "WARN", 8: "ERROR", 16: "FATAL"}
-_LOGGER_LEVELS = {
-    "debug": logging.DEBUG,
-    "info": logging.INFO,
-    "warn": logging.WARNING,
-    "error": logging.ERROR,
-    "fatal": logging.CRITICAL,
-}
 
 
 class RosoutNode:
@@ -85,21 +78,19 @@ class RosoutNode:
         from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelRequest
 
         async def get_loggers(body: bytes, header: Header) -> bytes:
-            names = [name for name in logging.root.manager.loggerDict if name.startswith("minirospy")]
+            ours = [name for name in logging.root.manager.loggerDict if name.startswith("minirospy")]
+            levels = logger_levels(sorted(ours)).items()
             return _bytes_of(
-                GetLoggersResponse([Logger(_ros_name(name), _level(name)) for name in sorted(names)])
+                GetLoggersResponse([Logger(_ros_name(name), level.lower()) for name, level in levels])
             )
 
         async def set_level(body: bytes, header: Header) -> bytes:
             request = SetLoggerLevelRequest()
             try:
                 request.deserialize(body)
-            except DeserializationError as error:
+                set_logger_level(_python_name(request.logger), request.level)
+            except (DeserializationError, ValueError) as error:
                 raise ServiceException(str(error)) from error
-            level = _LOGGER_LEVELS.get(request.level.lower())
-            if level is None:
-                raise ServiceException(f"[{request.level}] is none of the levels {', '.join(_LOGGER_LEVELS)}")
-            _logger(request.logger).setLevel(level)
             return b""
 
         await self._serve("get_loggers", GetLoggers, get_loggers)
@@ -134,7 +125,7 @@ class RosoutNode:
         stamp = message.header.stamp
         topics = "" if self._omits_topics() else f" [topics: {', '.join(message.topics)}]"
         head = (
-            f"{stamp.secs}.{stamp.nsecs:09d} {_LEVELS.get(message.level, message.level)} {message.name} "
+            f"{stamp.secs}.{stamp.nsecs:09d} {LEVEL_NAMES.get(message.level, message.level)} {message.name} "
             f"[{message.file}:{message.line}({message.function})]{topics} "
         )
         # A text may have several lines, as in the real file; nothing else may.
@@ -152,13 +143,6 @@ def _ros_name(name: str) -> str:
     return "ros" + name.removeprefix("minirospy")
 
 
-def _logger(ros_name: str) -> logging.Logger:
+def _python_name(ros_name: str) -> str:
     is_ours = ros_name == "ros" or ros_name.startswith("ros.")
-    return logging.getLogger("minirospy" + ros_name[3:] if is_ours else ros_name)
-
-
-def _level(name: str) -> str:
-    level = logging.getLogger(name).getEffectiveLevel()
-    return next(
-        word for word, number in reversed(_LOGGER_LEVELS.items()) if number <= max(level, logging.DEBUG)
-    )
+    return "minirospy" + ros_name[3:] if is_ours else ros_name

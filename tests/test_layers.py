@@ -20,7 +20,7 @@ LAYERS = [
     {"client", "aio", "rosout"},
     {"runtime"},
     {"graph", "wire", "idl", "tf2", "gpio", "bag", "urdf"},
-    {"clock", "environment", "names", "private_files", "scanner", "steps", "times"},
+    {"clock", "environment", "log_levels", "names", "private_files", "scanner", "steps", "times"},
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

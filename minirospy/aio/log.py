@@ -9,9 +9,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from minirospy.aio.topics import Publisher
-from minirospy.errors import (
-    ROSSerializationException,
-)
+from minirospy.errors import ROSSerializationException
+from minirospy.log_levels import SEVERITIES, ros_level
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log
@@ -24,15 +23,13 @@ __all__ = ["RosoutHandler", "TerminalHandler"]
 class TerminalHandler(logging.Handler):
     """Lines as rospy prints them: debug and info to stdout, the rest to stderr."""
 
-    _NAMES = {logging.WARNING: "WARN", logging.CRITICAL: "FATAL"}
-
     def __init__(self, node: Node) -> None:
         super().__init__()
         self._node = node
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one line."""
-        name = self._NAMES.get(record.levelno, record.levelname)
+        name = SEVERITIES.get(record.levelno, record.levelname)
         stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
         # There may be no terminal any more, which is no fault of the program.
         with contextlib.suppress(OSError, ValueError):
@@ -42,8 +39,6 @@ class TerminalHandler(logging.Handler):
 
 class RosoutHandler(logging.Handler):
     """Log records to /rosout."""
-
-    _LEVELS = ((logging.CRITICAL, 16), (logging.ERROR, 8), (logging.WARNING, 4), (logging.INFO, 2))
 
     def __init__(self, node: Node, publisher: Publisher[Log], message_class: type[Log]) -> None:
         super().__init__()
@@ -58,7 +53,7 @@ class RosoutHandler(logging.Handler):
             return
         message = self._message_class()
         message.header.stamp = self._node.now()
-        message.level = next((level for least, level in self._LEVELS if record.levelno >= least), 1)
+        message.level = ros_level(record.levelno)
         message.name = self._node.name
         message.msg = self.format(record)
         message.file = os.path.basename(record.pathname)

@@ -21,6 +21,18 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
 from minirospy import times
 from minirospy.client.session import current_session
 from minirospy.clock import SimulatedClock
+from minirospy.log_levels import (
+    DEBUG,
+    ERROR,
+    FATAL,
+    INFO,
+    PYTHON_LEVELS,
+    SEVERITIES,
+    WARN,
+    logger_levels,
+    ros_level,
+    set_logger_level,
+)
 
 if TYPE_CHECKING:
     from typing import TypedDict
@@ -44,7 +56,6 @@ __all__ = [
     "ERROR",
     "FATAL",
     "INFO",
-    "PYTHON_LEVELS",
     "WARN",
     "RosOutHandler",
     "RosStreamHandler",
@@ -73,24 +84,6 @@ __all__ = [
     "start",
 ]
 
-DEBUG, INFO, WARN, ERROR, FATAL = 1, 2, 4, 8, 16
-"""The levels of rosgraph_msgs/Log, as ``init_node(log_level=...)`` takes them."""
-
-PYTHON_LEVELS = {
-    DEBUG: logging.DEBUG,
-    INFO: logging.INFO,
-    WARN: logging.WARNING,
-    ERROR: logging.ERROR,
-    FATAL: logging.CRITICAL,
-}
-_LEVEL_NAME = {
-    logging.DEBUG: "DEBUG",
-    logging.INFO: "INFO",
-    logging.WARNING: "WARN",
-    logging.ERROR: "ERROR",
-    logging.CRITICAL: "FATAL",
-}
-_ROS_LEVEL = {python: ros for ros, python in PYTHON_LEVELS.items()}
 _COLOUR = {
     logging.DEBUG: "\033[32m",
     logging.WARNING: "\033[33m",
@@ -199,23 +192,14 @@ def _offer_logger_services() -> None:
     from minirospy.client.services import Service
 
     def get_loggers(request: object) -> GetLoggersResponse:
-        levels = {
-            name: logging.getLogger(name).getEffectiveLevel()
-            for name in sorted(logging.root.manager.loggerDict)
-        }
-        found = [Logger(name, _LEVEL_NAME[_known_level(level)]) for name, level in levels.items()]
-        return GetLoggersResponse(found)
+        levels = logger_levels(sorted(logging.root.manager.loggerDict))
+        return GetLoggersResponse([Logger(*each) for each in levels.items()])
 
     def set_level(request: SetLoggerLevelRequest) -> SetLoggerLevelResponse:
-        level = {name.lower(): number for number, name in _LEVEL_NAME.items()}.get(request.level.lower())
-        if level is None:
-            _log.error(
-                "log level [%s] of logger [%s] is none of debug, info, warn, error, fatal",
-                request.level,
-                request.logger,
-            )
-        else:
-            logging.getLogger(request.logger).setLevel(level)
+        try:
+            set_logger_level(request.logger, request.level)
+        except ValueError as error:
+            _log.error("log level of logger [%s]: %s", request.logger, error)
         return SetLoggerLevelResponse()
 
     Service("~get_loggers", GetLoggers, get_loggers)
@@ -296,7 +280,7 @@ class RosOutHandler(_DeferringHandler):
             message = self._publisher.data_class()
             stamp = message.header.stamp
             stamp.secs, stamp.nsecs = divmod(session.clock.now(), 10**9)
-            message.level = _ROS_LEVEL[_known_level(record.levelno)]
+            message.level = ros_level(record.levelno)
             message.name = session.name
             message.msg = _message(record)
             message.file = record.filename
@@ -386,11 +370,6 @@ def _warn(text: str) -> None:
     print(f"WARNING: {text}", file=sys.stderr)
 
 
-def _known_level(level: int) -> int:
-    """Return the nearest of the five levels at or below a level of Python's."""
-    return max((known for known in _LEVEL_NAME if known <= level), default=logging.DEBUG)
-
-
 def _message(record: logging.LogRecord) -> str:
     text = record.getMessage()
     if record.exc_info and not record.exc_text:
@@ -400,7 +379,7 @@ def _message(record: logging.LogRecord) -> str:
 
 def _line(record: logging.LogRecord) -> str:
     message = _message(record)
-    severity = _LEVEL_NAME.get(record.levelno, record.levelname)
+    severity = SEVERITIES.get(record.levelno, record.levelname)
     template = os.environ.get("ROSCONSOLE_FORMAT")
     if not template or template == _DEFAULT_FORMAT:
         return f"[{severity}] [{_stamp(record)}]: {message}"
@@ -482,7 +461,7 @@ def _log_function(level: int, name: str) -> LogFunction:
         if logger.isEnabledFor(level):
             _write(logger, level, sys._getframe(1), msg, args, **kwargs)
 
-    return _named(log, name, f"Log ``msg % args`` at level {_LEVEL_NAME[level]}.")
+    return _named(log, name, f"Log ``msg % args`` at level {SEVERITIES[level]}.")
 
 
 class _Places:
@@ -532,7 +511,7 @@ def _once_function(level: int, name: str) -> LogFunction:
             if _places.is_first(frame):
                 _write(logger, level, frame, msg, args, **kwargs)
 
-    return _named(log, name, f"Log at level {_LEVEL_NAME[level]}, from this place in the code only once.")
+    return _named(log, name, f"Log at level {SEVERITIES[level]}, from this place in the code only once.")
 
 
 def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLogFunction:
@@ -555,7 +534,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
             _write(logger, level, frame, msg, args, **kwargs)
 
     what = "the same text " if identical else ""
-    return _named(log, name, f"Log at level {_LEVEL_NAME[level]}, {what}at most once in ``period`` seconds.")
+    return _named(log, name, f"Log at level {SEVERITIES[level]}, {what}at most once in ``period`` seconds.")
 
 
 def _named(function: _F, name: str, doc: str) -> _F:

@@ -25,6 +25,7 @@ from minirospy.cli.parser import Misuse, Parser, attach_completer
 from minirospy.cli.verbs import Command
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
+from minirospy.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.rosout import RosoutNode
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.master.master import Master
@@ -40,14 +41,6 @@ _LOG_BYTES = 10 * 1024 * 1024
 
 _RECOVERY_SECONDS = 15.0
 """Within this a master that was just started answers, also on a busy machine with much to recover."""
-
-_LEVELS = {
-    "debug": logging.DEBUG,
-    "info": logging.INFO,
-    "warn": logging.WARNING,
-    "error": logging.ERROR,
-    "fatal": logging.CRITICAL,
-}
 
 
 class _Options(NamedTuple):
@@ -114,7 +107,7 @@ def _parser(name: str) -> Parser:
     )
     add(
         "--master-logger-level",
-        choices=_LEVELS,
+        choices=[name.lower() for name in LEVEL_NAMES.values()],
         metavar="MASTER_LOGGER_LEVEL",
         help="set rosmaster.master logger level ('debug', 'info', 'warn', 'error', 'fatal')",
     )
@@ -476,7 +469,7 @@ def _log_to_file(
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")
-    logger.setLevel(_LEVELS[level or "info"])
+    set_logger_level(logger.name, level or "info")
     file = None
     try:
         folder.mkdir(parents=True, exist_ok=True)

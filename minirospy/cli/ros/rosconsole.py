@@ -18,6 +18,7 @@ from minirospy.introspect.graph import Graph
 from minirospy.introspect.loggers import logger_level, logger_levels, set_logger_level
 from minirospy.introspect.nodes import list_nodes
 from minirospy.introspect.topics import find_topic
+from minirospy.log_levels import LEVEL_NAMES
 
 if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILY", "main"]
 
-_LEVELS = {"debug": 1, "info": 2, "warn": 4, "error": 8, "fatal": 16}
+_LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}
 """Names -> the levels of rosgraph_msgs/Log."""
 
 _COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}
