@@ -167,7 +167,7 @@ def is_shutdown() -> bool:
 
 def on_shutdown(h: Callable[[], object]) -> None:
     """Call ``h`` when the node shuts down, before it leaves the graph. Raises TypeError."""
-    current_session().lifecycle.on_shutdown(h)
+    current_session().lifecycle.add_hook(h)
 
 
 def signal_shutdown(reason: object) -> None:

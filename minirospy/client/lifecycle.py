@@ -6,20 +6,20 @@ Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 from __future__ import annotations
 
 import contextlib
+import enum
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator
-from typing import TypeVar
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
 
 from minirospy import errors
 from minirospy.client.shutdown import Phase, ShutdownMachine, ThreadState
 from minirospy.clock import SignalSafeEvent, wait_for_event
 
-__all__ = ["Deferral", "Lifecycle", "ROSInterruptException"]
+__all__ = ["Deferral", "Lifecycle", "ROSInterruptException", "Stage"]
 
-_Hook = TypeVar("_Hook", bound=Callable[..., object])
-_TOO_LATE = "already shutdown"
+_Hook: TypeAlias = Callable[..., object]
 _log = logging.getLogger(__name__)
 
 
@@ -77,44 +77,62 @@ class Deferral:
             self._depth = depth
 
 
+class Stage(enum.Enum):
+    """When a shutdown hook runs."""
+
+    FIRST = enum.auto()
+    """While is_shutdown() is false; without an argument."""
+    BEFORE = enum.auto()
+    """After those, still before is_shutdown() is true; with the reason of the shutdown."""
+    AFTER = enum.auto()
+    """Once is_shutdown() is true, before the node leaves the graph; with the reason."""
+
+
 class Lifecycle:
     """From the first hook to the last: what runs when the node shuts down, and in which order."""
 
-    def __init__(self, leave: Callable[[], object], *, is_down: bool = False) -> None:
-        """``leave()`` takes the node out of the graph. ``is_down``: in a fork of a process that has shut down."""
+    def __init__(
+        self,
+        leave: Callable[[], object],
+        stop_leaving: Callable[[], object] = lambda: None,
+        *,
+        is_down: bool = False,
+    ) -> None:
+        """``leave()`` takes the node out of the graph, ``stop_leaving()`` lets it return without the master's answer.
+
+        ``is_down``: in a fork of a process that has shut down.
+        """
         self._leave = leave
+        self.stop_leaving = stop_leaving
         self._lock = threading.RLock()
         self.shutting_down = SignalSafeEvent()
         """Set once the shutdown hooks have run: every blocking call ends."""
+        if is_down:
+            self.shutting_down.set()
         self.left = SignalSafeEvent()
         """Set once the node has left the graph."""
+
         self.deferral = Deferral()
-        self.hooks: list[Callable[[], object]] = []
+        self.hooks: list[_Hook] = []
         """What on_shutdown was given."""
-        self._hooks_before: list[Callable[[object], object]] = []
-        self._hooks_after: list[Callable[[object], object]] = []
+        self._hooks: dict[Stage, list[_Hook]] = {Stage.FIRST: self.hooks, Stage.BEFORE: [], Stage.AFTER: []}
         self._interrupts: list[Callable[[], object]] = []
+
         self._main = ThreadState()
         self._thread = threading.local()
         self.machine = ShutdownMachine(self._main)
         # A lock, since it is claimed in one step: a signal's handler may come between any two.
         self._claim = threading.Lock()
-        if is_down:
-            self.shutting_down.set()
 
-    # --- the shutdown
-
-    def on_shutdown(self, hook: Callable[[], object]) -> None:
-        """Call ``hook`` when the node shuts down, before it leaves the graph. Raises TypeError."""
-        self._add_hook(self.hooks, hook, ())
-
-    def before_shutdown(self, hook: Callable[[object], object]) -> None:
-        """Call ``hook(reason)`` after the hooks of :meth:`on_shutdown`, still before is_shutdown() is true."""
-        self._add_hook(self._hooks_before, hook, (_TOO_LATE,))
-
-    def after_shutdown(self, hook: Callable[[object], object]) -> None:
-        """Call ``hook(reason)`` once is_shutdown() is true, before the node leaves the graph."""
-        self._add_hook(self._hooks_after, hook, (_TOO_LATE,))
+    def add_hook(self, hook: _Hook, stage: Stage = Stage.FIRST) -> None:
+        """Call ``hook`` when the node shuts down, or now where it has. Raises TypeError."""
+        if not callable(hook):
+            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
+        with self._lock:
+            if not self.is_shutdown():
+                self._hooks[stage].append(hook)
+                return
+        hook(*(() if stage is Stage.FIRST else ("already shutdown",)))
 
     def signal_shutdown(self, reason: object) -> bool:
         """Shut the node down: hooks run in this thread, blocking calls end, the node leaves the graph.
@@ -129,13 +147,13 @@ class Lifecycle:
             try:
                 self.machine.runs_in_main = _is_main()
                 self.machine.phase = Phase.HOOKS
-                self._run_hooks(self.hooks, ())
-                self._run_hooks(self._hooks_before, (reason,))
+                self._run_hooks(Stage.FIRST)
+                self._run_hooks(Stage.BEFORE, reason)
                 with self._lock:
                     # A hook that is added from now on is called immediately.
                     self.shutting_down.set()
                 self.machine.phase = Phase.DOWN
-                self._run_hooks(self._hooks_after, (reason,))
+                self._run_hooks(Stage.AFTER, reason)
             finally:
                 # Also where an exception ends a hook.
                 self.shutting_down.set()
@@ -174,10 +192,8 @@ class Lifecycle:
         state.polls = state.polled = True
         if self.deferral.pending:
             self.deferral.poll()
-        if not self.shutting_down.is_set():
-            return False
-        state.notified = True
-        return True
+        state.notified = state.notified or self.shutting_down.is_set()
+        return self.shutting_down.is_set()
 
     def check_interrupted_sleep(self) -> None:
         """Notify the calling thread, whose sleep a shutdown has cut short. Raises ROSInterruptException.
@@ -186,15 +202,20 @@ class Lifecycle:
         it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
         """
         state = self.thread_state
-        if state.polled:
-            state.polled = False
-            return
-        raise self.interrupted("ROS shutdown request")
+        if not state.polled:
+            raise self.interrupted("ROS shutdown request")
+        state.polled = False
 
     def interrupted(self, text: str) -> ROSInterruptException:
         """Return the error that notifies the calling thread of the shutdown, for it to raise."""
         self.thread_state.notified = True
         return ROSInterruptException(text)
+
+    def is_interrupt(self, error: BaseException) -> bool:
+        """Return whether an error that ends the program, or a thread of it, is the one that was to interrupt it."""
+        if isinstance(error, KeyboardInterrupt) and self.machine.signals:
+            return True
+        return isinstance(error, errors.ROSInterruptException) and self.is_shutdown()
 
     @property
     def thread_state(self) -> ThreadState:
@@ -207,37 +228,29 @@ class Lifecycle:
 
     # --- helpers
 
+    def _run_hooks(self, stage: Stage, *reason: object) -> None:
+        # A hook may add another: it runs last.
+        for hook in self._hooks[stage]:
+            try:
+                with self.deferral.lifted():
+                    hook(*reason)
+            except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
+                # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
+                if type(error) is not KeyboardInterrupt:
+                    with contextlib.suppress(OSError, ValueError):
+                        traceback.print_exc()
+
     def _finish(self) -> None:
         """End what blocks, and leave the graph."""
         for interrupt in list(self._interrupts):
             with contextlib.suppress(Exception):
                 interrupt()
         try:
+            self.machine.phase = Phase.LEAVING
             self._leave()
         finally:
             self.machine.phase = Phase.LEFT
             self.left.set()
-
-    def _add_hook(self, hooks: list[_Hook], hook: _Hook, given: tuple[object, ...]) -> None:
-        if not callable(hook):
-            raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        with self._lock:
-            if not self.is_shutdown():
-                hooks.append(hook)
-                return
-        hook(*given)
-
-    def _run_hooks(self, hooks: Iterable[Callable[..., object]], given: tuple[object, ...]) -> None:
-        # A hook may add another: it runs last.
-        for hook in hooks:
-            try:
-                with self.deferral.lifted():
-                    hook(*given)
-            except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-                # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
-                if type(error) is not KeyboardInterrupt:
-                    with contextlib.suppress(OSError, ValueError):
-                        traceback.print_exc()
 
 
 class _Interrupting:

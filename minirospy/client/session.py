@@ -45,7 +45,9 @@ class Session:
         self.is_fork = is_fork
         self.identity: Identity = Identity(previous.identity if previous else None)
         self.lifecycle = Lifecycle(
-            self._leave, is_down=is_fork and previous is not None and previous.is_shutdown()
+            self._leave,
+            self._stop_leaving,
+            is_down=is_fork and previous is not None and previous.is_shutdown(),
         )
         self.signals = SignalWatchdog(self.lifecycle, self._is_sending)
         self.lock = threading.RLock()
@@ -203,12 +205,17 @@ class Session:
         """Leave the graph. Takes as long as the master answers: see Node.close(), which sets the limits."""
         if self._opened and self._loop:
             try:
-                self._loop.run(self._opened.close())
+                # After a signal the watchdog prints what is waited for.
+                self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
             self._loop.close()
         if self._master:
             self._master.close()
+
+    def _stop_leaving(self) -> None:
+        if self._opened:
+            self.post(self._opened.stop_unregistering)
 
     def _is_sending(self) -> bool:
         return self._opened is not None and self._opened.is_sending

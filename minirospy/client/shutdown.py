@@ -19,8 +19,10 @@ class Phase(enum.IntEnum):
     HOOKS = 1
     """The shutdown hooks run; is_shutdown() is still false."""
     DOWN = 2
-    """is_shutdown() is true, blocking calls end, the node unregisters."""
-    LEFT = 3
+    """is_shutdown() is true, blocking calls end."""
+    LEAVING = 3
+    """The node waits for the master to unregister it."""
+    LEFT = 4
     """The master does not know the node any more."""
 
 
@@ -33,6 +35,8 @@ class Action(enum.Enum):
     """Raise ROSInterruptException in the main thread."""
     KEYBOARD_INTERRUPT = enum.auto()
     """Raise KeyboardInterrupt in the main thread."""
+    STOP_LEAVING = enum.auto()
+    """Wait for the master no longer."""
     REPORT = enum.auto()
     """Print what the process still waits for."""
     EXIT = enum.auto()
@@ -52,9 +56,6 @@ class ThreadState:
         self.notified = False
         """Whether it was notified, by is_shutdown() or an exception: what it does now is its clean-up."""
 
-
-_BY_COUNT: Mapping[int, Action | None] = {1: None, 2: Action.KEYBOARD_INTERRUPT}
-"""What the first and second signal cause beyond the shutdown; each further one ends the process."""
 
 _DELAYS: Mapping[Action, float] = {Action.RUN_HOOKS: 0.5, Action.INTERRUPT: 0.5, Action.REPORT: 2.0}
 """Seconds between the cause of an action and the action."""
@@ -79,13 +80,22 @@ class ShutdownMachine:
         """When the main thread could first notice that is_shutdown() is true."""
         self._taken: set[Action] = set()
 
-    def signal(self, now: float) -> Action | None:
+    def signal(self, now: float) -> list[Action]:
         """Count a signal of the user's and return what it causes beyond the shutdown."""
         self.signals += 1
         if self._signalled is None:
             self._signalled = now
 
-        return _BY_COUNT.get(self.signals, Action.EXIT)
+        if self.signals == 1:
+            return []
+        if self.signals > 2:
+            return [Action.EXIT]
+        actions = [Action.STOP_LEAVING] if self.phase is Phase.LEAVING else []
+        if not (actions and self.runs_in_main):
+            # Else the main thread is in no code of the program's.
+            actions.append(Action.KEYBOARD_INTERRUPT)
+        self._taken.update(actions)
+        return actions
 
     def tick(self, now: float) -> list[Action]:
         """Return what is due; each action once."""
@@ -109,12 +119,11 @@ class ShutdownMachine:
         expected: list[tuple[Action, float]] = []
         if self.phase is Phase.RUNNING:
             expected.append((Action.RUN_HOOKS, self._signalled))
-        if self.phase is not Phase.DOWN:
-            # There the node waits for its master, and says so itself.
-            expected.append((Action.REPORT, self._signalled))
-        if self._free is not None and self.signals == 1 and not self._main_ends_by_itself():
+        expected.append((Action.REPORT, self._signalled))
+        if self._free is not None and not self._main_ends_by_itself():
             expected.append((Action.INTERRUPT, max(self._signalled, self._free)))
         return [(action, cause) for action, cause in expected if action not in self._taken]
 
     def _main_ends_by_itself(self) -> bool:
-        return self.main.polls or self.main.notified or self.main_has_ended
+        was_interrupted = Action.KEYBOARD_INTERRUPT in self._taken
+        return self.main.polls or self.main.notified or self.main_has_ended or was_interrupted

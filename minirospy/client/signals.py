@@ -14,16 +14,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 
+from minirospy.client.exit_messages import what_runs
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
-from minirospy.client.shutdown import Action
-from minirospy.errors import ROSInterruptException as PlainInterruptException
+from minirospy.client.shutdown import Action, Phase
 
-__all__ = ["SignalWatchdog", "suppress_interrupt_tracebacks"]
+__all__ = ["SignalWatchdog"]
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-_HANDLED, _NUMBER = 0x80, 0x7F
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
@@ -54,26 +53,29 @@ class SignalWatchdog:
         self._sending: socket.socket | None = None
         self._arrived = self._handled = self._nudges = 0
 
+    @property
+    def is_installed(self) -> bool:
+        """Whether the signals shut the node down."""
+        return self._sending is not None
+
     def install(self) -> None:
         """Let the signals shut the node down. Only the main thread can install handlers; without effect in another."""
         if threading.current_thread() is not threading.main_thread():
             return
 
-        for name in _NAMES:
-            number = getattr(signal, name, None)
-            if number is None or (handler := signal.getsignal(number)) == self._on_signal:
-                continue
-            if name == "SIGHUP" and handler == signal.SIG_IGN:
-                # As nohup has it.
-                continue
-            self._previous[number] = handler
-            signal.signal(number, self._on_signal)
+        for name in [name for name in _NAMES if hasattr(signal, name)]:
+            number = getattr(signal, name)
+            handler = signal.getsignal(number)
+            # nohup ignores SIGHUP, which stays so.
+            if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
+                self._previous[number] = handler
+                signal.signal(number, self._on_signal)
 
         if self._sending is None:
             receiving, self._sending = socket.socketpair()
             self._sending.setblocking(False)
             threading.Thread(
-                target=self._run, args=(receiving,), name="minirospy-signals", daemon=True
+                target=self._watch, args=(receiving,), name="minirospy-signals", daemon=True
             ).start()
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
@@ -93,11 +95,6 @@ class SignalWatchdog:
             self._sending.close()
             self._sending = None
 
-    @property
-    def is_installed(self) -> bool:
-        """Whether the signals shut the node down."""
-        return self._sending is not None
-
     def flush_at_exit(self) -> None:
         """Write what the program has printed while Ctrl-C still works; from here on the third is the system's business."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -112,7 +109,12 @@ class SignalWatchdog:
     def _on_signal(self, number: int, _: FrameType | None) -> None:
         self._number = number
         self._deferral.pending = True
-        self._send(_HANDLED | number)
+        self._handled += 1
+        if self._sending is not None:
+            # Wakes the watchdog also where an event loop has taken the file descriptor. No signal has the number 0.
+            with contextlib.suppress(OSError):
+                self._sending.send(b"\0")
+
         is_nudge, self._is_nudge = self._is_nudge, False
         if is_nudge and not self._deferral.is_active and not self._is_sending():
             self._dispatch()
@@ -136,16 +138,8 @@ class SignalWatchdog:
 
     # --- the watchdog thread
 
-    def _run(self, receiving: socket.socket) -> None:
-        perform: dict[Action, Callable[[], object]] = {
-            Action.RUN_HOOKS: self._run_hooks,
-            Action.INTERRUPT: lambda: self._interrupt(
-                ROSInterruptException("the program was signalled to end")
-            ),
-            Action.KEYBOARD_INTERRUPT: lambda: self._interrupt(KeyboardInterrupt()),
-            Action.REPORT: self._report,
-            Action.EXIT: lambda: os._exit(_EXIT_STATUS),
-        }
+    def _watch(self, receiving: socket.socket) -> None:
+        """Feed the state machine with signals and time, and perform its actions, until :meth:`release`."""
         machine, deferral = self._machine, self._deferral
         now = deferred_at = 0.0
         with receiving:
@@ -158,10 +152,9 @@ class SignalWatchdog:
                 now += min(time.monotonic() - started, _MAX_STEP)
 
                 machine.main_has_ended = not threading.main_thread().is_alive()
-                actions = [machine.signal(now) for _ in range(self._new_signals())]
-                for action in [*actions, *machine.tick(now)]:
-                    if action is not None:
-                        perform[action]()
+                for _ in range(self._new_signals()):
+                    self._perform(machine.signal(now))
+                self._perform(machine.tick(now))
 
                 if not deferral.pending:
                     deferred_at = now
@@ -169,19 +162,16 @@ class SignalWatchdog:
                     self._nudge()
 
     def _receive(self, receiving: socket.socket) -> bool:
-        """Count what signals have written; return False at the end."""
+        """Count the signals that have arrived; return False at the end."""
         try:
             data = receiving.recv(64)
         except TimeoutError:
             return True
         except OSError:
             return False
-        for byte in data:
-            number = byte & _NUMBER
-            if byte & _HANDLED:
-                self._handled += 1
-            elif number in self._previous and signal.getsignal(number) == self._on_signal:
-                self._arrived += 1
+        self._arrived += sum(
+            number in self._previous and signal.getsignal(number) == self._on_signal for number in data
+        )
         return bool(data)
 
     def _new_signals(self) -> int:
@@ -191,11 +181,24 @@ class SignalWatchdog:
         """
         return max(0, max(self._arrived, self._handled) - self._nudges - self._machine.signals)
 
-    def _run_hooks(self) -> None:
-        reason = f"signal-{self._number}"
-        threading.Thread(
-            target=self._lifecycle.signal_shutdown, args=(reason,), name="minirospy-shutdown", daemon=True
-        ).start()
+    def _perform(self, actions: list[Action]) -> None:
+        for action in actions:
+            match action:
+                case Action.RUN_HOOKS:
+                    run, reason = self._lifecycle.signal_shutdown, f"signal-{self._number}"
+                    threading.Thread(
+                        target=run, args=(reason,), name="minirospy-shutdown", daemon=True
+                    ).start()
+                case Action.INTERRUPT:
+                    self._interrupt(ROSInterruptException("the program was signalled to end"))
+                case Action.KEYBOARD_INTERRUPT:
+                    self._interrupt(KeyboardInterrupt())
+                case Action.STOP_LEAVING:
+                    self._lifecycle.stop_leaving()
+                case Action.REPORT:
+                    self._report()
+                case Action.EXIT:
+                    os._exit(_EXIT_STATUS)
 
     def _interrupt(self, error: BaseException) -> None:
         self._error = error
@@ -216,70 +219,12 @@ class SignalWatchdog:
                 signal.pthread_kill(threading.main_thread().ident or 0, self._number)
 
     def _report(self) -> None:
-        text = f"shutdown: still waiting for {_what_runs()}. Press Ctrl-C again to interrupt it, and a third time to end"
+        is_leaving = self._machine.phase is Phase.LEAVING
+        what = "the master to unregister this node" if is_leaving else what_runs()
+        text = (
+            f"shutdown: still waiting for {what}. Press Ctrl-C again to interrupt it, and a third time to end"
+        )
         # There may be no terminal any more.
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stderr.write(f"{text} the process\n")
             sys.stderr.flush()
-
-    def _send(self, byte: int) -> None:
-        if self._sending is not None:
-            with contextlib.suppress(OSError):
-                self._sending.send(bytes([byte]))
-
-
-def suppress_interrupt_tracebacks(lifecycle: Callable[[], Lifecycle]) -> None:
-    """Let a program, or a thread of it, that does not catch what interrupts it end without a traceback, with status 0.
-
-    ``lifecycle()`` is that of the process at the time.
-    """
-    hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
-
-    def is_expected(error: BaseException | None) -> bool:
-        # An interrupted wait may find its lock not acquired, which is a RuntimeError.
-        while error is not None:
-            if isinstance(error, PlainInterruptException) and lifecycle().is_shutdown():
-                return True
-            if isinstance(error, KeyboardInterrupt) and lifecycle().machine.signals:
-                return True
-            error = error.__context__ if isinstance(error, RuntimeError) else None
-        return False
-
-    def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        if is_expected(error):
-            raise SystemExit(0)
-        hooks[0](kind, error, trace)
-
-    def of_thread(arguments: threading.ExceptHookArgs) -> None:
-        if not is_expected(arguments.exc_value):
-            hooks[1](arguments)
-
-    def of_exit(arguments: sys.UnraisableHookArgs) -> None:
-        if not is_expected(arguments.exc_value):
-            hooks[2](arguments)
-
-    sys.excepthook, threading.excepthook, sys.unraisablehook = of_main, of_thread, of_exit
-
-
-def _what_runs() -> str:
-    """Return the thread or process that keeps this process, and where it is."""
-    main = threading.main_thread()
-    threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
-    frames = sys._current_frames()
-    for thread in threads:
-        if thread.is_alive() and (place := _place(frames.get(thread.ident or 0))):
-            return f"thread {thread.name} at {place}"
-    # A main thread that runs no code of the program's waits at its exit.
-    if len(threads) > 1:
-        return f"thread {threads[1].name}"
-    loaded = sys.modules.get("multiprocessing")
-    children = loaded.active_children() if loaded else []
-    return f"process {children[0].name} ({children[0].pid})" if children else "the exit of the program"
-
-
-def _place(frame: FrameType | None) -> str:
-    """Return file:line of the program's own code that is innermost; "" where there is none."""
-    libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
-    while frame is not None and frame.f_code.co_filename.startswith(libraries):
-        frame = frame.f_back
-    return f"{frame.f_code.co_filename}:{frame.f_lineno}" if frame else ""

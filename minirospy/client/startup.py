@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 
 from minirospy import names
 from minirospy.client import log
+from minirospy.client.exit_messages import suppress_tracebacks
 from minirospy.client.identity import private_parameters
 from minirospy.client.session import Session, current_session, replace_session_in_fork
-from minirospy.client.signals import suppress_interrupt_tracebacks
 from minirospy.client.subscriber import Subscriber
 from minirospy.clock import SimulatedClock, wait_for_event
 from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
@@ -124,7 +124,7 @@ def _release_previous(session: Session) -> None:
 @functools.cache
 def _install_process_hooks() -> None:
     """Install, once for all sessions of the process, what its exit, its forks and its interrupts need."""
-    suppress_interrupt_tracebacks(lambda: current_session().lifecycle)
+    suppress_tracebacks(lambda error: current_session().lifecycle.is_interrupt(error))
     atexit.register(lambda: current_session().shut_down_at_exit())
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []

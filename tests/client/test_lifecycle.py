@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import re
@@ -10,15 +11,18 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
 import pytest
 
 from minirospy.errors import RpcRefused
+from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
 
@@ -336,6 +340,57 @@ finally:
     assert (process.returncode, output) == (130, "")
 
 
+LEAVES = """
+import sys, time
+import rospy
+from std_msgs.msg import Bool
+rospy.init_node("leaves")
+rospy.Publisher("t", Bool, queue_size=1)
+print("ready", flush=True)
+try:
+    {}
+finally:
+    print("finally", flush=True)
+"""
+
+
+@contextlib.contextmanager
+def master_that_stops(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], object]]:
+    """Run a master; what is yielded stops it: it accepts connections, and answers nothing."""
+    loop, go_on = LoopThread("test-master"), threading.Event()
+    serving = Master()
+    loop.run(serving.start())
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{serving.port}")
+    try:
+        yield lambda: loop.post(go_on.wait)
+    finally:
+        go_on.set()
+        loop.run(serving.close(), 30.0)
+        loop.close()
+
+
+@POSIX_ONLY
+@pytest.mark.parametrize("body", ["rospy.spin()", "while True: time.sleep(0.1); rospy.loginfo('')"])
+def test_a_second_signal_ends_the_wait_for_a_silent_master(
+    body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with master_that_stops(monkeypatch) as stop:
+        process = start(LEAVES.format(body))
+        stop()
+        process.send_signal(signal.SIGINT)
+        assert process.stderr
+        assert process.stderr.readline() == (
+            "shutdown: still waiting for the master to unregister this node. "
+            "Press Ctrl-C again to interrupt it, and a third time to end the process\n"
+        )
+        begun = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=GUARD)
+        assert (process.returncode, output.splitlines()[-1], errors) == (0, "finally", "")
+        # Ten seconds is the limit for a master that is silent.
+        assert time.monotonic() - begun < 7.0
+
+
 @POSIX_ONLY
 def test_a_signal_at_any_moment_of_init_node(master: str) -> None:
     """It may come between any two steps: nothing is printed, and nothing stays behind in the master."""
@@ -610,6 +665,7 @@ print("ends")
 def test_other_start_methods(master: str, tmp_path: Path, method: str) -> None:
     script = tmp_path / "program.py"
     script.write_text(f"""
+import contextlib
 import multiprocessing
 import rospy
 

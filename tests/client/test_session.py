@@ -35,7 +35,7 @@ def test_the_next_session_keeps_name_clock_and_listeners_alone(session: Session)
     session.has_time = True
     session.parameter_listeners.append(print)
     session.init_arguments = ("one",)
-    session.lifecycle.on_shutdown(lambda: None)
+    session.lifecycle.add_hook(lambda: None)
     session.lifecycle.signal_shutdown("test")
 
     replace_session()
@@ -52,7 +52,7 @@ def test_the_next_session_keeps_name_clock_and_listeners_alone(session: Session)
 @pytest.mark.parametrize("was_down", [False, True])
 def test_a_fork_keeps_the_state_and_not_the_hooks(session: Session, *, was_down: bool) -> None:
     ran: list[str] = []
-    session.lifecycle.on_shutdown(lambda: ran.append("hook of the parent"))
+    session.lifecycle.add_hook(lambda: ran.append("hook of the parent"))
     if was_down:
         session.lifecycle.signal_shutdown("test")
         ran.clear()

@@ -33,7 +33,7 @@ def test_nothing_happens_without_a_signal(machine: ShutdownMachine) -> None:
 
 
 def test_a_main_thread_that_goes_on_is_interrupted_once_and_reported(machine: ShutdownMachine) -> None:
-    assert machine.signal(10.0) is None
+    assert machine.signal(10.0) == []
     machine.phase = Phase.HOOKS
     assert timeline(machine, 10.0, 10.2) == []
     machine.phase = Phase.LEFT
@@ -57,11 +57,30 @@ def test_interrupt_waits_while_the_main_thread_unregisters(
 ) -> None:
     machine.runs_in_main = True
     machine.signal(0.0)
-    machine.phase = Phase.DOWN
-    # Meanwhile the node reports that it waits for its master.
-    assert timeline(machine, 0.0, 4.9) == []
+    machine.phase = Phase.LEAVING
+    assert timeline(machine, 0.0, 4.9) == [(2.0, Action.REPORT)]
     machine.phase = Phase.LEFT
-    assert timeline(machine, 5.0, 10.0) == [(5.0, Action.REPORT), (5.5, Action.INTERRUPT)]
+    assert timeline(machine, 5.0, 10.0) == [(5.5, Action.INTERRUPT)]
+
+
+def test_a_second_signal_ends_the_wait_for_the_master_alone(machine: ShutdownMachine) -> None:
+    machine.runs_in_main = True
+    machine.signal(0.0)
+    machine.phase = Phase.LEAVING
+    assert machine.signal(1.0) == [Action.STOP_LEAVING]
+    machine.phase = Phase.LEFT
+    # A main thread that goes on regardless is interrupted, as after one signal.
+    assert timeline(machine, 1.0, 1.9) == [(1.5, Action.INTERRUPT)]
+    assert machine.signal(3.0) == [Action.EXIT]
+
+
+def test_a_second_signal_also_interrupts_a_main_thread_that_does_not_unregister(
+    machine: ShutdownMachine,
+) -> None:
+    machine.signal(0.0)
+    machine.phase = Phase.LEAVING
+    assert machine.signal(0.1) == [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT]
+    assert timeline(machine, 0.2, 10.0) == [(2.0, Action.REPORT)]
 
 
 @pytest.mark.parametrize("why", ["polls", "notified", "main_has_ended"])
@@ -88,8 +107,8 @@ def test_a_signal_after_another_shutdown_interrupts_half_a_second_later(machine:
 
 
 def test_the_second_signal_interrupts_and_the_third_ends(machine: ShutdownMachine) -> None:
-    asked = [machine.signal(now) for now in (0.0, 0.1, 0.2, 0.3)]
-    assert asked == [None, Action.KEYBOARD_INTERRUPT, Action.EXIT, Action.EXIT]
+    actions = [machine.signal(now) for now in (0.0, 0.1, 0.2, 0.3)]
+    assert actions == [[], [Action.KEYBOARD_INTERRUPT], [Action.EXIT], [Action.EXIT]]
 
 
 def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachine) -> None:
@@ -183,7 +202,7 @@ def test_hooks_run_once_though_signals_come_while_they_run(
         with lifecycle.deferral:
             Interrupted().handle(record)
 
-    lifecycle.on_shutdown(hook)
+    lifecycle.add_hook(hook)
     watchdog._on_signal(signal.SIGINT, None)
     lifecycle.deferral.poll()
     assert runs == [False]
@@ -201,8 +220,8 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
         watchdog._on_signal(signal.SIGINT, None)
         ran.append("never")
 
-    lifecycle.on_shutdown(hook)
-    lifecycle.on_shutdown(lambda: ran.append("other"))
+    lifecycle.add_hook(hook)
+    lifecycle.add_hook(lambda: ran.append("other"))
     watchdog._on_signal(signal.SIGINT, None)
     lifecycle.deferral.poll()
     assert ran == ["other"]

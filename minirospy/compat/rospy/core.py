@@ -9,6 +9,7 @@ import logging
 import os
 from collections.abc import Callable, Mapping
 
+from minirospy.client.lifecycle import Stage
 from minirospy.client.log import logerr
 from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
@@ -58,17 +59,17 @@ def is_shutdown_requested() -> bool:
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
-    current_session().lifecycle.before_shutdown(h)
+    current_session().lifecycle.add_hook(h, Stage.BEFORE)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
-    current_session().lifecycle.after_shutdown(h)
+    current_session().lifecycle.add_hook(h, Stage.AFTER)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
     """Call ``h()`` at shutdown, as rospy.on_shutdown."""
-    current_session().lifecycle.on_shutdown(h)
+    current_session().lifecycle.add_hook(h)
 
 
 def register_signals() -> None:

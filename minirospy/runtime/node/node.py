@@ -143,6 +143,7 @@ class Node:
         self._answered = 0.0
         """When the master answered last, in seconds of the loop's clock."""
         self._closed = False
+        self._unregistering: asyncio.Task[None] | None = None
 
     @property
     def tcpros_port(self) -> int:
@@ -183,16 +184,17 @@ class Node:
             # Resolving a name may wait for a server.
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
-    async def close(self) -> None:
+    async def close(self, *, announces: bool = True) -> None:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
         Takes as long as the master answers. One that refuses connections is not waited for; one that answers nothing is
-        given up after ``_SILENT_SECONDS``, and keeps the registrations that it has.
+        given up after ``_SILENT_SECONDS``, or when :meth:`stop_unregistering` is called, and keeps the registrations that
+        it has. ``announces``: whether a line is logged when it takes long.
         """
         if self._closed:
             return
         self._closed = True
-        unregistering = asyncio.ensure_future(self._unregister_all())
+        self._unregistering = asyncio.ensure_future(self._unregister_all(announces=announces))
         # Its first call is sent before anything else is done.
         await asyncio.sleep(0)
 
@@ -203,7 +205,7 @@ class Node:
             timer.cancel()
         links = [link for publication in self.publications.values() for link in publication.links]
         await asyncio.gather(
-            unregistering,
+            self._unregistering,
             *(link.drain(_FLUSH_SECONDS) for link in links),
             *watching,
             return_exceptions=True,
@@ -223,6 +225,11 @@ class Node:
         for task in self._registering:
             task.cancel()
         await asyncio.gather(*self._registering, return_exceptions=True)
+
+    def stop_unregistering(self) -> None:
+        """Let :meth:`close` return although the master has not answered (on the loop)."""
+        if self._unregistering:
+            self._unregistering.cancel()
 
     async def master(self, method: str, *args: Any) -> Any:
         """Call the master as this node; the value of its answer.
@@ -554,7 +561,7 @@ class Node:
             except RpcError as error:
                 _log.debug("registering %s: %s", key, error)
 
-    async def _unregister_all(self) -> None:
+    async def _unregister_all(self, *, announces: bool) -> None:
         """Unregister everything that the master has of this node, in as few calls as it allows."""
         # A name with a call under way comes after that call, which would undo its unregistration.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
@@ -566,13 +573,13 @@ class Node:
         tasks = [asyncio.ensure_future(self._call_all(calls))]
         tasks += [asyncio.ensure_future(self._update(key)) for key in under_way]
         try:
-            await self._wait_for_answers(tasks)
+            await self._wait_for_answers(tasks, announces=announces)
         finally:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]]) -> None:
+    async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
         """Wait for the last calls of the master, for as long as it answers anything.
 
         Of many nodes that shut down at once each waits for its turn: a short call, which a busy master answers in between,
@@ -582,23 +589,24 @@ class Node:
         uri = self.environment.master_uri
         patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
         text = "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s"
-        notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience)
+        notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience) if announces else None
 
         self._answered = loop.time()
         pending = set(tasks)
         probe: asyncio.Task[None] | None = None
-        while pending and (left := self._answered + patience - loop.time()) > 0:
-            done, pending = await asyncio.wait(
-                pending, timeout=min(left, _PROBE_SECONDS), return_when=asyncio.FIRST_EXCEPTION
-            )
-            if any(isinstance(task.exception(), MasterUnreachableError) for task in done):
-                break
-            if pending and (probe is None or probe.done()):
-                probe = asyncio.ensure_future(self._probe_master())
-
-        notice.cancel()
-        if probe:
-            probe.cancel()
+        try:
+            while pending and (left := self._answered + patience - loop.time()) > 0:
+                done, pending = await asyncio.wait(
+                    pending, timeout=min(left, _PROBE_SECONDS), return_when=asyncio.FIRST_EXCEPTION
+                )
+                if any(isinstance(task.exception(), MasterUnreachableError) for task in done):
+                    break
+                if pending and (probe is None or probe.done()):
+                    probe = asyncio.ensure_future(self._probe_master())
+        finally:
+            for waiting in (notice, probe):
+                if waiting:
+                    waiting.cancel()
 
     async def _probe_master(self) -> None:
         with contextlib.suppress(MasterUnreachableError, RpcError):

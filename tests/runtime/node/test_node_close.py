@@ -278,6 +278,23 @@ def test_close_gives_up_on_a_master_that_is_silent(
     assert "waiting for the master at" in caplog.text
 
 
+def test_close_returns_when_the_unregistration_is_stopped(caplog: pytest.LogCaptureFixture) -> None:
+    async def scene() -> None:
+        async with FakeMaster(multicall=True) as master:
+            node = await publishing_node(master.uri)
+            master.release.clear()
+            closing = asyncio.ensure_future(node.close(announces=False))
+            await asyncio.sleep(0)
+            # The limit for a silent master would fail the scene's.
+            node.stop_unregistering()
+            await closing
+            assert not master.unregistered
+            master.release.set()
+
+    run(scene)
+    assert not caplog.text
+
+
 def test_close_does_not_wait_for_a_master_that_refuses_connections() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:

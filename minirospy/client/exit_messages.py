@@ -1,0 +1,62 @@
+"""What a process that is interrupted prints: what it still waits for; and what it does not: tracebacks of the interrupt."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+
+__all__ = ["suppress_tracebacks", "what_runs"]
+
+
+def what_runs() -> str:
+    """Return the thread or process that keeps this process from its exit, and where in the program it is."""
+    main = threading.main_thread()
+    threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
+    frames = sys._current_frames()
+    for thread in threads:
+        if thread.is_alive() and (place := _place(frames.get(thread.ident or 0))):
+            return f"thread {thread.name} at {place}"
+
+    # A main thread that runs no code of the program's waits at its exit.
+    if len(threads) > 1:
+        return f"thread {threads[1].name}"
+    loaded = sys.modules.get("multiprocessing")
+    children = loaded.active_children() if loaded else []
+    return f"process {children[0].name} ({children[0].pid})" if children else "the exit of the program"
+
+
+def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
+    """Let the program, or a thread of it, that does not catch an expected error end without a traceback, with status 0."""
+    hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
+
+    def is_interrupt(error: BaseException | None) -> bool:
+        # An interrupted wait may find its lock not acquired, which is a RuntimeError.
+        while isinstance(error, RuntimeError):
+            error = error.__context__
+        return error is not None and is_expected(error)
+
+    def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if is_interrupt(error):
+            raise SystemExit(0)
+        hooks[0](kind, error, trace)
+
+    def of_thread(arguments: threading.ExceptHookArgs) -> None:
+        if not is_interrupt(arguments.exc_value):
+            hooks[1](arguments)
+
+    def of_exit(arguments: sys.UnraisableHookArgs) -> None:
+        if not is_interrupt(arguments.exc_value):
+            hooks[2](arguments)
+
+    sys.excepthook, threading.excepthook, sys.unraisablehook = of_main, of_thread, of_exit
+
+
+def _place(frame: FrameType | None) -> str:
+    """Return file:line of the program's own code that is innermost; "" where there is none."""
+    libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
+    while frame is not None and frame.f_code.co_filename.startswith(libraries):
+        frame = frame.f_back
+    return f"{frame.f_code.co_filename}:{frame.f_lineno}" if frame else ""
