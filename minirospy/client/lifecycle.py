@@ -6,20 +6,18 @@ Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 from __future__ import annotations
 
 import contextlib
-import enum
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterator
-from typing import TypeAlias
+from collections.abc import Callable, Iterable, Iterator
 
 from minirospy import errors
+from minirospy.client.deferral import Deferral, is_main_thread
 from minirospy.client.shutdown import Phase, ShutdownMachine, ThreadState
 from minirospy.clock import SignalSafeEvent, wait_for_event
 
-__all__ = ["Deferral", "Lifecycle", "ROSInterruptException", "Stage"]
+__all__ = ["Lifecycle", "ROSInterruptException"]
 
-_Hook: TypeAlias = Callable[..., object]
 _log = logging.getLogger(__name__)
 
 
@@ -29,63 +27,6 @@ class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
     asyncio would take a KeyboardInterrupt for the end of its loop: `minirospy.aio` raises the plain one, which is this
     one's base and the `minirospy.ROSInterruptException` that catches both.
     """
-
-
-class Deferral:
-    """A critical section of the main thread: ``with deferral:`` a signal is dispatched when the block ends.
-
-    A hook may publish, log or register, and so must not run while the main thread is half way through such a thing. In
-    other threads, where no signal arrives, without effect.
-    """
-
-    def __init__(self) -> None:
-        self.pending = False
-        """Whether a signal waits for the main thread. Set by the signal's handler."""
-        self.dispatch: Callable[[], object] = lambda: None
-        """Dispatch the pending signal. In the main thread."""
-        self._depth = 0
-
-    @property
-    def is_active(self) -> bool:
-        """Whether the main thread is inside a critical section."""
-        return self._depth > 0
-
-    def __enter__(self) -> None:
-        if _is_main():
-            self._depth += 1
-
-    def __exit__(self, *_: object) -> None:
-        if _is_main():
-            self._depth -= 1
-            self.poll()
-
-    def poll(self) -> None:
-        """Dispatch a pending signal, where this is the main thread and outside of a critical section."""
-        if self.pending and not self._depth and _is_main():
-            self.dispatch()
-
-    @contextlib.contextmanager
-    def lifted(self) -> Iterator[None]:
-        """Leave the critical section for the length of a block: for the user's code."""
-        if not _is_main():
-            yield
-            return
-        depth, self._depth = self._depth, 0
-        try:
-            yield
-        finally:
-            self._depth = depth
-
-
-class Stage(enum.Enum):
-    """When a shutdown hook runs."""
-
-    FIRST = enum.auto()
-    """While is_shutdown() is false; without an argument."""
-    BEFORE = enum.auto()
-    """After those, still before is_shutdown() is true; with the reason of the shutdown."""
-    AFTER = enum.auto()
-    """Once is_shutdown() is true, before the node leaves the graph; with the reason."""
 
 
 class Lifecycle:
@@ -113,10 +54,14 @@ class Lifecycle:
         """Set once the node has left the graph."""
 
         self.deferral = Deferral()
-        self.hooks: list[_Hook] = []
-        """What on_shutdown was given."""
-        self._hooks: dict[Stage, list[_Hook]] = {Stage.FIRST: self.hooks, Stage.BEFORE: [], Stage.AFTER: []}
-        self._interrupts: list[Callable[[], object]] = []
+        self.reason: object = None
+        """What the shutdown was requested with."""
+        self.hooks: list[Callable[[], object]] = []
+        """What on_shutdown was given: called while is_shutdown() is false."""
+        self.late_hooks: list[Callable[[], object]] = []
+        """Called after those, still before is_shutdown() is true."""
+        self.interrupts: list[Callable[[], object]] = []
+        """Called once is_shutdown() is true, before the node leaves the graph: they end what blocks."""
 
         self._main = ThreadState()
         self._thread = threading.local()
@@ -124,15 +69,18 @@ class Lifecycle:
         # A lock, since it is claimed in one step: a signal's handler may come between any two.
         self._claim = threading.Lock()
 
-    def add_hook(self, hook: _Hook, stage: Stage = Stage.FIRST) -> None:
-        """Call ``hook`` when the node shuts down, or now where it has. Raises TypeError."""
+    def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
+        """Call ``hook`` when the node shuts down, or now where it has; ``hooks``: a list above, by default the first.
+
+        Raises TypeError.
+        """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
         with self._lock:
             if not self.is_shutdown():
-                self._hooks[stage].append(hook)
+                (self.hooks if hooks is None else hooks).append(hook)
                 return
-        hook(*(() if stage is Stage.FIRST else ("already shutdown",)))
+        hook()
 
     def signal_shutdown(self, reason: object) -> bool:
         """Shut the node down: hooks run in this thread, blocking calls end, the node leaves the graph.
@@ -142,30 +90,31 @@ class Lifecycle:
         if not self._claim.acquire(blocking=False):
             return False
         _log.debug("signal_shutdown [%s]", reason)
+        self.reason = reason
 
         with self.deferral:
+            self.machine.runs_in_main = is_main_thread()
+            self.machine.phase = Phase.HOOKS
             try:
-                self.machine.runs_in_main = _is_main()
-                self.machine.phase = Phase.HOOKS
-                self._run_hooks(Stage.FIRST)
-                self._run_hooks(Stage.BEFORE, reason)
-                with self._lock:
-                    # A hook that is added from now on is called immediately.
-                    self.shutting_down.set()
-                self.machine.phase = Phase.DOWN
-                self._run_hooks(Stage.AFTER, reason)
+                self._run(self.hooks)
+                self._run(self.late_hooks)
             finally:
-                # Also where an exception ends a hook.
-                self.shutting_down.set()
-                self._finish()
+                self._end()
         return True
 
-    def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
-        """``with lifecycle.interrupting(f):`` while the block runs, a shutdown calls ``f`` to end what blocks in it.
+    @contextlib.contextmanager
+    def interrupting(self, interrupt: Callable[[], object]) -> Iterator[None]:
+        """While a block runs, have a shutdown call ``interrupt`` to end what blocks in it.
 
         A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
         """
-        return _Interrupting(self._interrupts, interrupt, self.shutting_down)
+        self.interrupts.append(interrupt)
+        try:
+            if self.shutting_down.is_set():
+                interrupt()
+            yield
+        finally:
+            self.interrupts.remove(interrupt)
 
     def spin(self) -> None:
         """Wait until the node shuts down."""
@@ -223,54 +172,34 @@ class Lifecycle:
         try:
             found: ThreadState = self._thread.state
         except AttributeError:
-            found = self._thread.state = self._main if _is_main() else ThreadState()
+            found = self._thread.state = self._main if is_main_thread() else ThreadState()
         return found
 
     # --- helpers
 
-    def _run_hooks(self, stage: Stage, *reason: object) -> None:
+    def _run(self, hooks: Iterable[Callable[[], object]]) -> None:
         # A hook may add another: it runs last.
-        for hook in self._hooks[stage]:
+        for hook in hooks:
             try:
                 with self.deferral.lifted():
-                    hook(*reason)
+                    hook()
             except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
                 # A KeyboardInterrupt is the second Ctrl-C. And there may be no terminal any more.
                 if type(error) is not KeyboardInterrupt:
                     with contextlib.suppress(OSError, ValueError):
                         traceback.print_exc()
 
-    def _finish(self) -> None:
+    def _end(self) -> None:
         """End what blocks, and leave the graph."""
-        for interrupt in list(self._interrupts):
-            with contextlib.suppress(Exception):
-                interrupt()
+        with self._lock:
+            # A hook that is added from now on is called immediately.
+            self.shutting_down.set()
+        self.machine.phase = Phase.DOWN
+        self._run(list(self.interrupts))
+
+        self.machine.phase = Phase.LEAVING
         try:
-            self.machine.phase = Phase.LEAVING
             self._leave()
         finally:
             self.machine.phase = Phase.LEFT
             self.left.set()
-
-
-class _Interrupting:
-    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
-
-    def __init__(
-        self, interrupts: list[Callable[[], object]], interrupt: Callable[[], object], down: threading.Event
-    ) -> None:
-        self._interrupts = interrupts
-        self._interrupt = interrupt
-        self._down = down
-
-    def __enter__(self) -> None:
-        self._interrupts.append(self._interrupt)
-        if self._down.is_set():
-            self._interrupt()
-
-    def __exit__(self, *_: object) -> None:
-        self._interrupts.remove(self._interrupt)
-
-
-def _is_main() -> bool:
-    return threading.current_thread() is threading.main_thread()

@@ -124,7 +124,7 @@ def _release_previous(session: Session) -> None:
 @functools.cache
 def _install_process_hooks() -> None:
     """Install, once for all sessions of the process, what its exit, its forks and its interrupts need."""
-    suppress_tracebacks(lambda error: current_session().lifecycle.is_interrupt(error))
+    suppress_tracebacks(_is_interrupt)
     atexit.register(lambda: current_session().shut_down_at_exit())
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
@@ -141,6 +141,10 @@ def _install_process_hooks() -> None:
             restore_signals()
 
         os.register_at_fork(before=block_signals, after_in_parent=restore_signals, after_in_child=start_child)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    return current_session().lifecycle.is_interrupt(error)
 
 
 def _wait_for_master(session: Session) -> None:

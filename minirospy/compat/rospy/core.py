@@ -9,7 +9,6 @@ import logging
 import os
 from collections.abc import Callable, Mapping
 
-from minirospy.client.lifecycle import Stage
 from minirospy.client.log import logerr
 from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
@@ -59,12 +58,14 @@ def is_shutdown_requested() -> bool:
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
-    current_session().lifecycle.add_hook(h, Stage.BEFORE)
+    lifecycle = current_session().lifecycle
+    lifecycle.add_hook(_given_reason(h), lifecycle.late_hooks)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` when is_shutdown() has become true. Raises TypeError."""
-    current_session().lifecycle.add_hook(h, Stage.AFTER)
+    lifecycle = current_session().lifecycle
+    lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
@@ -99,3 +100,12 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 def is_topic(param_name: str) -> Validator:
     """Return a check that the argument ``param_name`` is a topic's name. The check raises ParameterInvalid."""
     return valid_name(param_name)
+
+
+def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
+    """Return ``h`` as a hook without an argument, for the lifecycle. Raises TypeError."""
+    if not callable(h):
+        raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
+    lifecycle = current_session().lifecycle
+    is_late = lifecycle.is_shutdown()
+    return lambda: h("already shutdown" if is_late else lifecycle.reason)
