@@ -2,14 +2,16 @@
 
 Pure; parses with expat, and what is plain without it (``wire/xmlrpc_plain.py``). A server, which serves others
 meanwhile, does both in short steps where a document is long. Refuses what a caller could hurt with: document types
-(and so entities), nesting beyond 64 levels, a million elements, tags of 64 KiB, values of 96 MiB in memory. Source:
+(and so entities), nesting beyond 64 levels, a million elements, tags of 64 KiB, texts of 64 MiB in memory. Source:
 http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
 """
 
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from io import BytesIO
 from typing import Any, NamedTuple
 
 from minirospy.errors import RpcFault, RpcProtocolError
@@ -36,7 +38,7 @@ _MAX_ELEMENTS = 1_000_000
 """In one document: some seconds of work."""
 
 _MIB = 1024 * 1024
-_MAX_MEMORY = 96 * _MIB
+_MAX_MEMORY = 64 * _MIB
 """Of the long texts of one document: a character beyond U+FFFF makes each one of its text take four bytes."""
 
 _MAX_TOKEN = 65536
@@ -47,6 +49,9 @@ _MAX_SCALAR = 2048
 
 _LONG_TEXT = 16
 """Pieces of a text, 8 KiB each, after which it is a long one."""
+
+_GROWTH_SHIFT = 17
+"""A long text grows by a sixteenth of what it has already: as many pieces of 8 KiB as its length shifted by this."""
 
 _PLAIN_BYTES = 32768
 """A document up to this length is read in one step where it is plain."""
@@ -436,14 +441,14 @@ class Reader:
         self._depth = 0
         self._left = _MAX_ELEMENTS
         self._tag = ""
-        # The bytes that were fed, and those that the values take in memory.
+        # The bytes that were fed, and those that the long texts take in memory.
         self._fed = 0
         self._memory = 0
-        # How many pieces of the present text are counted in that, and the widest of their characters, in bytes.
-        self._weighed = 0
+        # What is joined of a long text, and the bytes that each of its characters takes.
+        self._joined = ""
         self._width = 1
         # A long base64 as far as it is decoded.
-        self._binary = bytearray()
+        self._binary: BytesIO | None = None
 
         parser = self._parser = expat.ParserCreate()
         parser.buffer_text = True
@@ -462,8 +467,8 @@ class Reader:
         # The parser looks at an incomplete tag or comment again whenever more of it comes.
         if not is_last and self._fed - self._parser.CurrentByteIndex > _MAX_TOKEN:
             raise RpcProtocolError(f"a tag or comment of more than {_MAX_TOKEN} bytes")
-        if len(self._text) - self._weighed > _LONG_TEXT:
-            self._weigh_text()
+        if len(self._text) - _LONG_TEXT > len(self._joined) >> _GROWTH_SHIFT:
+            self._join_text()
 
     def close(self) -> None:
         """Release the parser, whose handlers refer to this object and to all that was read. Idempotent."""
@@ -505,30 +510,28 @@ class Reader:
         elif tag in ("array", "struct"):
             self._values[-1].append(self._containers.pop())
         elif tag == "name":
-            self._names.append("".join(self._text))
+            self._names.append(self._whole_text())
         elif tag == "member":
             self._names.pop()
         elif tag == "methodName":
-            self.method = "".join(self._text)
+            self.method = self._whole_text()
         elif tag == "nil":
             raise RpcProtocolError("ROS has no nil")
         self._clear_text()
 
     def _scalar(self, tag: str, read: Callable[[str], Any]) -> Any:
-        text = "".join(self._text)
-        if tag == "base64":
-            if not self._binary:
-                return read(text)
-            self._binary += read(text)
-            return bytes(self._binary)
-        if tag != "string" and len(text) > _MAX_SCALAR:
+        text = self._whole_text()
+        if self._binary:
+            self._binary.write(read(text))
+            return self._binary.getvalue()
+        if tag not in ("string", "base64") and len(text) > _MAX_SCALAR:
             raise RpcProtocolError(f"a value of type {tag} has more than {_MAX_SCALAR} characters")
         return read(text)
 
     def _end_value(self) -> None:
         entry = self._values.pop()
         # A value without a type is a string.
-        value = entry[0] if entry else "".join(self._text)
+        value = entry[0] if entry else self._whole_text()
         if len(self._values) != len(self._containers):
             raise RpcProtocolError("a value inside a value")
         if not self._containers:
@@ -541,40 +544,49 @@ class Reader:
             container[self._names[-1]] = value
 
     def _clear_text(self) -> None:
-        if len(self._text) > 1:
-            self._weigh_text()
-            self._weighed = 0
-            self._width = 1
         self._text.clear()
-        if self._binary:
-            self._binary.clear()
+        if self._joined or self._binary:
+            self._joined = ""
+            self._width = 1
+            self._binary = None
 
-    def _weigh_text(self) -> None:
-        """Count the memory of a long text, whose characters all take as much as the widest one once it is whole."""
+    def _whole_text(self) -> str:
+        """Return the text of the present element."""
+        if len(self._text) > 1 or self._joined:
+            self._join_text()
+        return self._joined or "".join(self._text)
+
+    def _join_text(self) -> None:
+        """Join what has come of a long text, which would take too long at its end. Raises RpcProtocolError."""
         if self._tag == "base64":
             self._decode_base64()
             return
-        for number, piece in enumerate(self._text[self._weighed :], self._weighed):
-            width = _width(piece)
-            if width > self._width:
-                self._memory += (width - self._width) * sum(map(len, self._text[:number]))
-                self._width = width
-            self._memory += self._width * len(piece)
-        self._weighed = len(self._text)
+        more = "".join(self._text)
+        self._text.clear()
+        joined, self._joined = self._joined, ""
+
+        # All characters take as much as the widest one.
+        width = max(self._width, _width(more))
+        self._memory += width * (len(joined) + len(more)) - self._width * len(joined)
+        self._width = width
         if self._memory > _MAX_MEMORY:
             raise RpcProtocolError(f"a value of more than {_MAX_MEMORY // _MIB} MiB in memory", status=413)
+
+        # Python copies nothing where a local variable is the only one that refers to a text.
+        joined += more
+        self._joined = joined
 
     def _decode_base64(self) -> None:
         text = re.sub("[^A-Za-z0-9+/=]", "", "".join(self._text))
         whole = len(text) - len(text) % 4
-        self._binary += _read_base64(text[:whole])
+        self._binary = self._binary or BytesIO()
+        self._binary.write(_read_base64(text[:whole]))
         self._text[:] = [text[whole:]]
 
 
 def _width(text: str) -> int:
-    """Return the bytes that each character takes in memory."""
-    widest = "" if text.isascii() else max(text)
-    return 4 if widest > "\uffff" else 2 if widest > "\xff" else 1
+    """Return the bytes that each character of a long text takes in memory."""
+    return 1 if text.isascii() else min(4, sys.getsizeof(text) // len(text))
 
 
 def _read(body: bytes | bytearray) -> Reader:

@@ -26,6 +26,7 @@ from minirospy.wire.xmlrpc import (
     serialize_response,
     serialize_response_in_steps,
 )
+from tests.wire.memory import Allocations
 
 # What XML 1.0 can hold: no control characters but tab and line feed, no surrogates.
 TEXT = st.text(
@@ -167,6 +168,43 @@ def test_long_base64_is_decoded_as_it_comes() -> None:
     data = bytes(range(256)) * 2_000
     body = xmlrpc.client.dumps((xmlrpc.client.Binary(data), "after"), "m").encode()
     assert finish(parse_call_in_steps(body)).args == [data, "after"]
+
+
+@pytest.mark.parametrize("kind", ["value", "string", "base64", "name", "methodName"])
+def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
+    # To join 60 MiB at their end would take 50 ms.
+    text = "QUJD" * 1_000_000
+    body = {
+        "value": f"<value>{text}</value>",
+        "string": f"<value><string>{text}</string></value>",
+        "base64": f"<value><base64>{text}</base64></value>",
+        "name": f"<value><struct><member><name>{text}</name><value>1</value></member></struct></value>",
+        "methodName": f"<methodName>{text}</methodName>",
+    }[kind].encode()
+    data = b"<methodCall>" + body + b"</methodCall>"
+    end = data.index(b"<", 1_000_000)
+    reader = Reader()
+    with Allocations() as memory:
+        for at in range(0, end, 8192):
+            reader.feed(data[at : min(at + 8192, end)])
+        memory.mark()
+        reader.feed(data[end:], is_last=True)
+        assert memory.peak() < 1_000_000
+    reader.close()
+    value: Any = reader.params[0] if reader.params else reader.method
+    assert value == {"base64": b"ABC" * 1_000_000, "name": {text: "1"}}.get(kind, text)
+
+
+def test_memory_of_a_text_is_that_of_its_widest_character() -> None:
+    # 20 MiB of ASCII are within the limit; with one character that needs four bytes they are not.
+    text = b"<methodCall><value>" + b"x" * 20 * 1024 * 1024
+    for wide, is_refused in ((b"", False), ("\u20ac".encode(), False), ("\U0001f600".encode(), True)):
+        steps = parse_call_in_steps(text + wide + b"</value><methodName>m</methodName></methodCall>")
+        if is_refused:
+            with pytest.raises(RpcProtocolError, match="more than 64 MiB in memory"):
+                finish(steps)
+        else:
+            assert len(finish(steps).args[0]) >= 20 * 1024 * 1024
 
 
 def test_each_step_is_short() -> None:
