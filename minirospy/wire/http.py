@@ -110,8 +110,8 @@ class HttpReader:
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
-        # The bytes of a chunked body that are taken out of the buffer already.
-        self._chunked = 0
+        # What was taken out of the buffer of a body in chunks.
+        self._chunked: bytearray | None = None
         self.wants_continue = False
         """Whether the peer waits for :meth:`continue_line` before it sends its body."""
 
@@ -121,9 +121,14 @@ class HttpReader:
         return self._head is None and not self._buffer and not self._in_body
 
     @property
+    def in_chunks(self) -> bool:
+        """Whether the present message has a body in chunks, of which many may be in few bytes."""
+        return self._chunked is not None
+
+    @property
     def held(self) -> int:
         """Bytes of a message that is not whole yet."""
-        return len(self._buffer) + self._chunked
+        return len(self._buffer) + len(self._chunked or b"")
 
     def feed(self, data: bytes) -> list[HttpMessage]:
         """Return the messages that are complete with ``data``; b"" means that the peer has closed.
@@ -164,7 +169,7 @@ class HttpReader:
         """Release what was read of an incomplete message. Idempotent."""
         self._head = self._parser = None
         self._buffer = bytearray()
-        self._chunked = 0
+        self._chunked = None
         self._in_body = False
 
     def continue_line(self) -> bytes:
@@ -205,20 +210,25 @@ class HttpReader:
         return (yield from self._exactly(count))
 
     def _chunks(self) -> Generator[None, None, bytearray]:
-        body = bytearray()
+        body = self._chunked = bytearray()
         while True:
             line = (yield from self._until(_end_of_line)).partition(b";")[0].strip()
             if not re.fullmatch(rb"[0-9A-Fa-f]{1,12}", line):
                 raise RpcProtocolError(f"bad chunk size {bytes(line[:20])!r}")
-            size = int(line, 16)
-            self._check(len(body) + size)
-            self._chunked = len(body)
-            if not size:
-                self._chunked = 0
+            left = int(line, 16)
+            self._check(len(body) + left)
+            if not left:
                 while (yield from self._until(_end_of_line)):
                     pass
+                self._chunked = None
                 return body
-            body += yield from self._exactly(size)
+            # As it comes: to move a long chunk when it is whole would take long.
+            while left:
+                if not self._buffer:
+                    yield from self._more()
+                piece = self._take(min(left, len(self._buffer)))
+                body += piece
+                left -= len(piece)
             if (yield from self._until(_end_of_line)):
                 raise RpcProtocolError("a chunk is longer than its size")
 
@@ -238,14 +248,20 @@ class HttpReader:
 
     def _exactly(self, count: int) -> Generator[None, None, Body]:
         while len(self._buffer) < count:
-            if self._ended:
-                raise RpcProtocolError("the peer ended inside a message")
-            yield None
-        if len(self._buffer) > count:
+            yield from self._more()
+        if len(self._buffer) > 2 * count:
             return self._take(count)
-        # Not copied: it may be long.
-        whole, self._buffer = self._buffer, bytearray()
+        # The longer part is not copied.
+        rest = self._buffer[count:]
+        del self._buffer[count:]
+        whole, self._buffer = self._buffer, rest
         return whole
+
+    def _more(self) -> Generator[None, None, None]:
+        """Wait until the buffer is filled."""
+        if self._ended:
+            raise RpcProtocolError("the peer ended inside a message")
+        yield None
 
     def _take(self, count: int) -> bytes:
         data = bytes(self._buffer[:count])

@@ -16,6 +16,7 @@ from minirospy.wire.http import (
     serialize_request,
     serialize_response,
 )
+from tests.wire.memory import Allocations
 
 
 def feed(data: bytes, step: int, reader: HttpReader | None = None) -> list[HttpMessage]:
@@ -320,9 +321,9 @@ def test_reader_counts_what_it_holds() -> None:
     reader.feed(chunked + b"3\r\nabc\r\n2\r\nd")
     assert (reader.is_idle, reader.held) == (False, 4)
     reader.feed(b"e\r\n0\r\n")
-    assert reader.held == 0
+    assert reader.held == 5
     assert len(reader.feed(b"\r\n")) == 1
-    assert reader.is_idle
+    assert (reader.is_idle, reader.held) == (True, 0)
 
 
 def test_close_forgets_an_incomplete_message() -> None:
@@ -374,3 +375,35 @@ def test_answer_that_goes_on_until_the_end_comes_in_parts() -> None:
         assert reader.feed(data) == []
     (message,) = reader.feed(b"")
     assert message.body == b"abcd"
+
+
+@pytest.mark.parametrize(
+    ("head", "tail"),
+    [
+        (b"Content-Length: 4000000\r\n\r\n", b""),
+        (b"Content-Length: 4000000\r\n\r\n", b"POST"),
+        (b"Transfer-Encoding: chunked\r\n\r\n3d0900\r\n", b"\r\n0\r\n\r\nPOST"),
+    ],
+)
+def test_long_body_is_not_copied_when_it_is_whole(head: bytes, tail: bytes) -> None:
+    # A copy of the longest one would take some 50 ms.
+    reader = HttpReader()
+    body = b"x" * 4_000_000
+    request, end = b"POST / HTTP/1.1\r\n" + head + body[:-1], body[-1:] + tail
+    with Allocations() as memory:
+        assert not feed(request, 4096, reader)
+        memory.mark()
+        (message,) = reader.feed(end)
+        assert memory.peak() < 1_000_000
+    assert message.body == body
+
+
+def test_reader_knows_a_body_in_chunks() -> None:
+    reader = HttpReader()
+    reader.feed(b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\nabc")
+    assert not reader.in_chunks
+    reader = HttpReader()
+    reader.feed(b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n3\r")
+    assert reader.in_chunks
+    reader.feed(b"\nabc\r\n0\r\n\r\n")
+    assert not reader.in_chunks

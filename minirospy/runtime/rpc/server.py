@@ -410,7 +410,7 @@ class _Connection:
     def _read_much(self, reading: object) -> Steps[None]:
         """Read until nothing more is there, or until something else has stopped or started reading."""
         while self._reading is reading:
-            data = self._receive(_RECEIVE_MORE)
+            data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
             if data is None:
                 self._start_reading()
                 return
