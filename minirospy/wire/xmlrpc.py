@@ -78,8 +78,13 @@ class Call(NamedTuple):
     args: list[Any]
 
 
-class Serialized(bytes):
-    """An answer that is XML already."""
+class Serialized:
+    """An answer that is XML already, in pieces: a long one takes long to join."""
+
+    __slots__ = ("pieces",)
+
+    def __init__(self, pieces: Sequence[bytes]) -> None:
+        self.pieces = pieces
 
 
 def serialize_call(method: str, args: Sequence[Any]) -> bytes:
@@ -96,7 +101,7 @@ def serialize_call(method: str, args: Sequence[Any]) -> bytes:
 def serialize_response(value: Any) -> bytes:
     """Return a successful answer as XML."""
     if type(value) is Serialized:
-        return value
+        return b"".join(value.pieces)
     parts = [_HEAD, "<methodResponse><params><param>"]
     _write(value, parts, 0)
     parts.append("</param></params></methodResponse>\n")

@@ -86,7 +86,7 @@ class Master(MasterApi):
         self.host = host
         self.calls = 0
         # The answer to getSystemState, and after which change of the registry it was written.
-        self._state = (-1, Serialized())
+        self._state = (-1, Serialized(()))
         self.news: list[str] = []
         """What a person should know of the start: what was recovered, and what was not."""
         self._started = time.monotonic()
@@ -193,7 +193,7 @@ class Master(MasterApi):
         changes = self.registry.changes
         answer = yield from self.collect_system_state()
         pieces = yield from serialize_response_in_steps(answer, MAX_BODY)
-        state = Serialized(b"".join(pieces))
+        state = Serialized(pieces)
         if changes == self.registry.changes:
             self._state = (changes, state)
         return state

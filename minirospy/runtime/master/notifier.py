@@ -110,7 +110,7 @@ class Notifier:
         # The last update that was written: the subscribers of one topic all get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
         # The same for a large one, of a topic or a parameter.
-        self._last_large: tuple[str, Any, bytes] = ("", None, b"")
+        self._last_large: tuple[str, Any, list[bytes]] = ("", None, [])
         # Large calls that wait; bytes of those that are under way; whether one is being written.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
@@ -249,7 +249,7 @@ class Notifier:
             value == self._last_large[1] if method == "publisherUpdate" else value is self._last_large[1]
         )
         if not is_known:
-            self._last_large = ("", None, b"")
+            self._last_large = ("", None, [])
             yield ALONE
             try:
                 pieces = yield from serialize_call_in_steps(method, [_MASTER, name, value], MAX_BODY)
@@ -257,11 +257,12 @@ class Notifier:
                 self._is_writing = False
                 self._called(node, line, notice, count, 0, error)
                 return
-            self._last_large = (name, value, b"".join(pieces))
+            self._last_large = (name, value, pieces)
         self._is_writing = False
         body = self._last_large[2]
-        self._large_bytes += len(body)
-        done = partial(self._called, node, line, notice, count, len(body))
+        size = sum(map(len, body))
+        self._large_bytes += size
+        done = partial(self._called, node, line, notice, count, size)
         self._rpc.begin(node.uri, body, self._timeout, done)
         self._start_large()
 
@@ -273,7 +274,7 @@ class Notifier:
         self._large_bytes -= size
         self._start_large()
         if not self._large and not self._large_bytes:
-            self._last_large = ("", None, b"")
+            self._last_large = ("", None, [])
         if isinstance(answer, RpcUnreachable):
             if len(self._suspects) > _MOST_SUSPECTS:
                 self._suspects.clear()

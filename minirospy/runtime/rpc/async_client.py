@@ -68,11 +68,13 @@ class AsyncRpcClient:
         finally:
             call.cancel()
 
-    def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[Body | RpcError], None]) -> Call:
+    def begin(
+        self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
+    ) -> Call:
         """Do the same without a coroutine, which costs a master as much as all the rest of a call.
 
-        ``body`` is the call as XML. ``done`` is called on the loop, perhaps at once, with the answer as XML, or with
-        what :meth:`call` would raise.
+        ``body`` is the call as XML, perhaps in pieces. ``done`` is called on the loop, perhaps immediately, with the
+        answer as XML, or with what :meth:`call` would raise.
         """
         call = Call(self, uri, body, timeout, done)
         call.start()
@@ -222,7 +224,7 @@ class Call:
         self,
         client: AsyncRpcClient,
         uri: str,
-        body: bytes,
+        body: bytes | list[bytes],
         timeout: float,
         done: Callable[[Body | RpcError], None],
     ) -> None:
@@ -232,7 +234,7 @@ class Call:
         self._done: Callable[[Body | RpcError], None] | None = done
         self._loop = asyncio.get_running_loop()
         self._address: _Address = ("", 0)
-        self._request = [body]
+        self._request = [body] if isinstance(body, bytes) else body
         # Of these parts, the first that has not been started.
         self._next = 0
         self._left: bytes | memoryview = b""
@@ -248,12 +250,12 @@ class Call:
             self._finish(error)
             return
         self._address = (host, port)
-        body = self._request[0]
-        if len(body) < _LARGE:
-            self._request = [serialize_request(f"{host}:{port}", path, body)]
+        size = sum(map(len, self._request))
+        if size < _LARGE:
+            self._request = [serialize_request(f"{host}:{port}", path, b"".join(self._request))]
         else:
             # Not copied: several calls may send the same one.
-            self._request = [serialize_request_head(f"{host}:{port}", path, len(body)), body]
+            self._request = [serialize_request_head(f"{host}:{port}", path, size), *self._request]
         client = self._client
         client.under_way.set(self, self._timeout)
         kept = client.take(self._address)

@@ -494,10 +494,13 @@ class _Connection:
             return
         try:
             value = self._server.dispatch(call.method, call.args)
+            if type(value) is Serialized:
+                self._send_pieces(value.pieces, keep_alive)
+                return
             if type(value) is not list and isinstance(value, Awaitable):
                 self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
                 return
-            if type(value) is not Serialized and (isinstance(value, Generator) or not is_small(value)):
+            if isinstance(value, Generator) or not is_small(value):
                 self._start(self._serialize_in_steps(call.method, value, keep_alive))
                 return
             body = serialize_value(value)
@@ -543,6 +546,7 @@ class _Connection:
 
     def _serialize_in_steps(self, method: str, value: Any, keep_alive: bool) -> Steps[None]:
         """Answer with a value that may be long, or that steps return."""
+        pieces: Sequence[bytes]
         try:
             if isinstance(value, Generator):
                 self._must_finish = True
@@ -553,16 +557,15 @@ class _Connection:
             if self.is_refused:
                 return
             if isinstance(value, Serialized):
-                pieces: list[bytes] = [value]
+                pieces = value.pieces
             else:
                 pieces = yield from serialize_value_in_steps(value, MAX_BODY)
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
-            pieces = [_fault(method, error)]
+            pieces = (_fault(method, error),)
         del value
         self._work = None
         if not self.is_refused:
-            self._write(serialize_response_head(sum(map(len, pieces)), keep_alive=keep_alive), *pieces)
-            self._sent(keep_alive)
+            self._send_pieces(pieces, keep_alive)
             self._go_on()
 
     async def _answer_later(self, value: Awaitable[Any], keep_alive: bool) -> None:
@@ -582,6 +585,14 @@ class _Connection:
 
     def _send(self, body: bytes, keep_alive: bool) -> None:
         self._write(serialize_response(body, keep_alive=keep_alive))
+        self._sent(keep_alive)
+
+    def _send_pieces(self, pieces: Sequence[bytes], keep_alive: bool) -> None:
+        """Send an answer, which is not joined if it is long."""
+        if len(pieces) == 1:
+            self._send(pieces[0], keep_alive)
+            return
+        self._write(serialize_response_head(sum(map(len, pieces)), keep_alive=keep_alive), *pieces)
         self._sent(keep_alive)
 
     def _sent(self, keep_alive: bool) -> None:
