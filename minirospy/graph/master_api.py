@@ -12,7 +12,6 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Any
 
 from minirospy.escape import escaped
 from minirospy.graph.calls import (
@@ -177,23 +176,24 @@ class MasterApi(ABC):
 
     def collect_system_state(self) -> Steps[Answer]:
         """Return the same in steps."""
-        state: list[list[list[object]]] = []
-        registry = self.registry
-        for rows in (registry.publisher_rows(), registry.subscriber_rows(), registry.service_rows()):
-            table: list[list[Any]] = []
-            state.append(table)
-            while found := [list(row) for row in islice(rows, _ROWS)]:
-                table += found
-                yield None
-        return [SUCCESS, "current system state", state]
+        publishers = yield from _collect(self.registry.publisher_rows())
+        subscribers = yield from _collect(self.registry.subscriber_rows())
+        services = yield from _collect(self.registry.service_rows())
+        return [SUCCESS, "current system state", [publishers, subscribers, services]]
 
-    def get_topic_types(self, caller_id: str) -> Answer:
-        """[topic, type] of each topic."""
-        return [SUCCESS, "current system state", [list(row) for row in self.registry.topic_types().items()]]
+    def get_topic_types(self, caller_id: str) -> Answer | Steps[Answer]:
+        """Return [topic, type] of each topic."""
+        return self._answer_rows("current system state", self.registry.type_rows())
 
-    def get_published_topics(self, caller_id: str, namespace: str) -> Answer:
+    def get_published_topics(self, caller_id: str, namespace: str) -> Answer | Steps[Answer]:
         """Return [topic, type] of each published topic below a namespace."""
-        return [SUCCESS, "current topics", [list(row) for row in self.registry.published_topics(namespace)]]
+        return self._answer_rows("current topics", self.registry.published_rows(namespace))
+
+    def _answer_rows(self, text: str, rows: Iterator[tuple[str, str]]) -> Answer | Steps[Answer]:
+        def answer() -> Steps[Answer]:
+            return [SUCCESS, text, (yield from _collect(rows))]
+
+        return finish(answer()) if self.registry.is_small else answer()
 
     def register_publisher(self, caller_id: str, topic: str, type_: str, uri: str) -> Answer | Steps[Answer]:
         """Register a publisher; return the URIs of the topic's subscribers."""
@@ -380,6 +380,15 @@ class MasterApi(ABC):
         if self.registry.node_uri(caller_id) is None:
             return [SUCCESS, f"[{caller_id}] is not a registered node", 0]
         return [SUCCESS, f"[{caller_id}] is not a known provider of [{topic}]", 0]
+
+
+def _collect(rows: Iterator[tuple[object, ...]]) -> Steps[list[list[object]]]:
+    """Return the rows of a table as lists."""
+    table: list[list[object]] = []
+    while found := [list(row) for row in islice(rows, _ROWS)]:
+        table += found
+        yield None
+    return table
 
 
 def _weigh(name: str, value: object) -> Steps[int]:

@@ -242,12 +242,7 @@ class Registry:
 
     def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
         """(topic, type) of each published topic below the namespace ``subgraph``."""
-        prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
-        return [
-            (topic, self._types[topic])
-            for topic in self._publishers
-            if topic.startswith(prefix) and topic in self._types
-        ]
+        return list(self.published_rows(subgraph))
 
     def publishers(self) -> dict[str, list[str]]:
         """Return the nodes that publish each topic."""
@@ -260,6 +255,19 @@ class Registry:
     def services(self) -> dict[str, list[str]]:
         """Return the node that offers each service, in a list."""
         return dict(self.service_rows())
+
+    def type_rows(self) -> Iterator[tuple[str, str]]:
+        """Yield what :meth:`topic_types` returns. The table may change meanwhile."""
+        return iter(list(self._types.items()))
+
+    def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
+        """Yield what :meth:`published_topics` returns. The table may change meanwhile."""
+        prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
+        return (
+            (topic, self._types[topic])
+            for topic in list(self._publishers)
+            if topic.startswith(prefix) and topic in self._types
+        )
 
     def publisher_rows(self) -> Iterator[tuple[str, list[str]]]:
         """Yield each topic and the nodes that publish it. The table may change meanwhile."""

@@ -336,3 +336,21 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
                 assert successor.registry.nodes() == master.registry.nodes()
 
     asyncio.run(scene())
+
+
+def test_tables_of_a_large_graph_come_in_steps() -> None:
+    async def scene() -> None:
+        master = Master()
+        topics = [f"/large/t{number}" for number in range(2_000)]
+        for topic in topics:
+            master.serve("registerPublisher", ["/x", topic, "a/B", "http://x:1/"])
+        for call, text in (
+            (("getTopicTypes", "/x"), "current system state"),
+            (("getPublishedTopics", "/x", "/large"), "current topics"),
+        ):
+            found = list(master.serve(call[0], call[1:]))
+            assert len(found) >= 4
+            assert finish(master.serve(call[0], call[1:])) == [1, text, [[topic, "a/B"] for topic in topics]]
+        assert finish(master.serve("getPublishedTopics", ["/x", "/larg"])) == [1, "current topics", []]
+
+    asyncio.run(scene())
