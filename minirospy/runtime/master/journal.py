@@ -91,7 +91,7 @@ class Journal:
         # The numbers of large values that are being stored, and the last number.
         self._stored: set[int] = set()
         self._number = 0
-        # While the journal is rewritten in steps: what was appended since, and then the new file.
+        # While the journal is rewritten in steps: what was appended since, and the new file.
         self._since: list[bytes] | None = None
         self._second: int | None = None
         # Each rewrite in steps that ended or was given up counts: the one that finds another number is that one.
@@ -202,20 +202,13 @@ class Journal:
 
     @property
     def _is_rewriting(self) -> bool:
-        return self._since is not None or self._second is not None
+        return self._since is not None
 
     def _write(self, file: int, data: bytes) -> None:
         _write_all(file, data)
         self._size += len(data)
         if self._since is not None:
             self._since.append(data)
-        elif self._second is not None:
-            try:
-                _write_all(self._second, data)
-            except OSError:
-                # The old file keeps growing for a while.
-                self._compact_at = 2 * self._size
-                self._abandon()
 
     def _rewrite_in_steps(self, number: int) -> Steps[None]:
         """Do the same as :meth:`rewrite`, while others append."""
@@ -231,14 +224,10 @@ class Journal:
                 yield None
                 if number != self._rewrites:
                     return
-            since, self._since = self._since or [], None
-            for piece in since:
-                _write_all(self._second, piece)
-                size += len(piece)
+            size += self._write_since(self._second)
 
-            # The disk may take long.
+            # The disk may take long, and whoever writes to the file meanwhile waits for it.
             syncing = _Sync(self._second)
-            before = self._size
             syncing.start()
             while syncing.is_alive():
                 yield PAUSE
@@ -246,8 +235,9 @@ class Journal:
                     return
             if syncing.error:
                 raise syncing.error
-            file, self._second = self._put_in_place(self._second), None
-            self._switch_to(file, size + self._size - before)
+            size += self._write_since(self._second)
+            file, self._second, self._since = self._put_in_place(self._second), None, None
+            self._switch_to(file, size)
         except (OSError, ValueError, TypeError) as error:
             _log.warning("the journal %s could not be rewritten, it keeps growing: %s", self.path, error)
             self._compact_at = 2 * self._size
@@ -257,6 +247,13 @@ class Journal:
         finally:
             if number == self._rewrites:
                 self._abandon()
+
+    def _write_since(self, file: int) -> int:
+        """Write what was appended since to the new file; return how many bytes. Raises OSError."""
+        data = b"".join(self._since or ())
+        _write_all(file, data)
+        self._since = []
+        return len(data)
 
     def _put_in_place(self, file: int) -> int:
         """Give the new file, which is synced, the journal's name; return it, open. Raises OSError."""

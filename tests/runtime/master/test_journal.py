@@ -326,6 +326,24 @@ def test_close_while_the_new_file_is_synced_gives_it_up(
     assert path.read_bytes() == before
 
 
+def test_nothing_is_written_to_the_new_file_while_it_is_synced(
+    stepping: Journal, path: Path, steps: list[Steps[None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A disk that syncs a file keeps those waiting who write to it.
+    may_sync = threading.Event()
+    monkeypatch.setattr(os, "fsync", lambda file: may_sync.wait(60))
+    while next(steps[0]) is not PAUSE:
+        pass
+    new = path.with_name("journal-1.new")
+    before = new.read_bytes()
+    stepping.append("set", "/meanwhile", 1)
+    assert new.read_bytes() == before
+    may_sync.set()
+    finish(steps[0])
+    assert records(path)[-1] == ["set", "/meanwhile", 1]
+    assert stepping.size == path.stat().st_size
+
+
 @pytest.mark.parametrize("step", ["write", "fsync", "replace"])
 def test_rewrite_in_steps_that_fails_goes_on_with_the_old_file(
     stepping: Journal,
@@ -367,14 +385,16 @@ def test_disk_that_fails_for_the_new_file_alone_ends_the_rewrite(
             raise OSError(errno.ENOSPC, "full")
         return real(file, data)
 
-    running = steps[0]
-    while not new.exists() or not next(running):
-        next(running)
+    may_sync = threading.Event()
+    monkeypatch.setattr(os, "fsync", lambda file: may_sync.wait(60))
+    while next(steps[0]) is not PAUSE:
+        pass
     monkeypatch.setattr(os, "write", write)
     stepping.append("set", "/q", 1)
+    may_sync.set()
+    finish(steps[0])
     assert not new.exists()
     assert not stepping.trouble
-    finish(running)
     assert records(path)[-1] == ["set", "/q", 1]
     assert stepping.size == path.stat().st_size
     # Tried again only when the journal has doubled.
