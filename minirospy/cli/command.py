@@ -63,8 +63,11 @@ INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
 
 
-def refuse_bag(command: str) -> NoReturn:
+def refuse_bag(command: str, bag: str) -> NoReturn:
     """Refuse an option that reads a bag file. Raises MinirospyError: exit status 1."""
+    if not os.path.exists(bag):
+        ros = RosText(f"ERROR: bag file [{bag}] does not exist")
+        raise WordedError(NotFoundError("bag file", bag), ros)
     raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 

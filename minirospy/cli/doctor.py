@@ -44,11 +44,18 @@ class _DoctorParser(Parser):
         return options
 
 
+_ABOUT_ROSWTF = """roswtf is a tool for verifying a ROS installation and running system. Checks
+provided launchfile if provided, else current stack or package."""
+
+
 def _parser(name: str) -> Parser:
+    is_roswtf = name == "roswtf"
     parser = _DoctorParser(
         name,
-        "Checks this machine, its network and the graph, and says what to do. "
+        "Checks this machine, its network and the graph, and prints what to do. "
         "Exit status: 0 without problems, 1 with, 2 usage error.",
+        "roswtf [launch file]" if is_roswtf else "",
+        about=_ABOUT_ROSWTF if is_roswtf else "",
     )
     parser.add_argument(
         "others",
@@ -57,14 +64,21 @@ def _parser(name: str) -> Parser:
         help="another machine to try too, by its name or address; a launch file to check too (with arg:=value)",
         completer="launch_files",
     )
+    # Options of ROS's roswtf that have no effect here.
+    parser.accept(
+        "--all", help="run roswtf against all packages" if is_roswtf else "accepted, without effect"
+    )
+    parser.accept("--no-plugins", help="disable roswtf plugins" if is_roswtf else "accepted, without effect")
     parser.add_argument(
+        "--offline",
+        action="store_true",
+        help="only run offline tests" if is_roswtf else "only what needs no network",
+    )
+    add_own = parser.own_options().add_argument if is_roswtf else parser.add_argument
+    add_own(
         "--listen", action="store_true", help="then wait for the doctors of other machines, and connect back"
     )
-    parser.add_argument("--offline", action="store_true", help="only what needs no network")
-    parser.add_argument("--json", action="store_true", help="print the findings as JSON, one a line")
-    # Options of ROS's roswtf that have no effect here.
-    for word in ("--all", "--no-plugins"):
-        parser.accept(word)
+    add_own("--json", action="store_true", help="print the findings as JSON, one a line")
     return parser
 
 

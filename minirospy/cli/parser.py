@@ -72,7 +72,8 @@ class Parser(argparse.ArgumentParser):
     ``ros_usage`` is ROS's usage text; with it options and positional arguments may alternate, as with optparse, and
     help and errors have optparse's form. ``missing`` and ``surplus`` are ROS's texts about an argument that is missing
     or one too many, ``missing`` perhaps by the argument's name; ``about`` and ``ros_epilog`` are ROS's texts above and
-    below the options.
+    below the options. ``ros_argparse``: the program's name in ROS's errors where ROS itself uses argparse; help and
+    errors then have argparse's form.
     """
 
     def __init__(
@@ -85,15 +86,19 @@ class Parser(argparse.ArgumentParser):
         surplus: str = "",
         about: str = "",
         ros_epilog: str = "",
+        ros_argparse: str = "",
         intermixed: bool | None = None,
         **kwargs: Any,
     ) -> None:
         super().__init__(prog, description=description, **{"formatter_class": _Help, **kwargs})
+        if ros_argparse:
+            self.usage = ros_usage
         self.ros_usage = ros_usage
         self._missing = missing
         self._surplus = surplus
         self._about = about
         self._ros_epilog = ros_epilog
+        self._ros_argparse = ros_argparse
         self._intermixed = bool(ros_usage) if intermixed is None else intermixed
         self.register("action", "accepted", _Accepted)
 
@@ -146,15 +151,20 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str, ros: str = "") -> NoReturn:
         """Raise the CommandLineError of ``message``; ``ros`` is ROS's text where it has one of its own."""
         ros_text = ""
-        if self.ros_usage:
+        if self._ros_argparse:
+            ros_text = f"{self.format_usage()}{self._ros_argparse}: error: {ros or _without_hint(message)}"
+        elif self.ros_usage:
             tool = self.prog.partition(" ")[0]
-            ros_text = f"{self._usage_line()}\n\n{tool}: error: {ros or self._ros_message(message)}"
+            ros_text = f"{self.usage_line()}\n\n{tool}: error: {ros or self._ros_message(message)}"
         raise CommandLineError(f"{message} (`{self.prog} -h` shows what there is)", ros_text)
 
     def format_help(self) -> str:
+        if self._ros_argparse:
+            return self._ros_argparse_help()
         return self._ros_help() if self.ros_usage else super().format_help()
 
-    def _usage_line(self) -> str:
+    def usage_line(self) -> str:
+        """Return ROS's usage, the first line of its errors."""
         return f"Usage: {self.ros_usage}"
 
     def _check_options(self, args: Sequence[str] | None) -> None:
@@ -167,7 +177,10 @@ class Parser(argparse.ArgumentParser):
                 known.startswith(option) for known in self._option_string_actions
             ):
                 hint = did_you_mean(option, self._option_string_actions, 1)
-                self.error(f"unrecognized arguments: {word}{hint}", f"no such option: {option}")
+                self.error(
+                    f"unrecognized arguments: {word}{hint}",
+                    "" if self._ros_argparse else f"no such option: {option}",
+                )
 
     def _ros_message(self, message: str) -> str:
         """Return what optparse, or ROS's command, says where argparse says ``message``."""
@@ -201,11 +214,19 @@ class Parser(argparse.ArgumentParser):
 
     # --- help in optparse's form
 
+    def _ros_argparse_help(self) -> str:
+        """Return the help as argparse prints it, with ROS's text above the arguments, and ours at the end."""
+        own, self.description = self.description, self._about
+        try:
+            return super().format_help() + ("\n" + _filled(own) if own else "")
+        finally:
+            self.description = own
+
     def _ros_help(self) -> str:
         """Return ROS's help, exactly; then what minirospy has besides."""
         groups = [group for group in self._action_groups if group.title != _OWN_OPTIONS]
         options = [action for group in groups for action in group._group_actions if action.option_strings]
-        parts = [f"{self._usage_line()}\n"]
+        parts = [f"{self.usage_line()}\n"]
         if self._about:
             parts.append(_filled(self._about))
         parts.append(_ros_options("Options:", options))
@@ -233,6 +254,11 @@ def attach_completer(action: argparse.Action, completer: str) -> None:
 def completer_of(action: argparse.Action) -> str:
     """Return the name of the function that completes an argument; empty where nothing is attached."""
     return str(getattr(action, _COMPLETER, ""))
+
+
+def _without_hint(message: str) -> str:
+    """Return argparse's own words of ``message``, without the suggestions that follow them."""
+    return message.partition("; did you mean ")[0]
 
 
 def _width() -> int:

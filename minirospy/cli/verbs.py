@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from minirospy.cli.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import CommandLineError, Misuse, Parser
 from minirospy.errors import MinirospyError, UsageError, did_you_mean
 from minirospy.names import parse_arguments
 
@@ -20,18 +20,27 @@ __all__ = ["Command", "Family", "HelpStatus", "Verb"]
 
 
 class Command(NamedTuple):
-    """A command without verbs. ``interrupted`` is the exit status at Ctrl-C."""
+    """A command without verbs. ``interrupted`` is the exit status at Ctrl-C, ``misuse_status`` that of a usage error."""
 
     name: str
     parser: Callable[[], Parser]
     body: Callable[..., int | None]
     interrupted: int = 0
     wording: Wording = MappingProxyType({})
+    misuse_status: int = 2
 
     def main(self, argv: Sequence[str] | None = None) -> int:
         """Run the command; return the exit status as :func:`minirospy.cli.command.run` does."""
         words = sys.argv[1:] if argv is None else argv
-        return run(self.name, lambda: _call(self.parser(), self.body, words), self.interrupted, self.wording)
+        return run(self.name, lambda: self._run(words), self.interrupted, self.wording)
+
+    def _run(self, words: Sequence[str]) -> int | None:
+        try:
+            return _call(self.parser(), self.body, words)
+        except CommandLineError as error:
+            if self.misuse_status == 2:
+                raise
+            return complain(self.name, error, self.misuse_status, error.ros_text)
 
 
 class Verb(NamedTuple):

@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/rosnode, http://wiki.ros.org/ROS/Slave_API.
 from __future__ import annotations
 
 import contextlib
+import socket
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,7 +23,7 @@ from minirospy.introspect.topics import UNKNOWN_TYPE
 from minirospy.runtime.rpc.master_proxy import SlaveProxy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from minirospy.runtime.rpc.master_proxy import BusConnection, MasterProxy, SystemState
 
@@ -34,6 +35,7 @@ __all__ = [
     "find_node",
     "forget_node",
     "has_exited",
+    "is_unknown_host",
     "kill_node",
     "list_nodes",
     "neighbours",
@@ -177,10 +179,26 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             pass  # one that ends at once may have had no time for a whole answer
 
 
-def unreachable_nodes(graph: Graph, timeout: float = 3.0) -> list[NodeAddress]:
-    """Return the registered nodes that do not answer."""
-    nodes = graph.addresses(list_nodes(graph))
-    return [node for node in nodes if node.uri is not None and not _answers(graph, node, timeout)]
+def is_unknown_host(error: NodeUnreachableError) -> bool:
+    """Return whether a node did not answer because the name of its host cannot be resolved."""
+    return isinstance(getattr(error.__cause__, "__cause__", None), socket.gaierror)
+
+
+def unreachable_nodes(
+    graph: Graph, timeout: float = 3.0, on_error: Callable[[NodeUnreachableError], object] | None = None
+) -> list[NodeAddress]:
+    """Return the registered nodes that do not answer; ``on_error`` is called with the error of each."""
+    found = []
+    for node in graph.addresses(list_nodes(graph)):
+        if node.uri is None:
+            continue
+        try:
+            ping_node(graph, node, timeout)
+        except NodeUnreachableError as error:
+            found.append(node)
+            if on_error:
+                on_error(error)
+    return found
 
 
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
@@ -236,22 +254,12 @@ def _service_uri(master: MasterProxy, service: str) -> str:
 
 
 def _is_same_host(one: str, other: str) -> bool:
-    import socket
-
     if one == other:
         return True
     try:
         return socket.gethostbyname(one) == socket.gethostbyname(other)
     except OSError:
         return False
-
-
-def _answers(graph: Graph, node: NodeAddress, timeout: float) -> bool:
-    try:
-        ping_node(graph, node, timeout)
-    except NodeUnreachableError:
-        return False
-    return True
 
 
 def _held_by(table: Mapping[str, Iterable[str]], node: str) -> list[str]:

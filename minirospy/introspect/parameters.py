@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ParameterFile",
+    "RootValueError",
     "delete_parameter",
     "dump_parameters",
     "flatten",
@@ -26,6 +27,10 @@ __all__ = [
 ]
 
 _NAMESPACE_KEY = "_ns"
+
+
+class RootValueError(ValueTextError):
+    """The root of the parameters was given a value that is not a dictionary."""
 
 
 class ParameterFile(NamedTuple):
@@ -93,7 +98,7 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
             own_namespace = str(document.pop(_NAMESPACE_KEY))
             target, own = _join(namespace, own_namespace), True
         if target == "/" and not isinstance(document, dict):
-            raise ValueTextError(where, "the values have no names: give a namespace to load them into")
+            raise RootValueError(where, "the values have no names: give a namespace to load them into")
         check_parameter(document, target)
         files.append(ParameterFile(target, document, own))
     return files

@@ -22,6 +22,7 @@ from minirospy.workspace.packages import Packages
 
 __all__ = [
     "STDIN",
+    "LaunchFileNotFoundError",
     "Problems",
     "Source",
     "describe_args",
@@ -36,6 +37,18 @@ STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
 
 Problems = list[LaunchError]
+
+
+class LaunchFileNotFoundError(MinirospyError):
+    """A command line names no launch file; ``ros_text`` is what ROS prints about it, ``hint`` what to do."""
+
+    def __init__(self, ros_text: str, hint: str) -> None:
+        super().__init__(ros_text, hint)
+        self.ros_text = ros_text
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.ros_text}: {self.hint}"
 
 
 class Source(NamedTuple):
@@ -117,16 +130,16 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
         try:
             return [str(packages.find_resource(package, file))]
         except NotFoundError as error:
-            raise MinirospyError(
-                f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch "
-                f"file name: {error}{_package_with(file, packages)}"
+            raise LaunchFileNotFoundError(
+                f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch file name",
+                f"{error}{_package_with(file, packages)}",
             ) from error
 
     for file in what:
         if not Path(file).is_file():
-            raise MinirospyError(
-                f"[{file}] is not a launch file name: type roslaunch PACKAGE FILE, or a path"
-                + (_near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages))
+            hint = _near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages)
+            raise LaunchFileNotFoundError(
+                f"[{file}] is not a launch file name", f"type roslaunch PACKAGE FILE, or a path{hint}"
             )
     return what
 

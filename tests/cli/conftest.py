@@ -109,11 +109,11 @@ Command = Callable[..., Result]
 
 def without_ros_words(err: str) -> str:
     """Return what minirospy adds to stderr: without the usage and the errors in ROS's words, which test_wording.py tests."""
-    own = re.compile(r"[a-z][\w.-]*( \w+)?: (?!error: )|WARNING: |did you mean ")
+    own = re.compile(r"(?!usage: )[a-z][\w.-]*( \w+)?: (?!error: )|WARNING: |did you mean ")
     lines = err.splitlines(keepends=True)
     if not any(re.match(r"[a-z][\w.-]*( \w+)?: ERROR: ", line) for line in lines):
         return err
-    return "".join(line for line in lines if own.match(line) and not line.startswith("Usage: "))
+    return "".join(line for line in lines if own.match(line))
 
 
 def own_lines(err: str) -> list[str]:

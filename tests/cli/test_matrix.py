@@ -132,10 +132,17 @@ ROS_STATUS = {
     "rosservice args": 2,
     "rosservice call": 2,
     "rosparam set": TYPED_WRONG,
+    "rosrun": 3,
     "rosmsg package": EX_USAGE,
     "rossrv package": EX_USAGE,
 }
 """The exit status where a name does not exist, unless it is 1: as ROS has it."""
+
+REPORTED_BY_ROS = {"rosnode cleanup": "ERROR: connection refused to [http://localhost:1/]\n"}
+"""What is on stderr of a command that succeeds: the nodes that do not answer."""
+
+USAGE_STATUS = {"rosgraph": 255}
+"""The exit status of a usage error, unless it is 2: as ROS has it."""
 
 GRAPH = [name for name, row in ROWS.items() if row.asks]
 
@@ -183,6 +190,11 @@ def run(line: str, **streams: Any) -> Result:
         status,
         *(put[name].getvalue() if isinstance(put[name], Told) else "" for name in ("stdout", "stderr")),
     )
+
+
+def usage_out(line: str) -> str:
+    """Return what a usage error prints on standard output: nothing, but for rosgraph."""
+    return run("rosgraph -h").out.partition("usage: ")[0] if line == "rosgraph" else ""
 
 
 def one_line(result: Result, line: str) -> str:
@@ -263,7 +275,7 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
         options = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", run(f"{line} -h").out)) - {"--help"}
         for option in ("--nonsense", *sorted(options)):
             result = run(f"{line} {option}x")
-            assert (result.status, result.out) == (TYPED_WRONG, ""), (line, option)
+            assert (result.status, result.out) == (USAGE_STATUS.get(line, TYPED_WRONG), usage_out(line)), line
             said = one_line(result, line)
             assert f"{option}x" in said
             assert (
@@ -275,8 +287,9 @@ def test_an_option_that_no_command_has() -> None:
     """Of every command that is installed, whoever tests the rest of it."""
     for name in scripts():
         result = run(f"{name} --nonsense")
-        assert result.status in ((1,) if name in ("rospack", "rosstack") else (TYPED_WRONG, EX_USAGE)), name
-        assert result.status == EX_USAGE or not result.out
+        usage = USAGE_STATUS.get(name, 1 if name in ("rospack", "rosstack") else TYPED_WRONG)
+        assert result.status in (usage, EX_USAGE), name
+        assert result.status == EX_USAGE or result.out == usage_out(name)
         own = without_ros_words(result.err)
         assert re.fullmatch(rf"({name}: ERROR|\[{name}\] Error): [^\n]*--nonsense[^\n]*\n", own)
 
@@ -290,6 +303,7 @@ def test_a_missing_argument(lines: list[str]) -> None:
         # What ROS's usage does not have in brackets, though it may be left out.
         if usage.split() and line not in (
             "minirospy",
+            "rosgraph",
             "rosparam dump",
             *(
                 f"{name} {verb}"
@@ -298,7 +312,8 @@ def test_a_missing_argument(lines: list[str]) -> None:
             ),
         ):
             result = run(line)
-            assert (result.status, result.out) == (TYPED_WRONG, ""), line
+            out = run("rosrun -h").out.partition("\n\n")[0] + "\n" if line == "rosrun" else ""
+            assert (result.status, result.out) == (TYPED_WRONG, out), line
             one_line(result, line)
 
 
@@ -318,13 +333,19 @@ def test_the_other_name_of_each_command() -> None:
         if name and not ELSEWHERE.match(name):
             ours, theirs = run(f"minirospy {noun} --nonsense"), run(f"{name} --nonsense")
             assert ours.status == theirs.status
-            assert theirs.status in (TYPED_WRONG, EX_USAGE)
+            assert theirs.status in (USAGE_STATUS.get(name, TYPED_WRONG), EX_USAGE)
             assert name == "roscore" or ours == theirs
 
 
 # --- what is not there
 
-ROS_OUTPUT = {"rosnode ping": "rosnode: node is [/nope]\n", "rosversion": "Cannot locate [nope]\n"}
+RULE = "-" * 80 + "\n"
+ROS_OUTPUT = {
+    "rosnode ping": "rosnode: node is [/nope]\n",
+    "rosnode info": f"{RULE}Node [/nope]\nPublications: None\n\nSubscriptions: None\n\nServices: None\n\n",
+    "rosversion": "Cannot locate [nope]\n",
+    "rosrun": f"[rosrun] Couldn't find executable named nope below {PYPROJECT.parent / 'msgs' / 'std_msgs'}\n",
+}
 """What the real commands print to stdout about a name that nothing has."""
 
 
@@ -335,7 +356,7 @@ def test_a_name_that_nobody_has(line: str, graph: Robot) -> None:
     if row.quiet:
         assert result == (0, "\n", "")
     elif line == "rosmsg-proto":
-        assert (result.status, result.err.count("\n")) == (1, 1)
+        assert (result.status, result.err.count("\n")) == (1, 2)
     else:
         assert result.status == ROS_STATUS.get(line, 1)
         assert result.out == ROS_OUTPUT.get(line, "")
@@ -361,9 +382,8 @@ def test_no_master(uri: str, status: int, says: str, monkeypatch: pytest.MonkeyP
     for line in GRAPH:
         result = run(f"{line} {ROWS[line].good or ROWS[line].unknown}")
         assert result.status == (2 if line.startswith("rosservice") else status), line
-        assert result.out == (
-            "rosnode: node is [/robot]\n" if (line, status) == ("rosnode ping", 1) else ""
-        ), line
+        ros_output = {"rosnode ping": "rosnode: node is [/robot]\n", "rosnode info": RULE}
+        assert result.out == (ros_output.get(line, "") if status == 1 else ""), line
         said = one_line(result, line)
         assert uri in said
         assert says in said
@@ -428,7 +448,7 @@ def test_a_closed_pipe(line: str, graph: Robot) -> None:
     os.close(reader)
     with open(writer, "w", encoding="utf-8") as pipe:
         result = run(f"{line} {ROWS[line].good}", stdout=pipe)
-    assert (result.status, result.err) == (0, "")
+    assert (result.status, result.err) == (0, REPORTED_BY_ROS.get(line, ""))
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux has it")
@@ -450,7 +470,7 @@ def test_a_full_disk(line: str, graph: Robot) -> None:
 def test_closed_streams(line: str, graph: Robot) -> None:
     """`<&- >&- 2>&-`, and a Windows program without a console."""
     words = f"{line} {ROWS[line].good}"
-    assert run(words, stdin=None, stdout=None).err == ""
+    assert run(words, stdin=None, stdout=None).err == REPORTED_BY_ROS.get(line, "")
     assert run(words, stdin=None, stdout=None, stderr=None).status in (0, 1)
 
 
@@ -485,7 +505,7 @@ def test_an_output_that_cannot_encode(graph: Robot) -> None:
 def test_words_that_are_no_text(line: str, graph: Robot) -> None:
     """A byte that is no UTF-8, as Python hands it on."""
     result = run(f"{line} \udcff")
-    assert (result.status, result.out) == (TYPED_WRONG, "")
+    assert (result.status, result.out) == (TYPED_WRONG, RULE if line == "rosnode info" else "")
     assert "no UTF-8 text" in one_line(result, line)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.cli.ros import rosrun
+from tests.cli.conftest import own_lines
 
 BIN = Path(sys.executable).parent
 posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX systems")
@@ -129,18 +130,18 @@ def test_a_script_without_a_first_line_is_the_shells(package: Path) -> None:
 
 
 def fails(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+    """Return the exit status and the line of our own of a command that fails."""
     status = rosrun.main(words)
-    out, err = capsys.readouterr()
-    assert not out
-    assert err.count("\n") == 1
-    return status, err.removeprefix("rosrun: ERROR: ").rstrip()
+    own = own_lines(capsys.readouterr().err)
+    assert len(own) == 1
+    return status, own[0].removeprefix("rosrun: ERROR: ")
 
 
 @posix
 @pytest.mark.parametrize(
     ("program", "why"),
     [
-        ("elsewhere", "its first line asks for [/no/such/shell -x], which is not there"),
+        ("elsewhere", "its first line names [/no/such/shell -x], which does not exist"),
         ("windows", "its lines end as those of Windows"),
     ],
 )
@@ -158,28 +159,28 @@ def test_a_terminal_without_a_workspace(capsys: pytest.CaptureFixture[str]) -> N
     )
 
 
-def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert fails(capsys, "my")[1].startswith("type rosrun PACKAGE PROGRAM: [my] has ")
+def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert fails(capsys, "my")[1].startswith("type rosrun PACKAGE EXECUTABLE: [my] has ")
     assert "talker.py" in fails(capsys, "my")[1]
     assert fails(capsys, "mi", "x") == (
-        1,
+        2,
         "package [mi] not found; did you mean my? (ROS_PACKAGE_PATH names the folders that are searched)",
     )
     assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
     # The package forgotten, or not set off by a blank.
     for word in ("talker.py", "my/talker.py"):
-        assert fails(capsys, word) == (2, "type rosrun PACKAGE PROGRAM, as `rosrun my talker.py`")
+        assert fails(capsys, word) == (2, "type rosrun PACKAGE EXECUTABLE, as `rosrun my talker.py`")
     assert fails(capsys, "nowhere.py")[1].startswith("package [nowhere.py] not found")
     # Where no name is near, those that there are; a path is one below the package.
     for wrong in ("zzz", "/etc/passwd"):
         status, said = fails(capsys, "my", wrong)
-        assert status == 1
+        assert status == 3
         assert said.startswith(f"executable [{wrong}] not found: package [my] in {package} has dies, ")
         assert "talker.py" in said
     (package.parent / "none").mkdir()
     (package.parent / "none" / "package.xml").write_text("<package><name>none</name></package>")
     assert fails(capsys, "none", "x")[1].endswith("/none has no programs")
-    assert fails(capsys, "none")[1] == "type rosrun PACKAGE PROGRAM: [none] has no programs"
+    assert fails(capsys, "none")[1] == "type rosrun PACKAGE EXECUTABLE: [none] has no programs"
     assert fails(capsys, "--prefix") == (
         2,
         "option --prefix is unknown, or lacks its value (`rosrun -h` shows what there is)",
@@ -188,13 +189,11 @@ def test_typed_wrong(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @posix
-def test_what_is_not_executable_is_told_how_to_become_so(
-    package: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_file_that_is_not_executable(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (package / "scripts" / "twin").chmod(0o644)
     (package / "nodes" / "twin").chmod(0o644)
     path = package / "nodes" / "twin"
-    assert fails(capsys, "my", "twin") == (1, f"{path} is not executable: chmod +x {path}")
+    assert fails(capsys, "my", "twin") == (3, f"{path} is not executable: chmod +x {path}")
 
 
 def test_a_bad_master_uri_is_no_hindrance(package: Path) -> None:

@@ -201,7 +201,7 @@ def test_pub_from_standard_input_and_file(
         (["/t", "std_msgs/Bol", "True"], 1, "did you mean std_msgs/Bool"),
         (["/t", "Bool", "True"], 1, "did you mean std_msgs/Bool"),
         (["/t", "std_msgs/Bool", "datum: True"], 1, "No field name [datum] ([std_msgs/Bool] has bool data)"),
-        (["/t", "std_msgs/Bool", "data: [1"], 1, "'data: [1': "),
+        (["/t", "std_msgs/Bool", "data: [1"], 2, "'data: [1': "),
         (["/t", "std_msgs/Int32", "hi"], 1, "([std_msgs/Int32] has int32 data)"),
         (
             ["/t", "std_msgs/Bool", "data:True"],
@@ -339,7 +339,7 @@ def test_echo_options_that_cannot_be(master: str, command: Any) -> None:
 
 
 def test_bags_come_later(command: Any) -> None:
-    for words in (["list", "-b", "x.bag"], ["echo", "-b", "x.bag", "/t"], ["echo", "-b", "x.bag"]):
+    for words in (["list", "-b", __file__], ["echo", "-b", __file__, "/t"], ["echo", "-b", __file__]):
         assert command("rostopic", *words) == (
             1, "", f"rostopic: ERROR: `rostopic {words[0]} -b`: bag files cannot be read yet, "
             "they come with a later version\n",

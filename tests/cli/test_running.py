@@ -168,13 +168,13 @@ def test_rosrun_passes_words_and_status_on(package: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "status", "says"),
     [
-        (["rpi_fero", "x"], 1, "did you mean rpi_feros"),
-        (["rpi_feros", "led_actuato.py"], 1, "did you mean led_actuator.py"),
-        (["rpi_feros"], 2, "type rosrun PACKAGE PROGRAM"),
+        (["rpi_fero", "x"], 2, "did you mean rpi_feros"),
+        (["rpi_feros", "led_actuato.py"], 3, "did you mean led_actuator.py"),
+        (["rpi_feros"], 2, "type rosrun PACKAGE EXECUTABLE"),
         (["--what", "a", "b"], 2, "--what is unknown"),
     ],
 )
-def test_rosrun_typed_wrong(
+def test_rosrun_usage_errors(
     words: list[str], status: int, says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert rosrun.main(words) == status

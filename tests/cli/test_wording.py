@@ -39,6 +39,23 @@ USAGE = "Usage: rostopic list [/namespace]\n\n"
         ("rosparam get nope", 1, "ERROR: Parameter [/nope] is not set\n"),
         ("rosparam delete nope", 1, "ERROR: parameter [/nope] is not set\n"),
         ("rosmsg md5 std_msgs/Nope", 1, "Cannot locate [std_msgs/Nope]\n"),
+        ("rosmsg show nope", 1, "Could not find msg 'nope'\n"),
+        ("rosmsg show a/b/c", 1, "Unable to load msg [a/b/c]: invalid name [a/b/c]\n"),
+        ("rosrun nope nope", 2, "[rospack] Error: package 'nope' not found\n"),
+        ("roslaunch nope.launch", 1, "RLException: [nope.launch] is not a launch file name\n"),
+        ("rostopic list -b nope.bag", 1, "ERROR: bag file [nope.bag] does not exist\n"),
+        (
+            "rostopic delay",
+            2,
+            "usage: rostopic delay [options] /topic\n"
+            "rostopic: error: the following arguments are required: topic\n",
+        ),
+        ("rostopic pub -f nope.yaml /t std_msgs/Bool", 1, "ERROR: file does not exist: nope.yaml\n"),
+        (
+            "rostopic pub /t geometry_msgs/Point 1 2",
+            1,
+            "ERROR: Not enough arguments:\n * Given: [1, 2]\n * Expected: ['x', 'y', 'z']\n\nArgs are: [x y z]\n",
+        ),
     ],
 )
 def test_error_begins_with_ros_words(

@@ -25,7 +25,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "command_compatibility.md"
 REAL = Path("/usr/bin")
 OURS = Path(sys.executable).parent
 
-_UNKNOWN = "what does not exist is an error: exit 1 and one line"
+_STATUS = "the same text; exit {} in place of 0, since it is an error"
+_UNKNOWN = _STATUS.format(1)
 _TRACEBACK = "real ROS ends with a traceback"
 _PIPE = "real ROS waits for a name in the terminal or from a pipe that brings none"
 
@@ -134,7 +135,7 @@ rosservice call /ns/empty {{}}
 rosservice call /ns/empty 5
 rosservice call /set_led_state -v <<< data: true\\n---\\ndata: false\\n---\\n
 rosservice call /set_led_state <<< data: true\\n ## real ROS forgets a document that has no --- behind it
-rosservice call /set_led_state ## a call without values is an error: exit 2
+rosservice call /set_led_state ## no values, neither typed nor piped: an error, exit 2; real ROS calls nothing, exit 0
 rosservice call /set_led_state 1 2
 rosservice call /set_led_state 'dta: 1'
 rosservice call /set_led_state nope
@@ -143,7 +144,7 @@ rosservice call /fail
 rosservice call /nope
 rosservice call
 rosparam
-rosparam gt ## an unknown verb is an error: exit 64, as of rostopic
+rosparam gt ## {_STATUS.format(64)}
 rosparam list
 rosparam list /p/d
 rosparam list /nope
@@ -206,6 +207,7 @@ rossrv show SetBool
 rossrv show Empty
 rossrv show <<< std_srvs/SetBool\\n
 rossrv show nope
+rossrv show std_srvs/Nope
 rossrv show -b nope.bag std_srvs/Empty
 rossrv info std_srvs/Trigger
 rossrv md5 std_srvs/SetBool
@@ -225,19 +227,21 @@ rosmsg-proto msg sensor_msgs/Image -f 1 -e
 rosmsg-proto srv nav_msgs/SetMap
 rosmsg-proto srv std_srvs/SetBool
 rosmsg-proto msg nope
+rosmsg-proto msg a/b
+rosmsg-proto srv nope
 rosmsg-proto
 """
 
 HELP = """
 rostopic bw -h
-rostopic delay -h ## ours names its own argument
+rostopic delay -h
 rostopic echo -h
 rostopic find -h
 rostopic hz -h
 rostopic info -h
 rostopic list -h
 rostopic pub -h
-rostopic type -h ## ours names its own argument
+rostopic type -h
 rosnode ping -h
 rosnode list -h
 rosnode info -h
@@ -271,15 +275,15 @@ roslaunch -h
 roscore -h
 roslaunch-deps -h
 roslaunch-logs -h
-rosgraph -h ## ours has an option
-roswtf -h ## another program: minirospy doctor
-rosrun -h ## help of our own
+rosgraph -h
+roswtf -h
+rosrun -h
 rosunit -h
-rosversion -h ## help of our own
+rosversion -h
 """
 """Ours prints ROS's help, then what it has besides."""
 
-WRONG = """
+WRONG = f"""
 rostopic bw --nonsense
 rostopic echo --nonsense
 rostopic find --nonsense
@@ -348,11 +352,19 @@ roscore --nonsense
 roslaunch-deps
 roslaunch-deps --nonsense
 roslaunch-logs --nonsense
-rosrun ## a usage error: exit 2
-rosrun nope nope ## what does not exist: exit 1
+rosrun ## {_STATUS.format(2)}
+rosrun nope nope
+rosrun std_msgs nope
 rosversion nope
-rosgraph x ## a usage error: exit 2
-rosgraph --nonsense ## a usage error: exit 2
+rosversion
+rosversion a b
+rosgraph x
+rosgraph --nonsense
+rostopic type
+rostopic type --nonsense /a
+rostopic delay a b
+rostopic delay -w x /a
+rostopic delay --nonsense /a
 rosunit
 """
 
@@ -397,7 +409,7 @@ rostopic echo -b nope.bag /tiny
 rostopic echo --fliter m.data /tiny
 rostopic echo
 rostopic echo -n1 /button_state/nope ## a field that is not there is an error: exit 1; real ROS waits for ever
-rostopic echo -n1 /poly/polygon/points/x ## an array is no message: exit 1; real ROS waits for ever
+rostopic echo -n1 /poly/polygon/points/x ## an array is not a message: exit 1; real ROS waits for ever
 rostopic echo -n1 --filter 'm.(' /button_state ## what is not Python is an error: exit 2; real ROS prints tracebacks
 rostopic echo -n1 /image/data ## real ROS ends with a traceback
 rostopic hz
@@ -431,7 +443,9 @@ rostopic pub -1 -r 5 /out std_msgs/Bool 1
 rostopic pub -r 0 /out std_msgs/Bool 1
 rostopic pub -f nope.yaml /out std_msgs/Bool
 rostopic pub -f nope.yaml /out std_msgs/Bool 1
-rostopic pub -1 /out std_msgs/Bool 'data: [1' ## a value that is not YAML: exit 1
+rostopic pub -1 /out std_msgs/Bool 'data: [1'
+rostopic pub -1 /out std_msgs/Bool '{dta: 1}'
+rostopic pub -1 /out std_msgs/Header 1 2 3 4 5
 rostopic pub -1 /out std_msgs/Bol 1
 rostopic pub /out
 """
@@ -501,11 +515,11 @@ rosparam list
 rosparam delete
 """
 
-UNREACHABLE = """
+UNREACHABLE = f"""
 rosnode info dead
 rosnode info unresolved
-rosnode ping -c 1 dead ## a node that does not answer: exit 1
-rosnode ping -c 1 unresolved ## a node that does not answer: exit 1
+rosnode ping -c 1 dead ## {_STATUS.format(1)}
+rosnode ping -c 1 unresolved ## {_STATUS.format(1)}
 rosnode cleanup <<< n\\n
 rosservice type /dead/srv
 rosservice info /dead/srv
@@ -531,7 +545,7 @@ rostopic echo /a
 rostopic hz /a
 rostopic pub -1 /a std_msgs/Bool 1
 rosnode list
-rosnode info /a ## nothing is printed before it is known
+rosnode info /a
 rosnode ping /a
 rosnode cleanup
 rosservice list
@@ -542,41 +556,8 @@ rosparam set /a 1
 rosparam load values.yaml
 """
 
-OTHER_WORDS = {
-    "roslaunch nope nope.launch",
-    "roslaunch nope.launch",
-    "rosmsg package nope",
-    "rosmsg show ''",
-    "rosmsg show -b nope.bag std_msgs/Bool",
-    "rosmsg show std_msgs/Bol",
-    "rosmsg show std_msgs/msg/Bool",
-    "rosmsg show std_srvs/SetBool",
-    "rosmsg-proto msg nope",
-    "rosnode cleanup <<< n\\n",
-    "rosnode cleanup <<< y\\n",
-    "rosnode ping",
-    "rosnode ping -c 1 unresolved",
-    "rosparam load /etc/os-release",
-    "rosrun nope nope",
-    "rosservice call /fail",
-    "rosservice call /ns/empty 5",
-    "rosservice call /scene/set_logger_level rosout",
-    "rosservice call /set_led_state 'dta: 1'",
-    "rosservice call /set_led_state 1 2",
-    "rossrv show -b nope.bag std_srvs/Empty",
-    "rossrv show nope",
-    "rostopic delay",
-    "rostopic echo -b nope.bag /tiny",
-    "rostopic list -b nope.bag",
-    "rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3",
-    "rostopic pub -1 -v /out geometry_msgs/Point 1 2",
-    "rostopic pub -1 /out std_msgs/Bol 1",
-    "rostopic pub -1 /out std_msgs/Bool 'data: [1'",
-    "rostopic pub -f nope.yaml /out std_msgs/Bool",
-    "rostopic type /scan /poly",
-}
-"""Lines whose error does not begin with ROS's words: those have ROS's paths or Python's texts in them, are about something that
-is not an error here, or are not printed yet."""
+OTHER_WORDS = {"rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3"}
+"""Lines where ROS prints an error that ours does not print first: what is an error in ROS is none here."""
 
 _STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
 _CHANGING = [
@@ -588,6 +569,13 @@ _CHANGING = [
     (re.compile(r"(?<=://localhost:)\d+|(?<=://127.0.0.1:)\d+"), "40000"),
     (re.compile(r"\(\d+ - (\S+?):\d+\) \[\d+\]"), r"(40000 - \1:50000) [9]"),
     (re.compile(r"(?<=Pid: )\d+"), "4711"),
+    # Where packages are installed.
+    (re.compile(r"\[\['\S*/(?=\w+/(?:msg|srv)'\]\])"), "[['SHARE/"),
+    (re.compile(r"(?<=named nope below )\S*/"), "SHARE/"),
+    (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
+    # roslaunch colours its errors also where they go to a file, and writes tracebacks that ours has none of.
+    (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),
+    (re.compile(r"^The traceback for the exception was written to the log file\n", re.MULTILINE), ""),
 ]
 
 
@@ -676,18 +664,20 @@ def page(sections: dict[str, list[Row]]) -> str:
     """Return the table as Markdown."""
     rows = [row for section in sections.values() for row in section]
     equal = sum(row.equal for row in rows)
+    same_text = sum(row.real.out == row.ours.out for row in rows if not row.equal)
     worded = [row for row in rows if row.has_ros_words]
     same = sum(row.same_words for row in worded)
     lines = [
-        "# The commands beside those of real ROS",
+        "# The commands compared with those of real ROS",
         "",
         "Written by `tests/interop/command_table.py` (`WRITE=1 make interop`) from what Debian's ROS 1 and minirospy print on",
         "the same graph; do not edit. Compared are standard output, byte for byte, and the exit status: of "
         f"{len(rows)} lines {equal} are equal,",
-        f"{len(rows) - equal} differ on purpose; of help, ours begins with ROS's. Of {len(worded)} lines where ROS",
-        "prints an error",
-        f"in words of its own (not a traceback), ours prints the same words first in {same}, then a line of its own. Long output",
-        "is cut here, not in the comparison; numbers that change from run to run are replaced.",
+        f"{same_text} print the same and have another exit status, {len(rows) - equal - same_text} differ on purpose, with the "
+        "reason in bold. Help starts with ROS's text.",
+        f"Of {len(worded)} lines where ROS prints an error (not a traceback), ours prints the same text first in {same}, then "
+        "its own line. Long",
+        "output is cut here, not in the comparison; numbers and folders that change from run to run are replaced.",
     ]
     for title, section in sections.items():
         lines += ["", f"## {title}", "", "| typed | real ROS | minirospy |", "|---|---|---|"]
@@ -761,6 +751,8 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
         # Nodes come in the order of a set there, which no two runs share.
         out = "".join(sorted(out.splitlines(keepends=True)))
+        if "Usage: " not in err:
+            err = "".join(sorted(err.splitlines(keepends=True)))
     return Ended(status, *(_steady(part, folder) for part in (out, err)))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from typing import NoReturn
 
 from minirospy.cli.command import NO_MASTER
 from minirospy.cli.parser import Parser
@@ -18,6 +19,7 @@ from minirospy.introspect.nodes import Neighbours, neighbours
 
 __all__ = ["COMMAND", "main"]
 
+_MISUSE = 255
 _PAUSE_SECONDS = 1.0
 
 
@@ -26,9 +28,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     return COMMAND.main(argv)
 
 
+_ROS_HELP = """rosgraph is a command-line tool for debugging the ROS Computation Graph.
+
+Usage:
+\trosgraph
+
+"""
+
+
+class _RosgraphParser(Parser):
+    """Prints ROS's help, also of a usage error, as ROS does."""
+
+    def format_help(self) -> str:
+        return _ROS_HELP + super().format_help()
+
+    def error(self, message: str, ros: str = "") -> NoReturn:
+        """Raise the CommandLineError of ``message``; ROS's help is on standard output."""
+        sys.stdout.write(_ROS_HELP)
+        super().error(message, ros)
+
+
 def _parser() -> Parser:
-    parser = Parser(
-        "rosgraph", description="Print the nodes, who sends to them and to whom they send, each second."
+    parser = _RosgraphParser(
+        "rosgraph", description="Print the nodes, the senders and the receivers of each, once a second."
     )
     parser.add_argument("-1", "--once", action="store_true", help="print it once and exit")
     return parser
@@ -56,7 +78,7 @@ def _text(nodes: dict[str, Neighbours], services: Sequence[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-COMMAND = Command("rosgraph", _parser, _rosgraph, wording={"master": NO_MASTER})
+COMMAND = Command("rosgraph", _parser, _rosgraph, wording={"master": NO_MASTER}, misuse_status=_MISUSE)
 
 if __name__ == "__main__":
     sys.exit(main())

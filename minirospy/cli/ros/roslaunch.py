@@ -10,12 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy import private_files
+from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
 from minirospy.launch.command import shell_line
-from minirospy.launch.load import STDIN, Source, find_files, load_sources, resolved_arg_docs
+from minirospy.launch.load import (
+    STDIN,
+    LaunchFileNotFoundError,
+    Source,
+    find_files,
+    load_sources,
+    resolved_arg_docs,
+)
 from minirospy.launch.spec import ArgDoc, LaunchSpec, NodeSpec
 from minirospy.workspace.packages import Packages
 
@@ -72,7 +80,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _roslaunch(**words: Any) -> int:
-    options = LaunchOptions(**words)
+    try:
+        return _launch(LaunchOptions(**words))
+    except LaunchFileNotFoundError as error:
+        raise WordedError(error, RosText(f"RLException: {error.ros_text}")) from error
+    except LaunchError as error:
+        raise WordedError(error, RosText(f"RLException: {error.text}")) from error
+
+
+def _launch(options: LaunchOptions) -> int:
     environment = Environment.read()
     if options.port is not None:
         if not 0 < options.port < 65536:

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from minirospy.cli.command import RosText, refuse_bag
+from minirospy.cli.command import RosText, WordedError, refuse_bag
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.errors import NotFoundError
 from minirospy.introspect.interfaces import Interfaces, Kind
 
 __all__ = ["ROSMSG", "ROSSRV", "main", "main_srv"]
@@ -50,13 +51,35 @@ class _Verbs:
 
     def show(self, type: str | None, raw: bool, bag: str | None) -> None:
         if bag:
-            refuse_bag(f"{self.command} show")
+            refuse_bag(f"{self.command} show", bag)
         interfaces = self._interfaces()
         for name in _names(type):
-            for type_ in interfaces.find(name.removesuffix(f".{self.kind.value}")):
+            try:
+                types = interfaces.find(name.removesuffix(f".{self.kind.value}"))
+            except NotFoundError as error:
+                raise WordedError(error, RosText(self._cannot_show(name))) from error
+            for type_ in types:
                 if "/" not in name:
                     print(f"[{type_}]:")
                 print(interfaces.text(type_) if raw else interfaces.description(type_))
+
+    def _cannot_show(self, name: str) -> str:
+        """Return ROS's text about a type that does not exist."""
+        from minirospy.workspace.packages import Packages
+
+        package, slash, base = name.partition("/")
+        if not slash:
+            return f"Could not find msg '{name}'"
+        refused = (
+            f"Unable to load msg [{name}]" if self.kind is Kind.MESSAGE else f"Unknown srv type [{name}]"
+        )
+        if "/" in base:
+            return f"{refused}: invalid name [{name}]"
+        try:
+            folder = Packages().find(package) / self.kind.value
+        except NotFoundError:
+            return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path"
+        return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"
 
     def list_parser(self) -> Parser:
         return Parser(f"{self.command} list", f"List all {self.kind.word} types.", f"{self.command} list")
@@ -98,7 +121,11 @@ class _Verbs:
     def package(self, package: str | None, one_line: bool) -> None:
         interfaces = self._interfaces()
         for name in _names(package):
-            print((" " if one_line else "\n").join(interfaces.in_package(name)))
+            try:
+                types = interfaces.in_package(name)
+            except NotFoundError as error:
+                raise WordedError(error, RosText(_invalid_package(name), 64)) from error
+            print((" " if one_line else "\n").join(types))
 
     def packages_parser(self) -> Parser:
         parser = Parser(
@@ -141,11 +168,18 @@ def _names(name: str | None) -> list[str]:
     return names
 
 
+def _invalid_package(name: str) -> str:
+    """Return ROS's text about a package that does not exist: the folders that were searched are part of it."""
+    from minirospy.workspace.packages import Packages
+
+    roots = (f"\nROS path [{number}]={root}" for number, root in enumerate(Packages().roots))
+    return f"Invalid package: {name}{''.join(roots)}"
+
+
 def _family(command: str, kind: Kind) -> Family:
     verbs = _Verbs(command, kind)
     word = kind.word
     unknown_type = {f"{word} type": RosText("Cannot locate [{name}]")}
-    unknown_package = {"package": RosText("Invalid package: {name}", 64)}
     return Family(
         command,
         f"{command} is a command-line tool for displaying information about ROS {word.capitalize()} types.",
@@ -165,7 +199,6 @@ def _family(command: str, kind: Kind) -> Family:
                 f"List {word}s in a package",
                 verbs.package_parser,
                 verbs.package,
-                unknown_package,
             ),
             Verb("packages", f"List packages that contain {word}s", verbs.packages_parser, verbs.packages),
         ),

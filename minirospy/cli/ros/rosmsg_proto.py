@@ -69,7 +69,8 @@ def _rosmsg_proto(
     try:
         text = _prototype(mode, type, exclude_slots.split(","), empty_arrays)
     except (NotFoundError, DefinitionError) as error:
-        return fail(1, f"Unknown message class: {type} ({error})")
+        kind = "class:" if "/" in type else "name"
+        return fail(1, f"Unknown message {kind} {type}\nrosmsg-proto: ERROR: {error}")
     if flow_style:
         text = _restyled(text, flow=flow_style == "1")
     if prefix:

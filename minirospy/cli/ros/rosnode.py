@@ -9,15 +9,17 @@ import sys
 import time
 from collections.abc import Sequence
 
-from minirospy.cli.command import RosText, complain
+from minirospy.cli.command import RosText, WordedError, complain
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import MasterUnreachableError, NodeUnreachableError, NotFoundError, UsageError
-from minirospy.introspect.graph import Graph, NodeAddress
+from minirospy.escape import escaped
+from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.nodes import (
     NodeDetail,
     find_node,
     forget_node,
+    is_unknown_host,
     kill_node,
     list_nodes,
     node_connections,
@@ -78,7 +80,10 @@ def _ping(node: str | None, all: bool, count: int) -> int:
             return _ping_all(graph)
         name = graph.resolve(node)
         print(f"rosnode: node is [{name}]", flush=True)
-        return _ping_one(graph, find_node(graph, name), count)
+        try:
+            return _ping_one(graph, find_node(graph, name), count)
+        except NodeUnreachableError as error:
+            raise WordedError(error, RosText(_no_answer(error))) from error
 
 
 def _no_node_to_ping() -> Misuse:
@@ -89,9 +94,11 @@ def _no_node_to_ping() -> Misuse:
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
+    # Twice, as ROS does: its list of nodes is an error inside of the error.
+    ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
-        f"Please enter a node to ping. Available nodes are:{available}",
+        f"{ros}rosnode: error: Please enter a node to ping",
     )
 
 
@@ -122,13 +129,20 @@ def _ping_all(graph: Graph) -> int:
         try:
             _ping_once(graph, node, [])
         except NodeUnreachableError as error:
-            complain("rosnode", error, ros_text=f"ERROR: connection refused to [{error.uri}]")
+            complain("rosnode", error, ros_text=_no_answer(error))
             silent += 1
     return 1 if silent else 0
 
 
+def _no_answer(error: NodeUnreachableError) -> str:
+    """Return ROS's text about a node that does not answer."""
+    if is_unknown_host(error):
+        return f"ERROR: Unknown host [{node_host(error.uri)}] for node [{error.name}]"
+    return f"ERROR: connection refused to [{error.uri}]"
+
+
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print; the milliseconds are in ``times`` before the line is seen, whoever then types Ctrl-C."""
+    """Ping and print; the milliseconds are in ``times`` before the line is printed, in case Ctrl-C follows."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -179,14 +193,16 @@ def _info(nodes: Sequence[str], quiet: bool) -> int:
     failed = 0
     with Graph.open("rosnode") as graph:
         for name in nodes:
+            print(_RULE, flush=True)
             try:
                 detail = node_detail(graph, graph.resolve(name))
             except NotFoundError as error:
+                print(node_text(NodeDetail(error.name, None, [], [], [])))
                 complain("rosnode", error, ros_text=f"cannot contact [{error.name}]: unknown node")
                 failed += 1
                 continue
 
-            print(f"{_RULE}\n{node_text(detail)}")
+            print(node_text(detail))
             if not quiet:
                 failed += not _print_connections(graph, detail)
     return 1 if failed else 0
@@ -311,7 +327,9 @@ def _cleanup_parser() -> Parser:
 
 def _cleanup() -> int:
     with Graph.open("rosnode") as graph:
-        silent = unreachable_nodes(graph)
+        silent = unreachable_nodes(
+            graph, on_error=lambda error: print(escaped(_no_answer(error)), file=sys.stderr)
+        )
         if not silent:
             return 0
         print("Unable to contact the following nodes:\n" + "\n".join(f" * {node.name}" for node in silent))
@@ -347,10 +365,7 @@ FAMILY = Family(
             "test connectivity to node",
             _ping_parser,
             _ping,
-            {
-                "node": RosText("cannot ping [{name}]: unknown node"),
-                "no answer from node": RosText("ERROR: connection refused to [{uri}]"),
-            },
+            {"node": RosText("cannot ping [{name}]: unknown node")},
         ),
         Verb("list", "list active nodes", _list_parser, _list),
         Verb("info", "print information about node", _info_parser, _info),

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import RosText
+from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError, ValueTextError
@@ -133,7 +133,10 @@ def _load(file: str, namespace: str, verbose: bool) -> None:
             print(f"reading parameters from {'stdin' if from_stdin else f'[{file}]'}", flush=True)
         text = sys.stdin.read() if from_stdin else _read(file)
 
-        found = parameters.parse_parameters(text, where, graph.resolve(namespace))
+        try:
+            found = parameters.parse_parameters(text, where, graph.resolve(namespace))
+        except parameters.RootValueError as error:
+            raise WordedError(error, RosText("ERROR: global / can only be set to a dictionary")) from error
         for each in found:
             if verbose and each.own_namespace:
                 print(f"reading parameters into namespace [{each.namespace}]")

@@ -9,37 +9,45 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.command import run
+from minirospy.cli.command import RosText, WordedError, run
 from minirospy.environment import export_local
 from minirospy.errors import NotFoundError, UsageError
-from minirospy.workspace.packages import Packages
+from minirospy.workspace.packages import NotExecutableError, Packages
 
 __all__ = ["main"]
 
-_USAGE = """usage: rosrun [--prefix COMMAND] [--debug] PACKAGE PROGRAM [arguments ...]
-
-Runs PROGRAM of PACKAGE with the arguments. Its exit status is the program's own; 1 where it is not found.
-PROGRAM is a file's name, wherever in PACKAGE it lies, or its path from there.
-  -p, --prefix COMMAND  put COMMAND in front, as 'gdb --args'
-  -d, --debug           print what is run
+_ROS_USAGE = """Usage: rosrun [--prefix cmd] [--debug] PACKAGE EXECUTABLE [ARGS]
+  rosrun will locate PACKAGE and try to find
+  an executable named EXECUTABLE in the PACKAGE tree.
+  If it finds it, it will run it with ARGS.
 """
+
+_HELP = f"""{_ROS_USAGE}
+EXECUTABLE is a file's name anywhere below PACKAGE, or its path from there.
+  -p, --prefix cmd  put cmd in front, as 'gdb --args'
+  -d, --debug       print what is run
+Exit status: the program's; 2 where PACKAGE, 3 where EXECUTABLE is not found.
+"""
+
+_NO_PACKAGE = 2
+_NO_EXECUTABLE = 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return the program's exit status, or as in minirospy.cli.command where it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # What the program ignores is for it to say.
+    # The program decides which signals it ignores.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
     prefix: list[str] = []
     debug = False
-    # By hand: what follows PROGRAM is its own, also where it looks like an option of ours.
+    # By hand: the words after EXECUTABLE belong to it, even if they look like options of ours.
     while words and words[0].startswith("-"):
         option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
-            print(_USAGE, end="")
+            print(_HELP, end="")
             return 0
         if option in ("-d", "--debug") and not equals:
             debug = True
@@ -49,11 +57,14 @@ def _rosrun(words: list[str]) -> int:
             raise UsageError(
                 f"option {option} is unknown, or lacks its value (`rosrun -h` shows what there is)"
             )
+
     packages = Packages()
     if len(words) < 2:
-        raise UsageError(f"type rosrun PACKAGE PROGRAM{_what_there_is(words, packages)}")
+        print(_ROS_USAGE, end="", flush=True)
+        raise UsageError(f"type rosrun PACKAGE EXECUTABLE{_what_there_is(words, packages)}")
+
     package, program, *arguments = words
-    commands = packages.find_executables(package, program)
+    commands = _find(packages, package, program)
     chosen = commands[0] if len(commands) == 1 else _choose(package, commands, packages)
     command = [*prefix, *chosen, *arguments]
     if debug:
@@ -77,6 +88,25 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
             raise
         return f", as `rosrun {owner} {program}`"
     return f": [{words[0]}] has {', '.join(programs) or 'no programs'}"
+
+
+def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
+    """Return the commands that run a program. Raises WordedError, with the exit status of ROS's rosrun."""
+    try:
+        folder = packages.find(package)
+    except NotFoundError as error:
+        ros = RosText(f"[rospack] Error: package '{package}' not found", _NO_PACKAGE)
+        raise WordedError(error, ros) from error
+    try:
+        return packages.find_executables(package, program)
+    except (NotFoundError, NotExecutableError) as error:
+        is_path = "/" in program
+        where = f"{folder}/{program}" if is_path else f"{program} below {folder}"
+        print(f"[rosrun] Couldn't find executable named {where}")
+        if isinstance(error, NotExecutableError) and not is_path:
+            print("[rosrun] Found the following, but they're either not files,\n[rosrun] or not executable:")
+            print(f"[rosrun]   {error.path}")
+        raise WordedError(error, RosText("", _NO_EXECUTABLE)) from error
 
 
 def _split(prefix: str) -> list[str]:
@@ -119,13 +149,13 @@ def _replace(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # A script without a first line that says what runs it: shells run it themselves.
+            # A script without a `#!` line: shells run it themselves.
             os.execv("/bin/sh", ["/bin/sh", *command])
         why = error.strerror or str(error)
         if error.errno == errno.ENOENT and os.path.isfile(command[0]):
             with open(command[0], "rb") as file:
                 line = file.readline(200).decode("utf-8", "replace").rstrip("\n")
-            why = f"its first line asks for [{line.removeprefix('#!').strip()}], which is not there"
+            why = f"its first line names [{line.removeprefix('#!').strip()}], which does not exist"
             if line.endswith("\r"):
                 why = "its lines end as those of Windows: save it with Unix line ends (`sed -i 's/\\r$//' FILE`)"
         raise UsageError(f"cannot run {command[0]}: {why}") from error

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from minirospy.cli.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
-from minirospy.errors import MessageException, ServiceException, UsageError
+from minirospy.errors import CallFailed, MessageException, ServiceException, UsageError
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
@@ -134,7 +134,7 @@ def _call_parser() -> Parser:
         "args",
         nargs="*",
         default=[],
-        help="the request's values; a terminal asks for missing ones",
+        help="the request's values; in a terminal, missing ones are prompted for",
         completer="request_text",
     )
     parser.add_argument("-v", dest="verbose", action="store_true", help="print verbose output")
@@ -157,10 +157,18 @@ def _call(
             try:
                 response = services.call_service(graph, name, type_, request)
             except ServiceException as error:
-                raise WordedError(error, RosText(f"ERROR: {error}", 2)) from error
+                raise WordedError(error, RosText(f"ERROR: {_as_ros_shows(error, name)}", 2)) from error
             except MessageException as error:
                 raise _incorrect_type(type_, error) from error
             print(response, flush=True)
+
+
+def _as_ros_shows(error: ServiceException, service: str) -> str:
+    """Return ROS's text of an error: of the handler's own it shows the bytes."""
+    cause = error.__cause__
+    if isinstance(cause, CallFailed):
+        return f"service [{service}] responded with an error: {cause.text!r}"
+    return str(error)
 
 
 def _incorrect_type(type_: str, error: MessageException) -> WordedError:
@@ -182,7 +190,7 @@ def _warn_waiting(graph: Graph, service: str) -> None:
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
     """Yield the requests: one of the values typed, or one for each document on standard input.
 
-    In a terminal the fields that have no value yet are asked for.
+    In a terminal the fields that have no value yet are prompted for.
     """
     from minirospy.introspect.values import message_values, parse_arguments, parse_lines
 
@@ -210,7 +218,7 @@ def _filled_request(type_: str, values: Sequence[object]) -> Message:
     except MessageException as error:
         given = [f" * {value} (type {type(value).__name__})" for value in values]
         lines = [
-            f"ERROR: Incompatible arguments to call service:\n{error}",
+            f"ERROR: Incompatible arguments to call service:\n{error.__cause__ or error}",
             "Provided arguments are:",
             *given,
             f"\nService arguments are: [{' '.join(services.service_arguments(type_))}]",

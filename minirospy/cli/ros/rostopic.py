@@ -65,7 +65,7 @@ def _list(
     arguments: Arguments | None = None,
 ) -> None:
     if bag:
-        refuse_bag("rostopic list")
+        refuse_bag("rostopic list", bag)
     if publishers and subscribers:
         raise Misuse("argument -s: not allowed with argument -p", "you may only specify one of -p, -s")
     show = partial(_print_topics, publishers=not subscribers, subscribers=not publishers, verbose=verbose)
@@ -134,14 +134,19 @@ def _info(topic: str, arguments: Arguments | None = None) -> None:
 
 
 def _type_parser() -> Parser:
-    parser = Parser("rostopic type", "Print the type of a topic, or of a field of its messages.")
-    _add_topic(parser)
+    parser = Parser(
+        "rostopic type",
+        "Print the type of a topic, or of a field of its messages.",
+        "rostopic type [-h] topic_or_field",
+        ros_argparse="rostopic type",
+    )
+    parser.add_argument("topic_or_field", help="Topic or field name", completer="topics")
     return parser
 
 
-def _type(topic: str, arguments: Arguments | None = None) -> None:
+def _type(topic_or_field: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
-        name = graph.resolve(topic)
+        name = graph.resolve(topic_or_field)
         try:
             field = topics.require_topic(graph, name)
             path_type = topics.topic_field_type(field) if field.path else ""
@@ -225,7 +230,7 @@ def _echo(
     arguments: Arguments | None = None,
 ) -> None:
     if bag:
-        refuse_bag("rostopic echo")
+        refuse_bag("rostopic echo", bag)
     if topic is None:
         raise Misuse("a topic is missing", "topic must be specified")
     if all:
@@ -362,10 +367,21 @@ def _bw(topics: Sequence[str], window: int, arguments: Arguments | None = None) 
 
 def _delay_parser() -> Parser:
     parser = Parser(
-        "rostopic delay", "Print the delay of messages, from the stamps in their headers to their arrival."
+        "rostopic delay",
+        "Print the delay of messages, from the stamps in their headers to their arrival.",
+        "rostopic delay [options] /topic",
+        ros_argparse="rostopic",
     )
-    _add_topic(parser)
-    _add_window(parser, default=0)
+    # As ROS spells it.
+    parser.add_argument("topic", help="topic name to be calcurated the delay", completer="topics")
+    parser.add_argument(
+        "-w",
+        "--window",
+        type=int,
+        default=0,
+        metavar="WINDOW_SIZE",
+        help="window size, in # of messages, for calculating rate",
+    )
     _add_tcp_nodelay(parser)
     return parser
 

@@ -8,15 +8,17 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.cli.command import tool_node, warn
-from minirospy.errors import UsageError
+from minirospy.cli.command import RosText, WordedError, tool_node, warn
+from minirospy.cli.parser import Misuse
+from minirospy.errors import MessageException, NotFoundError, SerializationError, UsageError, ValueTextError
 from minirospy.idl.load import message_class
+from minirospy.idl.message import get_printable_message_args
 from minirospy.introspect.echo import fill_message
 from minirospy.introspect.graph import Graph, why_illegal
 from minirospy.introspect.publishing import publish_all, values_to_publish
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import ToolNode, TopicPublisher
@@ -48,13 +50,13 @@ class Publishing(NamedTuple):
 
 def publish(options: Publishing, arguments: Arguments | None) -> None:
     """Publish, with the remapping arguments that were among the words of the command line."""
-    cls = message_class(options.type)
+    cls = _message_class(options.type)
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
-        values = next(all_values)
-        # Before the node is there, so that a typing error shows immediately.
-        message = fill_message(cls, values)
+        # Before the node is started, so that a typing error shows immediately.
+        values = _first_values(all_values, options)
+        message = _filled(cls, values)
         state = graph.state()
         awaited = topic in state.subscribers
         if awaited or topic in state.publishers:
@@ -90,6 +92,48 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
                 print(f"publishing {message}", flush=True)
 
         publish_all(node, publisher, messages, options.rate or _FILE_RATE, show)
+
+
+def _message_class(type_: str) -> type[Message]:
+    try:
+        return message_class(type_)
+    except NotFoundError as error:
+        package = type_.partition("/")[0]
+        hint = f"If this is a valid message type, perhaps you need to type 'rosmake {package}'"
+        raise WordedError(error, RosText(f"ERROR: invalid message type: {type_}.\n{hint}")) from error
+
+
+def _first_values(all_values: Iterator[list[object]], options: Publishing) -> list[object]:
+    """Return the values of the first message. Raises WordedError, and Misuse where an argument is not YAML."""
+    try:
+        return next(all_values)
+    except NotFoundError as error:
+        raise WordedError(error, RosText(f"ERROR: file does not exist: {error.name}")) from error
+    except ValueTextError as error:
+        if options.file is not None or not options.args:
+            raise
+        raise Misuse(str(error), _ros_argument_error(error.text)) from error
+
+
+def _ros_argument_error(text: str) -> str:
+    """Return ROS's text about an argument that is not YAML: that of PyYAML's own parser."""
+    import yaml
+
+    try:
+        yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        return f"Argument error: {error}"
+    return ""
+
+
+def _filled(cls: type[Message], values: list[object]) -> Message:
+    try:
+        return fill_message(cls, values)
+    except MessageException as error:
+        if isinstance(error.__cause__, SerializationError):
+            raise  # ROS finds these only when it publishes, and prints nothing
+        text = f"ERROR: {error.__cause__ or error}\n\nArgs are: [{get_printable_message_args(cls())}]"
+        raise WordedError(error, RosText(text)) from error
 
 
 def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:

@@ -6,12 +6,13 @@ ROS has set it, else noetic, the last of ROS 1 and the one whose files and wire 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 
-from minirospy.cli.parser import Parser
+from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
-from minirospy.errors import NotFoundError, UsageError
+from minirospy.errors import NotFoundError
 from minirospy.workspace.folders import distro_codename
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
@@ -26,20 +27,32 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser() -> Parser:
     parser = Parser(
-        "rosversion", description="Print the version of a package, or the name of the ROS distribution."
+        "rosversion",
+        "Print the version of a package, or the name of the ROS distribution.",
+        "rosversion [-h] [-s] [-d] [-a] [package]",
+        # As ROS has it, which confuses the two.
+        about="rosversion -d: Output the version of the given package\n"
+        "rosversion package: Output the ROS distribution name",
+        ros_argparse="rosversion",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "package", nargs="?", help="the package's name, as rpi_feros", completer="package_names"
+        "package", nargs="?", help="The ROS package name (e.g. 'roscpp')", completer="package_names"
     )
-    parser.add_argument("-s", "--skip-newline", action="store_true", help="print no line feed at the end")
-    parser.add_argument("-d", "--distro", action="store_true", help="print the name of the ROS distribution")
-    parser.add_argument("-a", "--all", action="store_true", help="print every package and its version")
+    parser.add_argument("-s", "--skip-newline", action="store_true", help="Skip trailing newline")
+    parser.add_argument("-d", "--distro", action="store_true", help="Output the ROS distribution name")
+    parser.add_argument(
+        "-a", "--all", action="store_true", help="Show all ROS package names and their versions"
+    )
     return parser
 
 
 def _rosversion(package: str | None, skip_newline: bool, distro: bool, all: bool) -> None:
     if (package is not None) + distro + all != 1:
-        raise UsageError("name one package, or -d for the distribution, or -a for every package")
+        raise Misuse(
+            "name one package, or -d for the distribution, or -a for every package",
+            "one of the arguments package -d/--distro -a/--all is required",
+        )
 
     if distro:
         text = distro_codename()
