@@ -46,9 +46,6 @@ CHUNK_THRESHOLD = 768 * 1024
 _LARGE = 64 * 1024
 """A message of so many bytes is written from where it is, instead of being copied into the chunk."""
 
-_COMPRESSING = 4
-"""Chunks that may be compressed in parallel before the caller waits for the first of them."""
-
 _MAX_CHUNK = (MAX_UINT32, MAX_UINT32 - MAX_UINT32 // 64)
 """Bytes of a chunk that is written as it is, and of one that is compressed: noise becomes longer by that."""
 
@@ -100,6 +97,7 @@ class _Stream:
 class _Complete(NamedTuple):
     """A chunk that waits to be written: how to get its data, their size, and what the indexes say."""
 
+    is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]
     size: int
     start: int
@@ -120,8 +118,9 @@ class BagWriter:
     """Writes a bag of version 2.0 into a binary stream, which it does not close. For one thread at a time.
 
     ``chunk_threshold`` in bytes may be changed at any time. ``executor``: where chunks are compressed in parallel; without
-    one, the calling thread does it. ``continued``: append to the bag that the stream has, in place of its index. Raise
-    BagCompressionError if the compression is unknown or its library missing.
+    one, the calling thread does it. ``most_waiting``: if more chunks are waiting for that, :meth:`write` waits, too.
+    ``continued``: append to the bag that the stream has, in place of its index. Raise BagCompressionError if the compression
+    is unknown or its library missing.
 
     After an OSError of the stream, such as a full disk, :meth:`salvage` makes a readable bag of what has been written;
     for that the stream must be without a buffer. Buffers gain nothing here: chunks are written whole.
@@ -134,6 +133,7 @@ class BagWriter:
         compression: str = NONE,
         chunk_threshold: int = CHUNK_THRESHOLD,
         executor: Executor | None = None,
+        most_waiting: int = 4,
         continued: Continued | None = None,
     ) -> None:
         self.chunk_threshold = chunk_threshold
@@ -141,6 +141,7 @@ class BagWriter:
         """The chunks that have been written."""
         self._stream = stream
         self._executor = executor
+        self._most_waiting = most_waiting
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
@@ -181,7 +182,12 @@ class BagWriter:
     @property
     def size(self) -> int:
         """Bytes of the bag so far; chunks that are not compressed yet count with their full size."""
-        return self._position + sum(one.size for one in self._complete) + self._size
+        return self._position + self.gathered
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory that the stream has not been given yet."""
+        return self._size + sum(one.size for one in self._complete)
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Return the number of a new connection for :meth:`write`; ``header`` is the publisher's connection header.
@@ -260,10 +266,10 @@ class BagWriter:
             stream.clear()
 
         pieces = [*self._pieces, self._small] if self._small else self._pieces
-        complete = _Complete(self._data(pieces), self._size, start, end, counts, b"".join(indexes))
+        complete = _Complete(*self._data(pieces), self._size, start, end, counts, b"".join(indexes))
         self._start_chunk()
         self._complete.append(complete)
-        self._write_complete(0 if self._executor is None or self._compression == NONE else _COMPRESSING)
+        self._write_complete(self._most_waiting)
 
     def flush(self) -> None:
         """Write all messages so far into the stream, and flush it. Raise OSError."""
@@ -357,22 +363,24 @@ class BagWriter:
         # What is not bytes may be changed by its owner before it is written.
         self._pieces.append(body if type(body) is bytes else bytes(body))
 
-    def _data(self, pieces: list[Buffer]) -> Callable[[], list[Buffer]]:
-        """Return a function that gives the chunk's data as it is written."""
+    def _data(self, pieces: list[Buffer]) -> tuple[Callable[[], bool], Callable[[], list[Buffer]]]:
+        """Return two functions: whether the chunk's data, as it is written, is ready, and one that waits for it."""
         name = self._compression
         if name == NONE:
-            return lambda: pieces
+            return (lambda: True), (lambda: pieces)
 
         joined = b"".join(pieces)
         if self._executor is None:
-            return lambda: [compress(name, joined)]
+            return (lambda: True), (lambda: [compress(name, joined)])
         future = self._executor.submit(compress, name, joined)
-        return lambda: [future.result()]
+        return future.done, (lambda: [future.result()])
 
     def _write_complete(self, left: int) -> None:
-        """Write complete chunks until so many are left."""
-        while len(self._complete) > left:
+        """Write the complete chunks that are ready, and wait for the others until so many are left."""
+        while self._complete:
             chunk = self._complete[0]
+            if len(self._complete) <= left and not chunk.is_ready():
+                return
             data = chunk.data()
             stored = sum(map(len, data))
             header = encode_chunk_header(Chunk(self._compression, chunk.size, stored))

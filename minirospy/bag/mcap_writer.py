@@ -1,0 +1,118 @@
+"""Messages with their times in, an MCAP file out, laid out as the MCAP tools convert bags: profile ``ros1``.
+
+A connection is a channel; what its connection header has besides the type and the definition (md5sum, callerid, latching,
+...) is the channel's metadata, the definition a schema of encoding ``ros1msg``. Needs the extra ``minirospy[mcap]``.
+Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, BinaryIO
+
+from minirospy.bag.writer import CHUNK_THRESHOLD, Buffer
+from minirospy.errors import BagCompressionError, BagError, BagFormatError
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
+
+__all__ = ["COMPRESSIONS", "SCHEMA_FIELDS", "McapWriter", "check_mcap"]
+
+COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
+"""The names of the compressions of chunks, and those that the library gives them."""
+
+SCHEMA_FIELDS = ("type", "message_definition")
+"""The fields of a connection header that are the channel's schema; the others are its metadata."""
+
+_NEEDED = (*SCHEMA_FIELDS, "md5sum")
+
+
+def check_mcap() -> None:
+    """Raise BagError, which names the extra to install, unless MCAP files can be read and written."""
+    try:
+        import mcap.reader
+        import mcap.writer  # noqa: F401
+        import zstandard  # noqa: F401
+    except ImportError as error:
+        raise BagError(f"MCAP files need the library {error.name}: pip install 'minirospy[mcap]'") from error
+
+
+class McapWriter:
+    """Writes an MCAP file into a binary stream, which it does not close. As :class:`minirospy.bag.writer.BagWriter`.
+
+    ``compression``: none, lz4 or zstd. Raise BagCompressionError for another, BagError if the extra is missing.
+    """
+
+    def __init__(
+        self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_THRESHOLD
+    ) -> None:
+        if compression not in COMPRESSIONS:
+            raise BagCompressionError(compression, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
+        check_mcap()
+        from mcap.writer import CompressionType, Writer
+
+        self._stream = stream
+        self._chunk_size = chunk_size
+        self._gathered = 0
+        self._writer: Writer = Writer(
+            stream,
+            chunk_size=chunk_size,
+            compression=CompressionType[COMPRESSIONS[compression]],
+        )
+        self._writer.start(profile="ros1", library="minirospy")
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._sequences: dict[int, int] = {}
+        self._closed = False
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._stream.tell() + self._gathered
+
+    @property
+    def gathered(self) -> int:
+        """Bytes in memory that the stream has not been given yet."""
+        return self._gathered
+
+    def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
+        """Return the number of a new connection for :meth:`write`. Raise BagFormatError if its header lacks a field."""
+        for name in _NEEDED:
+            if name not in header:
+                raise BagFormatError(f'the connection header of {topic} has no field "{name}"')
+        text = header["message_definition"]
+        definition = text if isinstance(text, bytes) else text.encode("utf-8", "surrogateescape")
+        fields = {name: _text(value) for name, value in header.items() if name not in SCHEMA_FIELDS}
+
+        key = _text(header["type"]), definition
+        if key not in self._schemas:
+            self._schemas[key] = self._writer.register_schema(key[0], "ros1msg", definition)
+        return self._writer.register_channel(topic, "ros1", self._schemas[key], fields)
+
+    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
+        """Write a message that came at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
+        if time < 0:
+            raise BagFormatError(f"the time {time} ns is before 1970")
+        sequence = self._sequences.get(connection, 0)
+        self._sequences[connection] = (sequence + 1) % 2**32
+        whole = b"".join((body, tail)) if tail else body
+
+        self._gathered += len(whole)
+        # A view is copied into the chunk by the library.
+        self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
+        if self._gathered > self._chunk_size:
+            self._gathered = 0
+
+    def close(self) -> None:
+        """Complete the file: write its summary. Idempotent. Raise OSError."""
+        if not self._closed:
+            self._closed = True
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.flush()
+
+    def salvage(self, written: int | None = None) -> int:
+        """Raise OSError: a file without its summary is left to tools such as ``mcap recover``."""
+        raise OSError("the file has no summary")
+
+
+def _text(value: str | bytes) -> str:
+    return value if isinstance(value, str) else value.decode("utf-8", "replace")
