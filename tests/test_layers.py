@@ -15,7 +15,7 @@ LAYERS = [
     {"cli"},
     {"testing"},
     {"launch"},
-    {"introspect", "actionlib", "robots"},
+    {"introspect", "actionlib", "robots", "recording"},
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},

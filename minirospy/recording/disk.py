@@ -1,0 +1,134 @@
+"""Files that are written by a thread: whoever gives it bytes does not wait for the disk.
+
+What is queued counts in :attr:`DiskThread.pending`; the caller decides what to do when that becomes too much.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+__all__ = ["DiskThread", "QueuedFile"]
+
+Buffer = bytes | bytearray | memoryview
+
+
+class DiskThread:
+    """Does what is queued, in order, in a thread that starts with it. ``close`` waits for the queue's end."""
+
+    def __init__(self) -> None:
+        self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
+        # Two counters, each changed by one side only: no lock.
+        self._queued = self._done = 0
+        self._thread = threading.Thread(target=self._run, name="rosbag-disk")
+        self._thread.start()
+
+    @property
+    def pending(self) -> int:
+        """Bytes that are queued and not written yet."""
+        return self._queued - self._done
+
+    @property
+    def is_current(self) -> bool:
+        """Return whether the calling thread is this one."""
+        return threading.current_thread() is self._thread
+
+    def submit(self, function: Callable[[], object], size: int = 0) -> None:
+        """Queue a call, which writes ``size`` bytes. Of several threads one at a time."""
+        self._queued += size
+        self._queue.put((function, size))
+
+    def close(self) -> None:
+        """Wait until all is done, and end. A signal's exception in the waiting thread leaves the thread at work."""
+        self._queue.put(None)
+        self.join()
+
+    def join(self) -> None:
+        """Wait again for :meth:`close`."""
+        while self._thread.is_alive():
+            # In slices: on Windows no signal interrupts a wait.
+            self._thread.join(0.2)
+
+    def _run(self) -> None:
+        while (item := self._queue.get()) is not None:
+            function, size = item
+            function()
+            self._done += size
+
+
+class QueuedFile:
+    """A new file for a bag's writer, which is a stream as far as that needs one.
+
+    Calls are queued, and done immediately if the disk's thread itself makes them.
+
+    ``on_error(error)`` is called in that thread at the first OSError; what is still queued for the file is dropped then.
+    Raise OSError if the file cannot be created.
+    """
+
+    def __init__(self, disk: DiskThread, path: Path, on_error: Callable[[OSError], object]) -> None:
+        self.path = path
+        self._disk = disk
+        self._on_error = on_error
+        self._position = 0
+        self.failed = False
+        self._file = open(path, "w+b", buffering=0)  # noqa: SIM115 - closed by close()
+
+    def write(self, data: Buffer) -> int:
+        """Write all of ``data``, which must not change any more."""
+        size = len(data)
+        self._position += size
+        self._do(lambda: self._write_all(data), size)
+        return size
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Seek from the start, or to the end."""
+        if whence == os.SEEK_END:
+            # The writer seeks back to the header only, and then to the end, where nothing follows.
+            return self._position
+        self._position = offset
+        self._do(lambda: self._file.seek(offset))
+        return offset
+
+    def truncate(self, size: int | None = None) -> int:
+        """Cut the file off at the current position."""
+        position = self._position if size is None else size
+        self._do(lambda: self._file.truncate(position))
+        return position
+
+    def tell(self) -> int:
+        """Return the position where the next write goes."""
+        return self._position
+
+    def flush(self) -> None:
+        """Do nothing: the operating system has what is written."""
+
+    def written(self) -> int:
+        """Return how many bytes the file has. In the disk's thread."""
+        return os.fstat(self._file.fileno()).st_size
+
+    def close_file(self) -> None:
+        """Close the file behind what is queued."""
+        self._do(self._file.close)
+
+    def _do(self, call: Callable[[], object], size: int = 0) -> None:
+        if self._disk.is_current:
+            call()
+        else:
+            self._disk.submit(lambda: self._try(call), size)
+
+    def _try(self, call: Callable[[], object]) -> None:
+        if self.failed:
+            return
+        try:
+            call()
+        except OSError as error:
+            self.failed = True
+            self._on_error(error)
+
+    def _write_all(self, data: Buffer) -> None:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]

@@ -1,0 +1,111 @@
+"""What `rosbag record` is to do, and how its words are read: sizes, durations, topics.
+
+Source: http://wiki.ros.org/rosbag/Commandline#record.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+from minirospy.errors import UsageError
+
+__all__ = ["MEGABYTE", "RecordOptions", "parse_duration", "parse_size", "topic_filter"]
+
+KILOBYTE = 1024
+MEGABYTE = 1024 * 1024
+_SECOND = 10**9
+_UNITS = {"s": 1, "m": 60, "h": 3600}
+_MULTIPLIERS = {"k": 10**3, "M": 10**6, "G": 10**9}
+_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+class RecordOptions(NamedTuple):
+    """What to record, and into which files. Sizes are in bytes, times in nanoseconds; 0 is no limit."""
+
+    topics: tuple[str, ...] = ()
+    all_topics: bool = False
+    regex: bool = False
+    exclude: str = ""
+    node: str = ""
+    prefix: str = ""
+    """The file's name without ``.bag``, or what is in front of the date."""
+    append_date: bool = True
+    split: bool = False
+    max_splits: int = 0
+    max_size: int = 0
+    max_duration: int = 0
+    buffer_size: int = 256 * MEGABYTE
+    chunk_size: int = 768 * KILOBYTE
+    limit: int = 0
+    """Messages of each topic."""
+    min_space: int = 10**9
+    min_space_text: str = "1G"
+    compression: str = "none"
+    tcp_nodelay: bool = False
+    repeat_latched: bool = False
+    publish: bool = False
+    mcap: bool = False
+
+    @property
+    def follows_master(self) -> bool:
+        """Return whether topics may be added while it runs: the master is queried every second."""
+        return self.all_topics or self.regex or bool(self.node)
+
+    @property
+    def extension(self) -> str:
+        """The end of the files' names."""
+        return ".mcap" if self.mcap else ".bag"
+
+
+def parse_duration(text: str) -> int:
+    """Return the nanoseconds of ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError."""
+    number = _NUMBER.match(text)
+    if not number:
+        raise UsageError("Duration must start with a floating point number.")
+    unit = text[number.end() :] or "s"
+    if unit not in _UNITS:
+        raise UsageError("Duration unit must be s, m, or h")
+    nanoseconds = int(float(number[0]) * _UNITS[unit] * _SECOND)
+    if nanoseconds <= 0:
+        raise UsageError("Duration must be positive.")
+    return nanoseconds
+
+
+def parse_size(text: str) -> int:
+    """Return the bytes of ``1G``, ``500M``, ``20k`` or ``1000``: powers of 1000. Raise UsageError."""
+    number = re.match(r"\s*\d+", text)
+    multiplier = _MULTIPLIERS.get(text[number.end() : number.end() + 1], 1) if number else 0
+    if not number:
+        raise UsageError(f"the size {text!r} must be a number with G, M or k behind it")
+    return int(number[0]) * multiplier
+
+
+def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
+    """Return a function of a topic's global name: whether it is to be recorded. Raise UsageError on a bad expression.
+
+    ``subscribed_by_node``: for the topics that ``--node`` has brought, which need no further match. Expressions match whole
+    names.
+    """
+    exclude = _compiled(options.exclude) if options.exclude else None
+    patterns = [_compiled(topic) for topic in options.topics] if options.regex else []
+    names = frozenset(options.topics)
+
+    def matches(topic: str) -> bool:
+        if exclude and exclude.fullmatch(topic):
+            return False
+        if options.all_topics or subscribed_by_node:
+            return True
+        if options.regex:
+            return any(pattern.fullmatch(topic) for pattern in patterns)
+        return topic in names
+
+    return matches
+
+
+def _compiled(text: str) -> re.Pattern[str]:
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise UsageError(f"the regular expression {text!r} is wrong: {error}") from error

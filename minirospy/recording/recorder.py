@@ -1,0 +1,335 @@
+"""The node that records topics: `rosbag record`. Messages are written as they came, never deserialized.
+
+The workers that receive messages write them into the current chunk; a complete chunk is queued for the disk's thread. So
+nothing but the disk itself limits what is recorded, and what it cannot take is dropped and counted, topic by topic.
+Source: http://wiki.ros.org/rosbag/Commandline#record.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from minirospy import client
+from minirospy.client.session import current_session
+from minirospy.clock import SignalSafeEvent, wait_for_event
+from minirospy.errors import BagFormatError, MasterUnreachableError, RpcError
+from minirospy.idl.protocols import Message
+from minirospy.recording.bag_file import BagFile
+from minirospy.recording.disk import DiskThread
+from minirospy.recording.frames import ReceivedFrame, parts_of
+from minirospy.recording.options import RecordOptions, topic_filter
+from minirospy.recording.splits import Next, Splits, file_name
+
+__all__ = ["Recorder"]
+
+_TICK_SECONDS = 0.25
+_POLL_SECONDS = 1.0
+_REPORT_SECONDS = 5.0
+_SPACE_SECONDS = 20.0
+_TIME_SECONDS = 2.0
+
+
+class _Topic:
+    """A topic that is recorded: its subscriber, and how many messages it still takes (-1: any number)."""
+
+    def __init__(self, name: str, left: int) -> None:
+        self.name = name
+        self.left = left
+        self.subscriber: client.Subscriber[ReceivedFrame] | None = None
+
+
+class Recorder:
+    """Records topics from :meth:`run` on, as this process's node, which init_node has made.
+
+    Raise UsageError if an expression in ``options`` is wrong.
+    """
+
+    def __init__(self, options: RecordOptions) -> None:
+        self.options = options
+        self.status = 0
+        """The exit status: 1 once the disk has failed."""
+        self.dropped: Counter[str] = Counter()
+        """Messages of each topic that the disk was too slow for."""
+        self._matches = topic_filter(options)
+        self._matches_node = topic_filter(options, subscribed_by_node=True)
+        self._topics: dict[str, _Topic] = {}
+        self._lock = threading.Lock()
+        self._stop = SignalSafeEvent()
+        self._file: BagFile | None = None
+        self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
+        self._has_space = True
+        self._reported: Counter[str] = Counter()
+        self._clock: Callable[[], int] = time.time_ns
+        self._announcement: client.Publisher[Message] | None = None
+
+    def stop(self) -> None:
+        """Have :meth:`run` complete the file and return. From any thread."""
+        self._stop.set()
+
+    def run(self) -> int:
+        """Record until the node shuts down, or a limit of the options is reached; return the exit status."""
+        client.on_shutdown(self.stop)
+        if self.options.publish:
+            from std_msgs.msg import String
+
+            self._announcement = client.Publisher("begin_write", String, latch=True, queue_size=1)
+        if not self._wait_for_time():
+            return 0
+
+        workers = os.cpu_count() or 1
+        self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
+        self._disk = DiskThread()
+        self._splits = Splits(self.options, self._clock())
+        try:
+            with self._lock:
+                self._open(self._clock())
+            if self._file and self._check_space():
+                self._record()
+        except client.ROSInterruptException:
+            pass  # a registration was ended by the shutdown
+        finally:
+            self._finish()
+        return self.status
+
+    # --- the main thread
+
+    def _wait_for_time(self) -> bool:
+        """Wait until there is a time; return False at a shutdown."""
+        if not client.is_wallclock():
+            self._clock = lambda: client.get_rostime().to_nsec()
+            is_reported = False
+            start = time.monotonic()
+            while not self._clock() and not wait_for_event(self._stop, 0.01):
+                if time.monotonic() - start > _TIME_SECONDS and not is_reported:
+                    is_reported = True
+                    client.logwarn(
+                        "/use_sim_time set to true and no clock published.  Still waiting for valid time..."
+                    )
+        return not self._stop.is_set()
+
+    def _record(self) -> None:
+        if not self.options.regex:
+            for name in self.options.topics:
+                self._subscribe(client.resolve_name(name))
+
+        now = time.monotonic()
+        next_poll, next_report, next_space = now, now + _REPORT_SECONDS, now + _SPACE_SECONDS
+        while not self._stop.is_set():
+            now = time.monotonic()
+            if self.options.follows_master and now >= next_poll:
+                self._follow_master()
+                next_poll = now + _POLL_SECONDS
+            if now >= next_report:
+                self._report_drops()
+                next_report = now + _REPORT_SECONDS
+            if now >= next_space:
+                self._check_space()
+                next_space = now + _SPACE_SECONDS
+            if self.options.max_duration:
+                with self._lock:
+                    self._split(self._clock())
+            if self.options.limit:
+                self._end_finished()
+            wait_for_event(self._stop, _TICK_SECONDS)
+
+    def _subscribe(self, name: str) -> None:
+        if name in self._topics:
+            return
+        client.loginfo("Subscribing to %s", name)
+        topic = self._topics[name] = _Topic(name, self.options.limit or -1)
+        topic.subscriber = client.Subscriber(
+            name,
+            ReceivedFrame,
+            self._receive,
+            callback_args=topic,
+            tcp_nodelay=self.options.tcp_nodelay,
+        )
+
+    def _follow_master(self) -> None:
+        """Subscribe to the topics that have appeared."""
+        master = current_session().master
+        try:
+            state = master.get_system_state()
+        except (MasterUnreachableError, RpcError):
+            return
+        if self.options.all_topics or self.options.regex:
+            for name in state.publishers:
+                if self._matches(name):
+                    self._subscribe(name)
+        if self.options.node:
+            node = client.resolve_name(self.options.node)
+            for name, subscribers in state.subscribers.items():
+                if node in subscribers and self._matches_node(name):
+                    self._subscribe(name)
+
+    def _check_space(self) -> bool:
+        """Warn when the disk becomes full, and stop before it is; return whether there is room."""
+        file, least, text = self._file, self.options.min_space, self.options.min_space_text
+        if not file:
+            return False
+        try:
+            free = shutil.disk_usage(Path(file.active_name).absolute().parent).free
+        except OSError as error:
+            client.logwarn("Failed to check filesystem stats [%s].", error.strerror)
+            return True
+        if free < least:
+            client.logerr(
+                "Less than %s of space free on disk with %s. Disabling recording.", text, file.active_name
+            )
+            self.status = 1
+            self._stop.set()
+            return False
+        if free < 5 * least:
+            client.logwarn("Less than 5 x %s of space free on disk with '%s'.", text, file.active_name)
+        return True
+
+    def _report_drops(self) -> None:
+        """Log what has been dropped since the last report."""
+        with self._lock:
+            new = self.dropped - self._reported
+            self._reported = self.dropped.copy()
+        if new:
+            client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
+
+    def _end_finished(self) -> None:
+        """Unsubscribe from topics that have their number of messages; stop when all have."""
+        for topic in self._topics.values():
+            if not topic.left and topic.subscriber:
+                topic.subscriber.unregister()
+                topic.subscriber = None
+        if self._topics and not any(topic.left for topic in self._topics.values()):
+            self._stop.set()
+
+    def _finish(self) -> None:
+        """Complete the file; further Ctrl-C do not end that, until the third ends the process."""
+        self._stop.set()
+        # What this thread does from now on is its clean-up: a shutdown does not interrupt it.
+        client.is_shutdown()
+        with self._lock:
+            self._close()
+        closing = self._disk.close
+        while True:
+            try:
+                closing()
+                break
+            except KeyboardInterrupt:
+                client.logwarn("%d MB are still to be written", self._disk.pending // 10**6)
+                closing = self._disk.join
+        if self._executor:
+            self._executor.shutdown()
+        self._report_drops()
+        if self.dropped:
+            client.logwarn("The bag lacks messages that were dropped: %s", _counts(self.dropped))
+
+    # --- with the lock
+
+    def _open(self, now: int) -> None:
+        name = file_name(self.options, self._splits.count, time.time())
+        try:
+            self._file = BagFile(
+                name, self.options, self._disk, self._lock, self._executor, self._disk_failed
+            )
+        except OSError as error:
+            client.logerr(
+                "Error writing: Error opening file: %s.active (%s)", name, error.strerror or str(error)
+            )
+            self.status = 1
+            self._stop.set()
+            return
+
+        client.loginfo("Recording to '%s'.", name)
+        # With the time of the message that is the first of this file: they come before it.
+        for (topic, _), (header, body, tail) in self._latched.items():
+            self._file.write(topic, header, now, body, tail)
+        if self._announcement:
+            self._announcement.publish(self._announcement.data_class(name))
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file:
+            client.loginfo("Closing '%s'.", file.name)
+            file.close()
+
+    def _split(self, now: int) -> None:
+        """Go on in the next file where the time has come."""
+        while self._file:
+            action = self._splits.check(self._file.size, now)
+            if action is Next.CONTINUE:
+                return
+            name = self._file.name
+            self._close()
+            if action is Next.END:
+                self._stop.set()
+                return
+            for surplus in self._splits.closed(name):
+                self._disk.submit(partial(_remove, surplus))
+            self._open(now)
+
+    # --- the workers that receive
+
+    def _receive(self, message: ReceivedFrame, topic: _Topic) -> None:
+        now = self._clock()
+        header = message._connection_header
+        body, tail = parts_of(message.frame)
+        with self._lock:
+            if not self._file or not topic.left:
+                return
+            if topic.left > 0:
+                topic.left -= 1
+            self._split(now)
+            if not self._file:
+                return
+
+            if self.options.repeat_latched and header.get("latching") == "1":
+                kept = bytes(body) if not isinstance(body, bytes) else body
+                self._latched[topic.name, header.get("callerid", "")] = header, kept, tail
+            most = self.options.buffer_size
+            waiting = self._disk.pending + self._file.gathered
+            if most and waiting and waiting + len(body) + len(tail) > most:
+                self.dropped[topic.name] += 1
+                return
+            try:
+                self._file.write(topic.name, header, now, body, tail)
+            except BagFormatError as error:
+                self.dropped[topic.name] += 1
+                client.logerr("%s", error)
+
+    # --- the disk's thread
+
+    def _disk_failed(self, file: BagFile, error: OSError, lost: int) -> None:
+        why = error.strerror or str(error)
+        if lost < 0:
+            client.logerr("Error writing: %s: %s. `rosbag reindex` may save it", file.active_name, why)
+        else:
+            client.logerr(
+                "Error writing: %s: %s. Recording ends; %d messages are lost, the bag has those before",
+                file.name,
+                why,
+                lost,
+            )
+        with self._lock:
+            if self._file is file:
+                self._file = None
+        self.status = 1
+        self._stop.set()
+
+
+def _counts(counter: Counter[str]) -> str:
+    return ", ".join(f"{topic} {count}" for topic, count in counter.most_common())
+
+
+def _remove(name: str) -> None:
+    try:
+        os.unlink(name)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            client.logerr("Unable to remove %s: %s", name, error.strerror or str(error))
