@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import struct
 from collections import OrderedDict
-from collections.abc import Container, Iterable, Mapping
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from collections.abc import Container, Iterable
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple, Protocol
 
 from minirospy.bag import compression, records
 from minirospy.bag.records import Chunk, Connection
@@ -19,7 +19,7 @@ from minirospy.errors import BagFormatError
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
-__all__ = ["ChunkStream", "Found", "StoredChunk", "scan", "scan_connections", "size_of"]
+__all__ = ["ChunkStream", "Found", "StoredChunk", "scan", "scan_into", "size_of"]
 
 
 class StoredChunk(NamedTuple):
@@ -60,6 +60,10 @@ class ChunkStream:
             record = records.read_record(self.stream, limit)
             self._headers[position] = StoredChunk(records.parse_chunk_header(record), record.data_position)
         return self._headers[position]
+
+    def set_header(self, position: int, header: StoredChunk) -> None:
+        """Have the chunk at a position read by this header instead of the one in the file."""
+        self._headers[position] = header
 
     def data(self, position: int) -> bytes:
         """Return the decompressed data of the chunk at a position. Raise BagFormatError, BagCompressionError."""
@@ -138,12 +142,34 @@ _CPP = _Layout(struct.Struct("<13sI17sIII"), b"\x26\0\0\0" + _CONN, _OP + _TIME)
 _HEAD = 46
 
 
-def scan(data: bytes, ranks: Mapping[int, int], known: Container[int]) -> list[Found]:
+class Ranks(Protocol):
+    """The rank of a connection among those whose messages are wanted, or None: a dict, for example."""
+
+    def get(self, number: int, /) -> int | None:
+        """Return the rank."""
+
+
+def scan(data: bytes, ranks: Ranks, known: Container[int]) -> list[Found]:
     """Return the messages of a chunk's data whose connections have ``ranks``, in the order of the data.
 
     ``known`` are all connections of the bag: a message of another one is damage. Raise BagFormatError.
     """
     found: list[Found] = []
+    scan_into(found, data, ranks, known)
+    return found
+
+
+def scan_into(
+    found: list[Found],
+    data: bytes,
+    ranks: Ranks,
+    known: Container[int],
+    connections: dict[int, Connection] | None = None,
+) -> int:
+    """Add the messages of a chunk's data to ``found``, and its connections to ``connections``; return the data's size.
+
+    Raise BagFormatError, whose position is where the whole records end.
+    """
     add = found.append
     end, last_head = len(data), len(data) - _HEAD
     (form, first, second), other = _PYTHON, _CPP
@@ -154,7 +180,7 @@ def scan(data: bytes, ranks: Mapping[int, int], known: Container[int]) -> list[F
         if at <= last_head:
             one, number, two, seconds, nanoseconds, size = unpack(data, at)
             if one == first and two == second:
-                body = at + 46
+                body = at + _HEAD
                 if (after := body + size) > end:
                     raise BagFormatError(f"a message of {size} bytes does not fit into its chunk", at)
                 rank = ranks.get(number)
@@ -179,15 +205,8 @@ def scan(data: bytes, ranks: Mapping[int, int], known: Container[int]) -> list[F
                 add((record.time("time"), rank, at, record.data_position, record.end))
             elif number not in known:
                 raise BagFormatError(f"a message's connection {number} is not in the bag", at)
-        at = record.end
-    return found
-
-
-def scan_connections(data: bytes) -> dict[int, Connection]:
-    """Return the connections whose records are in a chunk's data. Raise BagFormatError."""
-    found: dict[int, Connection] = {}
-    for record in records.parse_records(data):
-        if record.op == records.OP_CONNECTION:
+        elif record.op == records.OP_CONNECTION and connections is not None:
             connection = records.parse_connection(record, data[record.data_position : record.end])
-            found.setdefault(connection.id, connection)
-    return found
+            connections.setdefault(connection.id, connection)
+        at = record.end
+    return end

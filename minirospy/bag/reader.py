@@ -11,6 +11,7 @@ from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
+from types import MappingProxyType
 from typing import BinaryIO
 
 from minirospy.bag import records
@@ -48,7 +49,10 @@ def open_bag(stream: BinaryIO) -> BagReader:
 
 
 class ChunkedReader(BagReader):
-    """A bag of version 2.0. ``connections`` and ``chunks`` may grow: a bag can be read while it is written."""
+    """A bag of version 2.0. ``connections`` and ``chunks`` may grow: a bag can be read while it is written.
+
+    ``headers``: of chunks whose header in the file is not complete, by their positions.
+    """
 
     def __init__(
         self,
@@ -57,6 +61,7 @@ class ChunkedReader(BagReader):
         chunks: Sequence[ChunkInfo],
         version: int = 200,
         index_position: int = 0,
+        headers: Mapping[int, StoredChunk] = MappingProxyType({}),
     ) -> None:
         self.version = version
         self.stream = stream
@@ -64,6 +69,8 @@ class ChunkedReader(BagReader):
         self.chunks = chunks
         self.index_position = index_position
         self._chunks = ChunkStream(stream)
+        for position, header in headers.items():
+            self._chunks.set_header(position, header)
         self._indexes: dict[int, ConnectionIndex] = {}
         self._indexed_chunks = 0
 
