@@ -6,11 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO, NamedTuple
 
-from minirospy.bag.chunks import StoredChunk, size_of
+from minirospy.bag.chunks import Found, StoredChunk, size_of
 from minirospy.bag.index import ConnectionIndex
 from minirospy.bag.records import ChunkInfo, Connection
 
-__all__ = ["BagReader", "Position", "StoredMessage"]
+__all__ = ["BagReader", "Block", "Position", "StoredMessage"]
 
 Position = int | tuple[int, int]
 """Where a message's record is: its chunk's position and its offset in there; in version 1.2 its position in the file."""
@@ -25,17 +25,40 @@ class StoredMessage(NamedTuple):
     position: Position
 
 
+class Block(NamedTuple):
+    """Messages that follow each other in the order of time, from one chunk.
+
+    ``found`` are time, rank (the place of its connection among those that were wanted), offset of the record, and start
+    and end of the body in ``data``. ``chunk`` is its position; None in bags of version 1.2.
+    """
+
+    chunk: int | None
+    data: bytes
+    found: Sequence[Found]
+
+
 class BagReader(ABC):
     """What can be read from a bag, of each version."""
 
     version: int
     """200 for 2.0."""
+    indexed = True
+    """Whether the bag has an index, or was made to have one."""
     stream: BinaryIO
     connections: dict[int, Connection]
     chunks: Sequence[ChunkInfo]
     """The chunks in the order of the file; none in bags of version 1.2."""
 
+    def prepare(self) -> None:
+        """Find the connections of a bag that has no index, as version 1.2 allows. Raise BagFormatError."""
+        return
+
     @abstractmethod
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """Yield what :meth:`messages` yields, in blocks: for those who read millions."""
+
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
@@ -44,6 +67,13 @@ class BagReader(ABC):
         They come in the order of time; those of one time in the order of the connections. Raise BagFormatError where
         the bag is damaged, when the messages before the damage have been yielded.
         """
+        self.prepare()
+        wanted = list(self.connections if connections is None else connections)
+        by_rank = [self.connections[number] for number in wanted]
+        for chunk, data, found in self.blocks(wanted, start, end):
+            for time, rank, at, body, after in found:
+                position = at if chunk is None else (chunk, at)
+                yield StoredMessage(by_rank[rank], time, data[body:after], position)
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:

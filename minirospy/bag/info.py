@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/rosbag/Commandline#info. The texts are those of ROS,
 
 from __future__ import annotations
 
+import re
 import time
 from array import array
 from collections import Counter
@@ -26,6 +27,7 @@ __all__ = [
     "frequency_of",
     "seconds",
     "summarize",
+    "value_of",
 ]
 
 _NUMPY_PAYS = 100_000
@@ -68,7 +70,7 @@ class Summary(NamedTuple):
 
 def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summary:
     """Return what a bag holds; with ``frequencies`` the whole index is read for the topics' rates. Raise BagFormatError."""
-    version = f"{reader.version // 100}.{reader.version % 100}"
+    version = f"{reader.version // 100}.{reader.version % 100}" + ("" if reader.indexed else " (unindexed)")
     connections = list(reader.connections.values())
     counts: Counter[int] = Counter()
     if reader.chunks:
@@ -203,6 +205,36 @@ def as_yaml(summary: Summary) -> str:
         if topic.frequency is not None:
             lines.append(f"      frequency: {topic.frequency:.4f}")
     return "\n".join([*lines, ""])
+
+
+def value_of(text: str, key: str) -> str:
+    """Return the value of a key in what :func:`as_yaml` gives, such as ``start`` or ``topics[0].type``, as -k prints it.
+
+    Raise LookupError if it does not exist.
+    """
+    import yaml
+
+    if not re.fullmatch(r"[A-Za-z_]\w*(\[-?\d+\])*(\.[A-Za-z_]\w*(\[-?\d+\])*)*", key):
+        raise LookupError(key)
+    value: object = yaml.safe_load(text)
+    for part in re.findall(r"\w+|-\d+", key):
+        if isinstance(value, dict):
+            value = value[part]
+        elif isinstance(value, list) and re.fullmatch(r"-?\d+", part):
+            value = value[int(part)]
+        else:
+            raise LookupError(key)
+
+    if isinstance(value, list):
+        return "".join(f"- {_printed(each)}\n" for each in value)
+    return _printed(value).replace("\n  ", "\n") if isinstance(value, dict) else str(value)
+
+
+def _printed(value: object) -> str:
+    """Return an item of a list as -k prints it."""
+    if not isinstance(value, dict):
+        return f"  {value}"
+    return "\n  ".join(f"{name}: {each}" for name, each in value.items())
 
 
 def _median_period(times: Sequence[array[int]]) -> float | None:

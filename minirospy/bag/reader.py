@@ -15,14 +15,14 @@ from types import MappingProxyType
 from typing import BinaryIO
 
 from minirospy.bag import records
-from minirospy.bag.base import BagReader, Position, StoredMessage
+from minirospy.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.bag.chunks import THREADS, ChunkStream, Found, StoredChunk, scan, size_of
 from minirospy.bag.index import ConnectionIndex, read_entries
 from minirospy.bag.reader12 import open_bag12
 from minirospy.bag.records import ChunkInfo, Connection
 from minirospy.errors import BagFormatError, BagUnindexedError, BagVersionError
 
-__all__ = ["BagReader", "ChunkedReader", "Position", "StoredMessage", "open_bag"]
+__all__ = ["ChunkedReader", "open_bag"]
 
 _CACHE_SIZE = 64 * 1024 * 1024
 """Bytes of chunks that overlap in time and are kept decompressed; of more, some are read again."""
@@ -97,13 +97,11 @@ class ChunkedReader(BagReader):
             raise BagUnindexedError(str(error)) from error
         return cls(stream, connections, chunks, version, header.index_pos)
 
-    def messages(
-        self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
-    ) -> Iterator[StoredMessage]:
-        """See :meth:`BagReader.messages`."""
-        wanted = list(self.connections if connections is None else connections)
-        by_rank = [self.connections[number] for number in wanted]
-        ranks = {number: rank for rank, number in enumerate(wanted)}
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """See :meth:`BagReader.blocks`."""
+        ranks = {number: rank for rank, number in enumerate(connections)}
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
         chunks = [
@@ -115,11 +113,8 @@ class ChunkedReader(BagReader):
         ]
         chunks.sort(key=_start_time)
 
-        merged = _Merge(self._chunks, chunks, ranks, self.connections, (first, last))
         try:
-            for position, data, found in merged.blocks():
-                for time, rank, at, body, after in found:
-                    yield StoredMessage(by_rank[rank], time, data[body:after], (position, at))
+            yield from _Merge(self._chunks, chunks, ranks, self.connections, (first, last)).blocks()
         finally:
             self._chunks.prepare(())
 
@@ -208,8 +203,8 @@ class _Merge:
         self._loaded: OrderedDict[int, tuple[bytes, list[Found]]] = OrderedDict()
         self._size = 0
 
-    def blocks(self) -> Iterator[tuple[int, bytes, Sequence[Found]]]:
-        """Yield a chunk's position, its data, and those of its messages that come next."""
+    def blocks(self) -> Iterator[Block]:
+        """Yield the messages that come next."""
         heap: list[tuple[int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
@@ -231,7 +226,9 @@ class _Merge:
             # Of two messages with one time and connection, the one in the earlier chunk comes first.
             stop = max(stop, run.done + 1)
 
-            yield run.position, data, found[run.done : stop] if run.done or stop < len(found) else found
+            yield Block(
+                run.position, data, found[run.done : stop] if run.done or stop < len(found) else found
+            )
             run.done = stop
             if stop < len(found):
                 self._push(heap, run)

@@ -11,13 +11,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO
 
 from minirospy.bag import records
-from minirospy.bag.base import BagReader, Position, StoredMessage
+from minirospy.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.bag.chunks import size_of
 from minirospy.bag.index import ConnectionIndex, Entry, merge_entries
 from minirospy.bag.records import ChunkInfo, Connection, Record
 from minirospy.errors import BagFormatError, BagUnindexedError
 
-__all__ = ["Reader12", "open_bag12"]
+__all__ = ["Reader12", "open_bag12", "unindexed_bag12"]
 
 _ENTRY = struct.Struct("<IIQ")
 
@@ -25,19 +25,18 @@ _ENTRY = struct.Struct("<IIQ")
 class Reader12(BagReader):
     """A bag of version 1.2: a connection for each topic.
 
-    ``start``: the position of the first record. ``indexed``: whether the bag has a header, and so may have an index.
+    ``start``: the position of the first record. Until :meth:`read_index` or :meth:`scan` it is not ``indexed``.
     """
 
-    def __init__(self, stream: BinaryIO, version: int, start: int, *, indexed: bool) -> None:
+    def __init__(self, stream: BinaryIO, version: int, start: int) -> None:
         self.version = version
         self.stream = stream
         self.connections: dict[int, Connection] = {}
         self.chunks: Sequence[ChunkInfo] = ()
-        self.indexed = indexed
+        self.indexed = False
         self.start = start
         self._by_topic: dict[str, int] = {}
         self._indexes: dict[int, ConnectionIndex] = {}
-        self._scanned = False
 
     def read_index(self) -> None:
         """Read the index at the bag's end. Raise BagUnindexedError if there is none, or if it is damaged."""
@@ -57,6 +56,7 @@ class Reader12(BagReader):
                 record = records.read_record(self.stream, limit)
                 self._read_topic_index(record, limit)
                 position = record.end
+            self.indexed = True
         except BagFormatError as error:
             raise BagUnindexedError(str(error)) from error
 
@@ -80,21 +80,25 @@ class Reader12(BagReader):
             except BagFormatError:
                 break
             position = record.end
-        self._scanned = True
+        self.indexed = True
 
-    def messages(
-        self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
-    ) -> Iterator[StoredMessage]:
-        """See :meth:`BagReader.messages`."""
-        if not self._indexes and not self._scanned:
+    def prepare(self) -> None:
+        """See :meth:`BagReader.prepare`."""
+        if not self.indexed:
             for _ in self.scan():
                 pass
-        wanted = list(self.connections if connections is None else connections)
+
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """See :meth:`BagReader.blocks`."""
+        ranks = {number: rank for rank, number in enumerate(connections)}
         entries: Iterator[Entry] = merge_entries(
-            self._indexes[number].between(start, end) for number in wanted
+            self._indexes[number].between(start, end) for number in connections
         )
         for entry in entries:
-            yield self.message_at(entry.offset)
+            connection, time, body, _ = self.message_at(entry.offset)
+            yield Block(None, body, [(time, ranks[connection.id], entry.offset, 0, len(body))])
 
     def message_at(self, position: Position) -> StoredMessage:
         """See :meth:`BagReader.message_at`."""
@@ -171,16 +175,21 @@ class Reader12(BagReader):
 def open_bag12(stream: BinaryIO, version: int) -> Reader12:
     """Return a reader of the bag whose first line has been read.
 
-    One without an index is read by a scan of the whole file. Raise BagUnindexedError if it should have one.
+    A bag without a header has no index, and is scanned when it is read. Raise BagUnindexedError if it should have one.
     """
     start = stream.tell()
     limit = size_of(stream)
     stream.seek(start)
-    indexed = records.read_record(stream, limit).op == records.OP_BAG_HEADER
-    reader = Reader12(stream, version, start, indexed=indexed)
-    if indexed:
+    reader = Reader12(stream, version, start)
+    if records.read_record(stream, limit).op == records.OP_BAG_HEADER:
         reader.read_index()
     return reader
+
+
+def unindexed_bag12(stream: BinaryIO) -> Reader12:
+    """Return a reader of the bag at the stream's position, which is to be scanned. Raise BagFormatError."""
+    version = records.read_version(stream)
+    return Reader12(stream, version, stream.tell())
 
 
 def _time_of(record: Record) -> int:

@@ -12,6 +12,9 @@ COMPAT = OVERLAY.with_name("compat")
 SHARED = {
     "ros_names.py",
     "__init__.py",
+    "rosbag/exceptions.py",
+    "rosbag/internals.py",
+    "rosbag/private.py",
     "rpi.py",
     "rospy/live.py",
     "rospy/passing.py",

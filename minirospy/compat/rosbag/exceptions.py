@@ -1,0 +1,68 @@
+"""rosbag's exceptions, and the errors of the pure room as those."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NoReturn
+
+from minirospy.errors import BagEncryptedError, BagError, BagFormatError, BagUnindexedError
+
+__all__ = [
+    "ROSBagEncryptException",
+    "ROSBagEncryptNotSupportedException",
+    "ROSBagException",
+    "ROSBagFormatException",
+    "ROSBagUnindexedException",
+    "as_ros_errors",
+    "raise_as_ros",
+]
+
+
+class ROSBagException(Exception):
+    """The root of rosbag's errors; ``value`` is the text."""
+
+    def __init__(self, value: str = "") -> None:
+        super().__init__(value)
+        self.value = value
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class ROSBagFormatException(ROSBagException):
+    """A bag's bytes are not what the format prescribes."""
+
+
+class ROSBagUnindexedException(ROSBagException):
+    """A bag was not closed, or its index is damaged."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__("Unindexed bag")
+
+
+class ROSBagEncryptNotSupportedException(ROSBagException):
+    """A bag is encrypted, or should be: that is not supported."""
+
+
+class ROSBagEncryptException(ROSBagException):
+    """Encryption failed."""
+
+
+@contextmanager
+def as_ros_errors() -> Iterator[None]:
+    """Raise our errors as those that programs catch."""
+    try:
+        yield
+    except BagError as error:
+        raise_as_ros(error)
+
+
+def raise_as_ros(error: BagError) -> NoReturn:
+    """Raise the exception of rosbag for one of ours."""
+    if isinstance(error, BagUnindexedError):
+        raise ROSBagUnindexedException from error
+    if isinstance(error, BagEncryptedError):
+        raise ROSBagEncryptNotSupportedException(str(error)) from error
+    kind = ROSBagFormatException if isinstance(error, BagFormatError) else ROSBagException
+    raise kind(str(error)) from error

@@ -1,0 +1,11 @@
+"""rosbag, provided by minirospy: bags, read and written. Source: http://wiki.ros.org/rosbag/Code%20API."""
+
+from minirospy.compat.rosbag import (
+    Bag,
+    Compression,
+    ROSBagException,
+    ROSBagFormatException,
+    ROSBagUnindexedException,
+)
+
+__all__ = ["Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException"]

@@ -1,0 +1,19 @@
+"""rosbag.bag, provided by minirospy: bags that programs read and write."""
+
+from minirospy.compat.rosbag.bag import (
+    Bag,
+    BagMessage,
+    BagMessageWithConnectionHeader,
+    Compression,
+    ROSBagEncryptException,
+    ROSBagEncryptNotSupportedException,
+    ROSBagException,
+    ROSBagFormatException,
+    ROSBagUnindexedException,
+)
+
+__all__ = [
+    "Bag", "BagMessage", "BagMessageWithConnectionHeader", "Compression", "ROSBagEncryptException",
+    "ROSBagEncryptNotSupportedException", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException",
+]  # fmt: skip
+from minirospy.compat.rosbag.internals import _get_message_type as _get_message_type
