@@ -15,6 +15,7 @@ LAYERS = [
     {"cli"},
     {"testing"},
     {"launch"},
+    {"frames"},
     {"introspect", "actionlib", "robots", "recording"},
     {"workspace"},
     {"client", "aio", "rosout"},

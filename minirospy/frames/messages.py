@@ -1,0 +1,77 @@
+"""Between messages and the buffer's numbers: TransformStamped, times, and /tf's messages that stay bytes."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from minirospy.client.time import Time
+from minirospy.tf2.buffer import StampedTransform
+
+__all__ = ["LazyTFMessage", "Moment", "nanoseconds", "transform_stamped"]
+
+_BILLION = 1_000_000_000
+_new: Any = object.__new__
+
+
+class Moment(Protocol):
+    """A time or a duration of rospy's, genpy's or the like."""
+
+    def to_sec(self) -> float:
+        """Return the seconds."""
+
+
+def nanoseconds(time: Moment) -> int:
+    """Return a time in nanoseconds: exact where it has ``secs`` and ``nsecs``. Raise TypeError as tf2_py does."""
+    try:
+        return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]
+    except AttributeError:
+        pass
+    try:
+        return int(time.to_sec() * 1e9)
+    except AttributeError:
+        raise TypeError("time must have a to_sec method, e.g. rospy.Time or rospy.Duration") from None
+
+
+def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
+    """Return the answer to a lookup as a message."""
+    # Without the constructors, which take longer than the lookup.
+    message: TransformStamped = _new(TransformStamped)
+    message.header = header = _new(Header)
+    header.seq = 0
+    header.stamp = stamp = _new(Time)
+    stamp.secs, stamp.nsecs = divmod(found.stamp, _BILLION)
+    header.frame_id = target
+    message.child_frame_id = source
+    message.transform = transform = _new(Transform)
+    transform.translation = where = _new(Vector3)
+    where.x, where.y, where.z = found.translation
+    transform.rotation = turn = _new(Quaternion)
+    turn.x, turn.y, turn.z, turn.w = found.rotation
+    return message
+
+
+class LazyTFMessage(TFMessage):
+    """A TFMessage as bytes (``raw``), decoded when its ``transforms`` are read: a buffer takes the bytes."""
+
+    __slots__ = ["raw"]
+    _slot_types = TFMessage._slot_types
+
+    def __init__(self, *args: Any, **kwds: Any) -> None:
+        if args or kwds:
+            super().__init__(*args, **kwds)
+        self.raw: bytes | None = None
+
+    def deserialize(self, data: Any) -> LazyTFMessage:
+        """Keep the bytes."""
+        self.raw = data
+        return self
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "transforms" or self.raw is None:
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+        super().deserialize(self.raw)
+        return self.transforms

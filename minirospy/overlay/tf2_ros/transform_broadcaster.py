@@ -1,0 +1,6 @@
+"""tf2_ros.transform_broadcaster, provided by minirospy: transforms to /tf. Source: http://wiki.ros.org/tf2_ros."""
+
+from geometry_msgs.msg import TransformStamped as TransformStamped
+from tf2_msgs.msg import TFMessage as TFMessage
+
+from minirospy.frames.broadcasters import TransformBroadcaster as TransformBroadcaster
