@@ -21,7 +21,7 @@ LAYERS = [
     {"client", "aio", "rosout"},
     {"runtime"},
     {"graph", "wire", "idl", "tf2", "gpio", "bag", "urdf"},
-    {"clock", "environment", "log_levels", "names", "private_files", "scanner", "steps", "times"},
+    {"clock", "environment", "log_levels", "names", "private_files", "scanner", "steps", "times", "tree_svg"},
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
@@ -34,7 +34,7 @@ IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subp
 FILES = sorted(
     path
     for path in PACKAGE.rglob("*.py")
-    if "overlay" not in path.relative_to(PACKAGE).parts and path.name != "__main__.py"
+    if not {"overlay", "ros_packages"} & set(path.relative_to(PACKAGE).parts) and path.name != "__main__.py"
 )
 
 
