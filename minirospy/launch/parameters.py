@@ -5,8 +5,10 @@ Source: http://wiki.ros.org/roslaunch/XML/param, http://wiki.ros.org/roslaunch/X
 
 from __future__ import annotations
 
+import os
 import shlex
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,9 +18,11 @@ from minirospy.introspect.parameters import flatten
 from minirospy.introspect.values import check_parameter, parse_value
 from minirospy.launch.document import Tag
 from minirospy.launch.substitution import convert
+from minirospy.workspace.packages import Packages, built_in_roots, is_python
 
 __all__ = ["param_value", "rosparam_values"]
 
+_XACRO = ("xacro", "xacro.py")
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
@@ -89,7 +93,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 def _output_of(tag: Tag, command: str) -> str:
     """Return the output of a command, which is run without a shell."""
     try:
-        done = subprocess.run(shlex.split(command), stdout=subprocess.PIPE, check=False)
+        done = subprocess.run(_command_words(shlex.split(command)), stdout=subprocess.PIPE, check=False)
     except ValueError as error:
         raise tag.error(f"command [{command}]: {error}") from None
     except (OSError, IndexError):
@@ -97,3 +101,18 @@ def _output_of(tag: Tag, command: str) -> str:
     if done.returncode:
         raise tag.error(f"command [{command}] returned with code [{done.returncode}]")
     return _decoded(tag, command, done.stdout)
+
+
+def _command_words(words: list[str]) -> list[str]:
+    """Return the words that run a command: a package's Python program by this interpreter, as its nodes are; xacro as ours.
+
+    So a launch file finds xacro also where no virtual environment is active, and never that of ROS 2.
+    """
+    if not words:
+        return words
+    program, *rest = words
+    if program in _XACRO:
+        program = str(Packages.below(*built_in_roots()).find("xacro") / program)
+    if "/" in program.replace(os.sep, "/") and is_python(Path(program)):
+        return [sys.executable, program, *rest]
+    return words

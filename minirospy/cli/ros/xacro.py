@@ -1,0 +1,45 @@
+"""`xacro`: macros of robot descriptions, by the package of the same name, with `$(find PACKAGE)` answered by our packages.
+
+Its options, texts and exit statuses (2 where a file cannot be processed) are the package's. Options of earlier releases
+that ask for what has become the only behaviour are accepted. Source: http://wiki.ros.org/xacro.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Sequence
+
+from minirospy.cli.command import run
+from minirospy.errors import MinirospyError
+
+__all__ = ["main"]
+
+_ALWAYS = {"--xacro-ns", "--check-order"}
+"""What has been the only behaviour since ROS Melodic."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run xacro; return its exit status."""
+    words = sys.argv[1:] if argv is None else argv
+    return run("xacro", lambda: _xacro(words))
+
+
+def _xacro(words: Sequence[str]) -> int:
+    # The package names xml.parsers in an `except` clause, and relies on another module's import of it.
+    import xml.parsers.expat  # noqa: F401
+
+    try:
+        import xacro  # type: ignore[import-untyped]
+    except ImportError as error:
+        raise MinirospyError(f"the package xacro cannot be imported ({error}): pip install xacro") from error
+
+    if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
+        # A robot description is UTF-8, whatever the system's code page is; roslaunch reads it as such.
+        sys.stdout.reconfigure(encoding="utf-8")
+    sys.argv = ["xacro", *(word for word in words if word not in _ALWAYS)]
+    try:
+        xacro.main()
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else int(bool(end.code))
+    return 0

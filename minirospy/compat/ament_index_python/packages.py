@@ -1,0 +1,47 @@
+"""Where packages are, by the names of ROS 2's functions. Source: https://github.com/ament/ament_index (ament_index_python)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from minirospy.errors import NotFoundError
+from minirospy.workspace.packages import Packages
+
+__all__ = [
+    "PackageNotFoundError",
+    "get_package_prefix",
+    "get_package_share_directory",
+    "get_package_share_path",
+    "get_packages_with_prefixes",
+]
+
+
+class PackageNotFoundError(KeyError):
+    """No package of this name, in ROS_PACKAGE_PATH or among minirospy's own."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def get_package_share_directory(package_name: str, print_warning: bool = True) -> str:
+    """Return the folder of a package. Raises PackageNotFoundError."""
+    try:
+        return str(Packages().find(package_name))
+    except NotFoundError as error:
+        near = f"; did you mean {' or '.join(error.nearest)}?" if error.nearest else ""
+        raise PackageNotFoundError(f"resource not found: {package_name}{near}") from error
+
+
+def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
+    """Return the folder of a package. Raises PackageNotFoundError."""
+    return Path(get_package_share_directory(package_name))
+
+
+def get_package_prefix(package_name: str) -> str:
+    """Return the folder of a package: ROS 1 has no folder that several share. Raises PackageNotFoundError."""
+    return get_package_share_directory(package_name)
+
+
+def get_packages_with_prefixes() -> dict[str, str]:
+    """Return every package and its folder."""
+    return {name: str(folder) for name, folder in Packages().folders().items()}
