@@ -63,7 +63,7 @@ class Target:
         self._loop.close()
 
     async def _take(self, data: bytes) -> None:
-        from minirospy.runtime.rpc import server as rpc_server
+        from minirospy.runtime.rpc import connection as connections
         from minirospy.wire.xmlrpc import parse_response, serialize_response
 
         if self._count % INPUTS_PER_MASTER == 0:
@@ -74,10 +74,10 @@ class Target:
         ours.setblocking(False)
         with theirs:
             theirs.setblocking(False)
-            connection = rpc_server._Connection(master._server, ours, self._loop)
+            connection = connections.Connection(master._server, ours, self._loop)
             master._server.connections[connection] = None
             for piece in data.split(CUT):
-                if piece and connection._state is rpc_server._OPEN:
+                if piece and connection._state is connections.State.OPEN:
                     connection.received(piece)
                 with contextlib.suppress(BlockingIOError, ConnectionError):
                     theirs.recv(1 << 20)

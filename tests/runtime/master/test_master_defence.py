@@ -20,6 +20,7 @@ from minirospy.environment import Environment
 from minirospy.errors import RpcFault, UsageError
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node.node import Node
+from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as rpc_server
 from minirospy.runtime.transport.access import Access, listening_lines
 from minirospy.runtime.transport.loop import LoopThread
@@ -224,14 +225,14 @@ def loop() -> Iterator[LoopThread]:
 
 
 def test_a_request_that_never_ends_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
-    monkeypatch.setattr(rpc_server, "_REQUEST_SECONDS", 0.05)
+    monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.05)
     assert exchange(master, b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\nabc") == b""
 
 
 def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/large", "x" * 1_000_000)
-        monkeypatch.setattr(rpc_server, "_REQUEST_SECONDS", 0.3)
+        monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.3)
         with socket.create_connection(("127.0.0.1", int(master.rsplit(":", 1)[1])), 20) as sock:
             hung_up = False
             while not hung_up:
@@ -392,10 +393,10 @@ def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
         ours.setblocking(False)
         with theirs:
             theirs.setblocking(False)
-            connection = rpc_server._Connection(master._server, ours, asyncio.get_running_loop())
+            connection = connections.Connection(master._server, ours, asyncio.get_running_loop())
             master._server.connections[connection] = None
             for piece in pieces:
-                if connection._state is rpc_server._OPEN:
+                if connection._state is connections.State.OPEN:
                     connection.received(piece)
                 with contextlib.suppress(BlockingIOError):
                     theirs.recv(1 << 20)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.runtime.rpc import server as rpc_server
+from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.http import HttpReader, serialize_request
@@ -88,7 +88,7 @@ def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> No
 
 
 def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rpc_server, "_PROGRESS", 10_000)
+    monkeypatch.setattr(connections, "_PROGRESS", 10_000)
 
     async def scene() -> None:
         server = RpcServer(lambda *_: "x" * 20_000_000)

@@ -1,0 +1,548 @@
+"""One client of the XML-RPC server: bytes in, requests out, and their answers in order.
+
+The server (``runtime/rpc/server.py``) accepts clients and limits what they all together have it hold; what one client may do is
+decided here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections import deque
+from collections.abc import Awaitable, Generator, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.steps import ALONE, Steps, is_small
+from minirospy.wire.http import (
+    MAX_BODY,
+    HttpMessage,
+    HttpReader,
+    serialize_error,
+    serialize_response,
+    serialize_response_head,
+)
+from minirospy.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
+from minirospy.wire.xmlrpc import serialize_response as serialize_value
+from minirospy.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
+
+if TYPE_CHECKING:
+    from minirospy.runtime.rpc.server import RpcServer
+
+__all__ = ["Connection", "State"]
+
+_log = logging.getLogger(__name__)
+
+_REQUEST_SECONDS = 30.0
+"""A request that has begun must be whole after this, and an answer taken."""
+
+_LINGER_SECONDS = 2.0
+"""Who is refused may still be sending: so long it is heard out, or the answer would be lost with the connection."""
+
+_SHORT_BODY = 4096
+"""A longer request is read in steps."""
+
+_ALONE_BODY = 1024 * 1024
+"""Of requests beyond this one is read at a time: its values may take some times as much memory."""
+
+_PROGRESS = 65536
+"""Bytes that have moved set the time limit anew: a large value may be long under way by a poor radio."""
+
+_MOST_UNREAD = 256 * 1024
+"""Bytes of answers that wait for a client to read them, before it gets no more."""
+
+_RECEIVE = 4096
+_RECEIVE_MORE = 16384
+"""Bytes at a time, of a new request and of the rest of a long one: what one client pipelines is taken apart before
+the next one has its turn."""
+
+_END_OF_HEAD = b"\r\n\r\n"
+
+_ANSWERS_AT_ONCE = 1
+"""Of requests that came together; the others are answered in steps."""
+
+
+class State(Enum):
+    """What a server does with one client."""
+
+    OPEN = "it is served"
+    BUSY = "it requested much at once: nothing more is read from it before that is answered"
+    FULL = "it does not read its answers: nothing is read from it"
+    CLOSING = "it ends once it has read its answers"
+    REFUSED = "it is heard out, without an answer"
+    ENDED = "the socket is closed"
+
+
+_OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State
+
+
+class Connection:
+    """One client: feed, take messages, answer them in order."""
+
+    __slots__ = (
+        "_fd",
+        "_has_deadline",
+        "_held",
+        "_loop",
+        "_moved",
+        "_must_finish",
+        "_out",
+        "_reader",
+        "_reading",
+        "_server",
+        "_sock",
+        "_state",
+        "_task",
+        "_unread",
+        "_waiting",
+        "_work",
+        "_work_bytes",
+    )
+
+    def __init__(self, server: RpcServer, sock: socket.socket, loop: asyncio.AbstractEventLoop) -> None:
+        self._server = server
+        self._sock = sock
+        self._fd = sock.fileno()
+        self._loop = loop
+        self._reader = HttpReader()
+        self._state: State = _OPEN
+        self._out: deque[memoryview] = deque()
+        # Bytes in there.
+        self._unread = 0
+        self._waiting: list[HttpMessage] = []
+        self._has_deadline = False
+        # Bytes since the time limit was set.
+        self._moved = 0
+        self._task: asyncio.Task[None] | None = None
+        # A long request that is being answered in steps, and the bytes of its body.
+        self._work: Steps[None] | None = None
+        self._work_bytes = 0
+        # It changes something: it is brought to its end, whether or not the client waits for it.
+        self._must_finish = False
+        self._held = 0
+        # Set while it is read from in steps.
+        self._reading: object | None = None
+        loop.add_reader(self._fd, self.readable)
+
+    @property
+    def is_idle(self) -> bool:
+        """Return whether no request is under way."""
+        return self._state is _OPEN and self._reader.is_idle and not self._is_answering and not self._out
+
+    @property
+    def is_refused(self) -> bool:
+        """Return whether nothing more is answered."""
+        return self._state is _REFUSED or self._state is _ENDED
+
+    @property
+    def _is_answering(self) -> bool:
+        return self._task is not None or self._work is not None
+
+    def end(self) -> None:
+        """Hang up. Idempotent."""
+        if self._state is _ENDED:
+            return
+        self._state = _ENDED
+        self._stop_reading()
+        if self._out:
+            self._loop.remove_writer(self._fd)
+        self._sock.close()
+        self._server.connections.pop(self, None)
+        self._drop_request()
+        self._out.clear()
+        self._count_unread(-self._unread)
+        self._server.deadlines.drop(self)
+
+    def received(self, data: bytes) -> None:
+        """Bytes of requests have come."""
+        try:
+            messages = self._reader.feed(data)
+        except RpcProtocolError as error:
+            self.refuse(error.status, str(error))
+            return
+        if self._held or not messages:
+            self._hold()
+            if not self._server.limit_held(self):
+                return
+            if self._reader.wants_continue:
+                self._write(self._reader.continue_line())
+        if self._has_deadline and messages:
+            self._has_deadline = False
+            self._server.deadlines.drop(self)
+        self._moved += len(data)
+        self._waiting += messages
+        self._answer_waiting()
+        self._set_deadline()
+
+    def _receive(self, most: int = _RECEIVE) -> bytes | None:
+        """Return the bytes that have arrived; b"" at the end, None where there are none."""
+        try:
+            return self._sock.recv(most)
+        except (BlockingIOError, InterruptedError):
+            return None
+        except OSError:
+            return b""
+
+    def readable(self) -> None:
+        """Read what there is: the rest of a long request in steps, as what a client sends that was refused."""
+        if not self._held and self._state is not _REFUSED:
+            self._take(self._receive())
+            return
+        self._stop_reading()
+        reading = self._reading = object()
+        self._server.turns.start(self._read_much(reading))
+
+    def _read_much(self, reading: object) -> Steps[None]:
+        """Read until nothing more is there, or until something else has stopped or started reading."""
+        while self._reading is reading:
+            data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
+            if data is None:
+                self._start_reading()
+                return
+            self._take(data)
+            yield None
+
+    def _stop_reading(self) -> None:
+        """Read nothing for now. Idempotent."""
+        self._loop.remove_reader(self._fd)
+        self._reading = None
+
+    def _start_reading(self) -> None:
+        self._reading = None
+        self._loop.add_reader(self._fd, self.readable)
+
+    def _take(self, data: bytes | None) -> None:
+        """Take what has come: b"" is the end, None is nothing."""
+        if data is None:
+            return
+        if self._state is _REFUSED:
+            # Whatever it still says.
+            if not data:
+                self.end()
+            return
+        if data:
+            self._server.connections.move_to_end(self)
+            if data.endswith(_END_OF_HEAD):
+                # Clients in Python send the body right behind its head: mostly it is there by now.
+                data += self._receive() or b""
+            self.received(data)
+        elif self._out and self._state is _OPEN:
+            # It asks no more, but waits for what it asked.
+            self._state = _CLOSING
+            self._stop_reading()
+        else:
+            self.end()
+
+    def _answer_waiting(self) -> None:
+        left = _ANSWERS_AT_ONCE
+        while self._waiting and self._state is _OPEN:
+            if self._is_answering or not left:
+                self._pause()
+                if not self._is_answering:
+                    self._start(self._answer_rest())
+                return
+            left -= 1
+            self._answer(self._waiting.pop(0))
+
+    def _answer_rest(self) -> Steps[None]:
+        """Answer many requests that came together, or rather those of them that come next."""
+        yield None
+        self._work = None
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if self._state is _BUSY:
+            self._state = _OPEN
+            self._start_reading()
+            self._answer_waiting()
+            self._set_deadline()
+
+    def _pause(self) -> None:
+        """Read nothing until the present requests are answered."""
+        if self._state is _OPEN:
+            self._state = _BUSY
+            self._stop_reading()
+
+    def _answer(self, message: HttpMessage) -> None:
+        """Answer immediately, or start a task or work in steps for what takes longer."""
+        if message.method != "POST":
+            self.refuse(405, "this is an XML-RPC server: send POST")
+            return
+        keep_alive = message.keep_alive
+        if len(message.body) > _SHORT_BODY:
+            self._answer_in_steps(message.body, keep_alive)
+            return
+        try:
+            call = parse_call(message.body)
+        except RpcProtocolError as error:
+            self.refuse(error.status, str(error))
+            return
+        try:
+            value = self._server.dispatch(call.method, call.args)
+            if type(value) is Serialized:
+                self._send_pieces(value.pieces, keep_alive)
+                return
+            if type(value) is not list and isinstance(value, Awaitable):
+                self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
+                return
+            if isinstance(value, Generator) or not is_small(value):
+                self._start(self._serialize_in_steps(call.method, value, keep_alive))
+                return
+            body = serialize_value(value)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            body = _fault(call.method, error)
+        self._send(body, keep_alive)
+
+    def _answer_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> None:
+        self._work_bytes = len(body)
+        self._hold()
+        if self._server.limit_held(self):
+            self._start(self._read_in_steps(body, keep_alive))
+
+    def _start(self, work: Steps[None]) -> None:
+        self._work = work
+        self._server.turns.start(work)
+
+    def _read_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> Steps[None]:
+        """Read a long request, and answer it."""
+        if len(body) > _ALONE_BODY:
+            yield ALONE
+        try:
+            call = yield from parse_call_in_steps(body)
+        except RpcProtocolError as error:
+            self._work = None
+            self.refuse(error.status, str(error))
+            return
+        del body
+        self._work_bytes = 0
+        self._hold()
+        try:
+            value = self._server.dispatch(call.method, call.args)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            self._finish(_fault(call.method, error), keep_alive)
+            return
+        if isinstance(value, Awaitable):
+            self._work = None
+            self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
+            return
+        method = call.method
+        del call
+        yield from self._serialize_in_steps(method, value, keep_alive)
+
+    def _serialize_in_steps(self, method: str, value: Any, keep_alive: bool) -> Steps[None]:
+        """Answer with a value that may be long, or that steps return."""
+        pieces: Sequence[bytes]
+        try:
+            if isinstance(value, Generator):
+                self._must_finish = True
+                try:
+                    value = yield from value
+                finally:
+                    self._must_finish = False
+            if self.is_refused:
+                return
+            if isinstance(value, Serialized):
+                pieces = value.pieces
+            else:
+                pieces = yield from serialize_value_in_steps(value, MAX_BODY)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            pieces = (_fault(method, error),)
+        del value
+        self._work = None
+        if not self.is_refused:
+            self._send_pieces(pieces, keep_alive)
+            self._go_on()
+
+    async def _answer_later(self, value: Awaitable[Any], keep_alive: bool) -> None:
+        try:
+            body = serialize_value(await value)
+        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+            body = _fault("a method", error)
+        self._task = None
+        self._finish(body, keep_alive)
+
+    def _finish(self, body: bytes, keep_alive: bool) -> None:
+        """Send the answer to what took longer, and go on with the next request."""
+        self._work = None
+        if not self.is_refused:
+            self._send(body, keep_alive)
+            self._go_on()
+
+    def _send(self, body: bytes, keep_alive: bool) -> None:
+        self._write(serialize_response(body, keep_alive=keep_alive))
+        self._sent(keep_alive)
+
+    def _send_pieces(self, pieces: Sequence[bytes], keep_alive: bool) -> None:
+        """Send an answer, which is not joined if it is long."""
+        if len(pieces) == 1:
+            self._send(pieces[0], keep_alive)
+            return
+        self._write(serialize_response_head(sum(map(len, pieces)), keep_alive=keep_alive), *pieces)
+        self._sent(keep_alive)
+
+    def _sent(self, keep_alive: bool) -> None:
+        if not keep_alive:
+            self._close()
+
+    def log_refusal(self, why: str) -> None:
+        """Log that the client was refused something."""
+        self._server.log_refusal(self._sock, why)
+
+    def _drop_request(self) -> None:
+        """Forget what was requested."""
+        self._waiting.clear()
+        self._reader.close()
+        self._work_bytes = 0
+        self._hold()
+        work, self._work = self._work, None
+        if work and not self._must_finish:
+            self._server.turns.cancel(work)
+        if self._task:
+            self._task.cancel()
+
+    def refuse(self, status: int, text: str) -> None:
+        """Answer with an error, and read no more requests."""
+        if self.is_refused:
+            return
+        self._drop_request()
+        self.log_refusal(text)
+        self._write(serialize_error(status, text))
+        if self._state in (_FULL, _BUSY):
+            self._start_reading()
+        if self._state in (_OPEN, _BUSY, _FULL):
+            self._state = _REFUSED
+            if not self._out:
+                self._say_end()
+            self._limit(_LINGER_SECONDS)
+
+    def _close(self) -> None:
+        """Hang up once what is written has been taken."""
+        self._waiting.clear()
+        if not self._out:
+            self.end()
+        elif self._state in (_OPEN, _BUSY, _FULL):
+            if self._state is _OPEN:
+                self._stop_reading()
+            self._state = _CLOSING
+
+    def _write(self, *pieces: bytes) -> None:
+        """Send what the socket takes, and keep the rest."""
+        if self._state is _ENDED:
+            return
+        sent = 0
+        if not self._out:
+            try:
+                sent = self._sock.send(pieces[0])
+            except (BlockingIOError, InterruptedError):
+                pass
+            except OSError:
+                self.end()
+                return
+            if len(pieces) == 1 and sent == len(pieces[0]):
+                return
+            self._loop.add_writer(self._fd, self._writable)
+        left = sent
+        for piece in pieces:
+            if left < len(piece):
+                self._out.append(memoryview(piece)[left:])
+            left = max(0, left - len(piece))
+        self._count_unread(sum(map(len, pieces)) - sent)
+        self._set_deadline()
+        if self._state is _OPEN and self._unread > _MOST_UNREAD:
+            # The client does not read its answers: it gets no more of them, and is not read from.
+            self._state = _FULL
+            self._stop_reading()
+        self._server.limit_unread()
+
+    def _count_unread(self, more: int) -> None:
+        """Count bytes that were added to the answers that wait, or taken from them."""
+        self._unread += more
+        self._server.unread += more
+        if not self._unread:
+            self._server.slow.pop(self, None)
+        elif more < 0:
+            self._server.slow.move_to_end(self)
+        else:
+            self._server.slow.setdefault(self, None)
+
+    def _writable(self) -> None:
+        sent = 0
+        try:
+            while self._out and sent < _MOST_UNREAD:
+                piece = self._out[0][:_MOST_UNREAD]
+                count = self._sock.send(piece)
+                sent += count
+                if count < len(self._out[0]):
+                    self._out[0] = self._out[0][count:]
+                else:
+                    self._out.popleft()
+                if count < len(piece):
+                    break
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError:
+            self.end()
+            return
+        if sent:
+            self._count_unread(-sent)
+        if self._out:
+            self._moved += sent
+            self._set_deadline()
+            return
+        self._loop.remove_writer(self._fd)
+        if self._state is _CLOSING:
+            self.end()
+        elif self._state is _REFUSED:
+            self._say_end()
+        else:
+            if self._state is _FULL:
+                self._state = _OPEN
+                self._start_reading()
+            self._answer_waiting()
+            self._set_deadline()
+
+    def _say_end(self) -> None:
+        with contextlib.suppress(OSError):
+            self._sock.shutdown(socket.SHUT_WR)
+
+    def _hold(self) -> None:
+        """Count the bytes of the present request."""
+        count = self._reader.held + self._work_bytes
+        if count == self._held:
+            return
+        self._server.held += count - self._held
+        self._held = count
+        if count:
+            self._server.holders[self] = count
+        else:
+            self._server.holders.pop(self, None)
+
+    def _set_deadline(self) -> None:
+        """Set the time limit of a request that has started, or an answer that waits; an idle connection has none."""
+        if self._out or not self._reader.is_idle:
+            is_due = not self._has_deadline or self._moved > _PROGRESS
+            if is_due and self._state is not _ENDED and self._state is not _REFUSED:
+                self._limit(_REQUEST_SECONDS)
+        elif self._has_deadline and self._state is not _REFUSED:
+            self._has_deadline = False
+            self._server.deadlines.drop(self)
+
+    def _limit(self, seconds: float) -> None:
+        self._has_deadline = True
+        self._moved = 0
+        self._server.deadlines.set(self, seconds)
+
+
+def _fault(method: str, error: Exception) -> bytes:
+    """Return the answer to a call that failed."""
+    match error:
+        case RpcFault():
+            return serialize_fault(error.code, error.text)
+        case RpcProtocolError():
+            _log.warning("%s cannot be answered: %s", method, error)
+        case _:
+            _log.error("fault in %s", method, exc_info=error)
+    return serialize_fault(1, f"{type(error).__name__}: {error}")
