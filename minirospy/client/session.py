@@ -247,7 +247,8 @@ class Session:
     def _forget_parameters(self) -> None:
         """Forget all cached parameters: the master has restarted, and the node is not subscribed to them any more."""
         if self.node:
-            keys, self.node.parameters = self.node.parameters, set()
+            keys = list(self.node.parameters)
+            self.node.parameters.clear()
             for key in keys:
                 self.parameter_changed(key)
 

@@ -10,7 +10,7 @@ import pytest
 
 from minirospy.environment import Environment
 from minirospy.errors import RpcFault
-from minirospy.runtime.node import node as node_module
+from minirospy.runtime.node import registration
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.server import RpcServer
@@ -238,7 +238,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            node._watch_seconds = 0.0
+            registrations = node._registrations
+            registrations._watch_seconds = 0.0
             looking = asyncio.Event()
 
             async def lose(awaitable: Coroutine[Any, Any, Any], _: float) -> None:
@@ -250,10 +251,10 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
                     return
 
             with monkeypatch.context() as patch:
-                patch.setattr(node_module.asyncio, "wait_for", lose)
-                assert node._watching
-                node._watching.cancel()
-                node._watching = asyncio.ensure_future(node._watch_master())
+                patch.setattr(registration.asyncio, "wait_for", lose)
+                assert registrations._watching
+                registrations._watching.cancel()
+                registrations.watch()
                 await looking.wait()
                 await node.close()
 
@@ -263,8 +264,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
 def test_close_gives_up_on_a_master_that_is_silent(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(node_module, "_SILENT_SECONDS", 0.2)
-    monkeypatch.setattr(node_module, "_NOTICE_SECONDS", 0.1)
+    monkeypatch.setattr(registration, "_SILENT_SECONDS", 0.2)
+    monkeypatch.setattr(registration, "_NOTICE_SECONDS", 0.1)
 
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:

@@ -415,7 +415,7 @@ def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
 def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
-            ask = b.master
+            ask = b._registrations.call
 
             async def answer_late(method: str, *args: Any) -> Any:
                 answer = await ask(method, *args)
@@ -424,7 +424,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
                     await eventually(lambda: b.subscriptions["/t"].links)
                 return answer
 
-            monkeypatch.setattr(b, "master", answer_late)
+            monkeypatch.setattr(b._registrations, "call", answer_late)
             subscription = await listen(b, "/t", Box())
             assert [(link.uri, link.closed) for link in subscription.links] == [(a.uri, False)]
 
@@ -499,7 +499,7 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
     """Return what a node asks its master comes late, where the method's name begins so, and is not taken back."""
-    ask = node.master
+    ask = node._registrations.call
 
     async def ask_late(method: str, *args: Any) -> Any:
         await asyncio.sleep(0.05)
@@ -510,7 +510,7 @@ def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
             return await asyncio.shield(asyncio.ensure_future(ask_late(method, *args)))
         return await ask(method, *args)
 
-    monkeypatch.setattr(node, "master", master)
+    monkeypatch.setattr(node._registrations, "call", master)
 
 
 async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]]:
@@ -612,14 +612,14 @@ def test_a_master_that_was_away_gets_the_registrations_it_missed(
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.05) as (master, (a,)):
             await publish(a, "/known")
-            ask, is_away = a.master, True
+            ask, is_away = a._registrations.call, True
 
             async def be_away(method: str, *args: Any) -> Any:
                 if is_away:
                     raise MasterUnreachableError("http://there")
                 return await ask(method, *args)
 
-            monkeypatch.setattr(a, "master", be_away)
+            monkeypatch.setattr(a._registrations, "call", be_away)
             with pytest.raises(MasterUnreachableError):
                 await offer(a, kind)
             is_away = False
@@ -661,7 +661,7 @@ def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
 ) -> None:
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.02) as (_, (a,)):
-            end, call, looked = await offer(a, "publisher"), a._call_master, asyncio.Event()
+            end, call, looked = await offer(a, "publisher"), a._registrations._call_master, asyncio.Event()
 
             async def end_first(method: str, *args: Any, **limits: float) -> Any:
                 if method == "lookupNode" and a.publications:
@@ -669,7 +669,7 @@ def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
                     asyncio.get_running_loop().call_soon(looked.set)
                 return await call(method, *args, **limits)
 
-            monkeypatch.setattr(a, "_call_master", end_first)
+            monkeypatch.setattr(a._registrations, "_call_master", end_first)
             await looked.wait()
             await asyncio.sleep(0.05)
 
