@@ -2,7 +2,7 @@
 
 Pure. Plain is what nearly all documents of ROS are: ASCII without references; strings, numbers, booleans, arrays
 and structs, written without spaces inside the tags. Of anything else, right or wrong, nothing is said here: that
-is the parser's (``wire/xmlrpc.py``).
+is the parser's (``wire/xmlrpc_reader.py``).
 """
 
 from __future__ import annotations

@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 
 from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.steps import finish
-from minirospy.wire import xmlrpc as xmlrpc_module
+from minirospy.wire import xmlrpc_reader
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.xmlrpc import (
     Call,
     DateTime,
-    Reader,
     parse_call,
     parse_call_in_steps,
     parse_response,
@@ -26,6 +25,7 @@ from minirospy.wire.xmlrpc import (
     serialize_response,
     serialize_response_in_steps,
 )
+from minirospy.wire.xmlrpc_reader import Reader
 from tests.wire.memory import Allocations
 
 # What XML 1.0 can hold: no control characters but tab and line feed, no surrogates.
@@ -241,7 +241,7 @@ def test_each_step_is_short() -> None:
 def test_what_would_take_too_much_is_refused_before_its_end(
     body: bytes, why: str, status: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(xmlrpc_module, "_MAX_MEMORY", 1024 * 1024)
+    monkeypatch.setattr(xmlrpc_reader, "_MAX_MEMORY", 1024 * 1024)
     with pytest.raises(RpcProtocolError, match=why) as caught:
         finish(parse_call_in_steps(body))
     assert caught.value.status == status

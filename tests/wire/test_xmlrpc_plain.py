@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.errors import RpcProtocolError
-from minirospy.wire.xmlrpc import _read, serialize_call, serialize_response
+from minirospy.wire.xmlrpc import serialize_call, serialize_response
 from minirospy.wire.xmlrpc_plain import read_plain
+from minirospy.wire.xmlrpc_reader import read_document
 
 TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=126) | st.sampled_from("\t\n/ab"), max_size=8)
 VALUES = st.recursive(
@@ -38,7 +39,7 @@ def check(body: bytes) -> bool:
     found = read_plain(body)
     if found is None:
         return False
-    reader = _read(body)
+    reader = read_document(body)
     assert (reader.root, reader.method) == (
         "methodCall" if found[0] is not None else "methodResponse",
         found[0],
@@ -116,7 +117,7 @@ def test_what_is_too_deep_or_too_long_is_left_to_the_parser() -> None:
     nested = b"<param>" * 300 + b"</param>" * 300
     assert not check(b"<methodResponse><params>" + nested + b"</params></methodResponse>")
     with pytest.raises(RpcProtocolError, match="elements"):
-        _read(serialize_response([""] * 500_001))
+        read_document(serialize_response([""] * 500_001))
     assert read_plain(serialize_response([""] * 500_001)) is None
 
 
