@@ -25,6 +25,7 @@ __all__ = [
     "Parameter",
     "anything",
     "api_uri",
+    "global_key",
     "global_name",
     "node_name",
     "parameter_key",
@@ -232,12 +233,24 @@ def subgraph(value: object, name: str, caller_id: str) -> str:
     return names.resolve(_short_text(value, name), caller_id) if value else ""
 
 
+def global_key(value: object, name: str, caller_id: str) -> str:
+    """Return the name of a parameter that starts at the root."""
+    found = text(value, name, caller_id)
+    if found[0] not in "/~":
+        raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")
+    return found
+
+
 def uris(value: object, name: str, caller_id: str) -> list[str]:
     """Return a list of URIs."""
     if not isinstance(value, list):
         raise CallRefused(f"ERROR: param [{name}] must be a list")
     if not all(isinstance(uri, str) for uri in value):
         raise CallRefused(f"ERROR: param [{name}] must be a list of strings")
+    for uri in value:
+        scheme, separator, rest = uri.partition("://")
+        if not (scheme and separator and rest.partition("/")[0]):
+            raise CallRefused(f"ERROR: param [{name}] does not contain valid URLs [{uri}]")
     return value
 
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from minirospy import names
 from minirospy.graph.calls import (
     ERROR,
     FAILURE,
@@ -18,6 +19,7 @@ from minirospy.graph.calls import (
     Dispatcher,
     Method,
     anything,
+    global_key,
     parameters,
     some,
     text,
@@ -86,7 +88,7 @@ class SlaveApi:
                 "getSubscriptions": Method(self.get_subscriptions, []),
                 "getUri": Method(self.get_uri, ""),
                 "paramUpdate": Method(
-                    self.param_update, -1, parameters(parameter_key=text, parameter_value=anything)
+                    self.param_update, -1, parameters(parameter_key=global_key, parameter_value=anything)
                 ),
                 "publisherUpdate": Method(self.publisher_update, -1, parameters(topic=text, publishers=uris)),
                 "requestTopic": Method(self.request_topic, [], parameters(topic=text, protocols=some)),
@@ -170,6 +172,7 @@ class SlaveApi:
 
     def request_topic(self, caller_id: str, topic: str, protocols: Any) -> Answer:
         """Where a subscriber finds the topic, by the first protocol that both sides speak."""
+        topic = names.resolve(topic, self._node.name)
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         offered = protocols if isinstance(protocols, list) else []

@@ -49,3 +49,11 @@ outcome("no caller", node.getName)
 outcome("a number as caller", lambda: node.getName(5))
 outcome("an empty caller", lambda: node.getName(""))
 outcome("one argument too many", lambda: node.getName("/me", 5))
+
+# Arguments that are refused, and a topic's name without its slash.
+outcome("paramUpdate, relative key", lambda: node.paramUpdate("/me", "x", 1))
+outcome("paramUpdate, empty key", lambda: node.paramUpdate("/me", "", 1))
+outcome("paramUpdate, number as key", lambda: node.paramUpdate("/me", 3, 1))
+outcome("publisherUpdate, no URL", lambda: node.publisherUpdate("/me", "/told", ["x"]))
+outcome("publisherUpdate, no list", lambda: node.publisherUpdate("/me", "/told", 3))
+outcome("requestTopic, relative name", lambda: node.requestTopic("/me", "told", [["TCPROS"]])[0])
