@@ -10,6 +10,7 @@ import pytest
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 COMPAT = OVERLAY.with_name("compat")
 SHARED = {
+    "message_filters/stamps.py",
     "ros_names.py",
     "__init__.py",
     "rosbag/exceptions.py",

@@ -73,6 +73,7 @@ AROUND = [
     "genmsg.gentools",
     "catkin.find_in_workspaces",
     "rospkg",
+    "message_filters",
 ]
 """The modules of the second page."""
 
@@ -80,7 +81,7 @@ REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 OF_ROS = (
     "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
-    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg",
+    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",

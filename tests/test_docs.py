@@ -1,4 +1,4 @@
-"""The asyncio programs of the docs run, and print what the pages say."""
+"""The programs of the docs run, and print what the pages say."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = {name: (DOCS / name).read_text(encoding="utf-8") for name in ("asyncio.md", "actions.md")}
+PAGES = {
+    name: (DOCS / name).read_text(encoding="utf-8")
+    for name in ("asyncio.md", "actions.md", "python_packages.md")
+}
 PROGRAMS = [
     pytest.param(code, printed, id=f"{name}-{number}")
     for name, page in PAGES.items()

@@ -1,0 +1,160 @@
+"""Queues of messages by their stamps, and the search for a set of stamps that are close together. Pure."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from itertools import count
+
+from minirospy.times import Time
+
+__all__ = ["StampQueue", "closest_stamps"]
+
+
+class StampQueue(MutableMapping[Time, object]):
+    """The messages of one input by their stamps: a dict of ROS's, which keeps its stamps sorted in addition."""
+
+    __slots__ = ("_entries", "_numbers", "order")
+
+    def __init__(self, messages: Mapping[Time, object] | None = None) -> None:
+        """``messages``: what it holds from the start, in the order of their arrival."""
+        self.order: list[int] = []
+        """The stamps, in nanoseconds, ascending."""
+        self._entries: dict[int, tuple[int, Time, object]] = {}
+        self._numbers = count()
+        if messages:
+            self.update(messages)
+
+    def __setitem__(self, stamp: Time, message: object) -> None:
+        nanoseconds = stamp.to_nsec()
+        before = self._entries.get(nanoseconds)
+        if before:
+            # As in a dict, the key that is there keeps its place and its identity.
+            self._entries[nanoseconds] = before[0], before[1], message
+            return
+        self._entries[nanoseconds] = next(self._numbers), stamp, message
+        if self.order and nanoseconds < self.order[-1]:
+            insort(self.order, nanoseconds)
+        else:
+            self.order.append(nanoseconds)
+
+    def __getitem__(self, stamp: Time) -> object:
+        return self._entries[stamp.to_nsec()][2]
+
+    def __delitem__(self, stamp: Time) -> None:
+        self.take(stamp.to_nsec())
+
+    def __contains__(self, stamp: object) -> bool:
+        return isinstance(stamp, Time) and stamp.to_nsec() in self._entries
+
+    def __iter__(self) -> Iterator[Time]:
+        return (stamp for _, stamp, _ in self._entries.values())
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+    def clear(self) -> None:
+        """Remove every message."""
+        self.order.clear()
+        self._entries.clear()
+
+    def take(self, nanoseconds: int) -> object:
+        """Remove a message by its stamp in nanoseconds, and return it. Raises KeyError."""
+        message = self._entries.pop(nanoseconds)[2]
+        del self.order[bisect_left(self.order, nanoseconds)]
+        return message
+
+    def stamp_at(self, nanoseconds: int) -> Time:
+        """Return the stamp as it was given. Raises KeyError."""
+        return self._entries[nanoseconds][1]
+
+    def has(self, nanoseconds: int) -> bool:
+        """Return whether there is a message with this stamp, in nanoseconds."""
+        return nanoseconds in self._entries
+
+    def keep_newest(self, size: int) -> None:
+        """Remove the oldest messages, so that at most ``size`` are left."""
+        while len(self.order) > size:
+            del self._entries[self.order.pop(0)]
+
+    def nearest(self, stamp: int) -> int:
+        """Return the stamp that is closest to another one; of two, that which arrived first. Raises IndexError if empty."""
+        order = self.order
+        if order[-1] <= stamp:
+            return order[-1]
+        after = bisect_left(order, stamp)
+        if after == 0 or order[after] == stamp:
+            return order[after]
+        return min(order[after - 1], order[after], key=lambda each: self._rank(each, stamp))
+
+    def between(self, first: int, last: int) -> list[int]:
+        """Return the stamps from ``first`` to ``last``, ascending."""
+        return self.order[bisect_left(self.order, first) : bisect_right(self.order, last)]
+
+    def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
+        """Return some of its stamps, the closest to ``stamp`` first; equally close ones in the order of their arrival."""
+        return sorted(stamps, key=lambda each: self._rank(each, stamp))
+
+    def _rank(self, each: int, stamp: int) -> tuple[int, int]:
+        return abs(each - stamp), self._entries[each][0]
+
+
+def closest_stamps(
+    queues: Sequence[StampQueue], stamp: int, slop: int, index: int | None = None
+) -> list[int] | None:
+    """Return one stamp of each queue so that all of them are less than ``slop`` apart; None without such a set.
+
+    ``stamp`` is the new one; ``index`` the queue that it is in: of that queue it is the one of the set.
+
+    It is the set that ROS finds first: ROS tries every combination of the stamps that are at most ``slop`` from
+    ``stamp``, those of the first queue in the outermost loop, closest first. Here the number of steps grows with the number
+    of stamps (times its logarithm), not with the product over all queues. All values are nanoseconds.
+    """
+    nearest = []
+    for at, queue in enumerate(queues):
+        if not queue.order:
+            return None
+        nearest.append(stamp if at == index else queue.nearest(stamp))
+    if min(nearest) < stamp - slop or max(nearest) > stamp + slop:
+        return None
+    if max(nearest) - min(nearest) < slop:
+        return nearest
+
+    # Stamps that are less than `slop` apart are in a window of that width, which starts at one of them.
+    candidates = [
+        [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
+        for at, queue in enumerate(queues)
+    ]
+    # A window with the new stamp starts before it, or at it.
+    last = stamp + slop if index is None else stamp
+    starts = {each for stamps in candidates for each in stamps if each <= last}
+    windows = [start for start in sorted(starts) if _has_each(candidates, start, start + slop - 1)]
+
+    chosen = []
+    for queue, stamps in zip(queues, candidates, strict=True):
+        # The first stamp with which a window is left is the one that ROS's loops arrive at first.
+        for each in queue.by_distance(stamps, stamp):
+            if left := _around(windows, each, slop):
+                windows = left
+                chosen.append(each)
+                break
+        else:
+            return None
+    return chosen
+
+
+def _around(windows: Sequence[int], stamp: int, slop: int) -> list[int]:
+    """Return the starts of those windows that contain a stamp."""
+    return list(windows[bisect_right(windows, stamp - slop) : bisect_right(windows, stamp)])
+
+
+def _has_each(candidates: Sequence[Sequence[int]], first: int, last: int) -> bool:
+    """Return whether each queue has a stamp from ``first`` to ``last``."""
+    for stamps in candidates:
+        at = bisect_left(stamps, first)
+        if at == len(stamps) or stamps[at] > last:
+            return False
+    return True
