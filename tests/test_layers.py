@@ -21,7 +21,18 @@ LAYERS = [
     {"client", "aio", "rosout"},
     {"runtime"},
     {"graph", "wire", "idl", "tf2", "gpio", "bag", "urdf"},
-    {"clock", "environment", "log_levels", "names", "private_files", "scanner", "steps", "times", "tree_svg"},
+    {
+        "clock",
+        "environment",
+        "log_levels",
+        "names",
+        "private_files",
+        "scanner",
+        "signal_dispatch",
+        "steps",
+        "times",
+        "tree_svg",
+    },
     {"errors", "escape"},
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}

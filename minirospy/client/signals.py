@@ -19,6 +19,7 @@ from types import FrameType
 from minirospy.client.exit_messages import what_runs
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action, Phase
+from minirospy.signal_dispatch import dispatching_signal
 
 __all__ = ["SignalWatchdog"]
 
@@ -117,7 +118,8 @@ class SignalWatchdog:
 
         is_nudge, self._is_nudge = self._is_nudge, False
         if is_nudge and not self._deferral.is_active and not self._is_sending():
-            self._dispatch()
+            with dispatching_signal():
+                self._dispatch()
 
     def _dispatch(self) -> None:
         self._deferral.pending = False

@@ -10,13 +10,11 @@ from __future__ import annotations
 import atexit
 import contextlib
 import operator
-import sys
 import threading
 import time
 import warnings
 import weakref
 from collections.abc import Sequence
-from types import FrameType
 from typing import Any
 
 from minirospy.errors import BoardError
@@ -24,6 +22,7 @@ from minirospy.gpio.events import Callback, CallbackThread, Detector, Slope
 from minirospy.gpio.link import Edge, Link
 from minirospy.gpio.model import PINS, Function, Pull, Setup
 from minirospy.gpio.place import Place
+from minirospy.signal_dispatch import is_dispatching_signal
 
 __all__ = [
     "BCM",
@@ -129,7 +128,7 @@ class Gpio:
         # channel -> BCM pin of what is set up, for the two calls that must be fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The same, of an input() or output() that a signal handler's cleanup() interrupted at its first step.
+        # The same, of channels that a signal's cleanup() has released: the call that it interrupted still finds them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -144,6 +143,7 @@ class Gpio:
         if mode not in {BOARD, BCM}:
             raise ValueError("An invalid mode was passed to setmode()")
         self._mode = mode
+        self._interrupted.clear()
 
     def getmode(self) -> int | None:
         """BCM, BOARD or None."""
@@ -204,7 +204,10 @@ class Gpio:
                 set(self._directions) if channel is None else {self._pin(one) for one in _channels(channel)}
             )
             mine = wanted & set(self._directions)
-            self._let_interrupted_call_end(sys._getframe())
+            if is_dispatching_signal():
+                # A shutdown hook: the program may have checked its flag, and be about to use its pin. It is not to fail
+                # for that: RPi.GPIO, being C, ends its calls first.
+                self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
                 self._forget_events(pin)
@@ -388,17 +391,6 @@ class Gpio:
             else:
                 self._writable.pop(channel, None)
 
-    def _let_interrupted_call_end(self, frame: FrameType | None) -> None:
-        # A shutdown hook runs in a signal handler, and Python runs those at the first step of a function. A
-        # program that checked its flag and then reads its pin is not to fail for that: RPi.GPIO, being C,
-        # ends its calls first.
-        while frame is not None:
-            if frame.f_code in _QUICK_CALLS and frame.f_locals.get("self") is self:
-                channel = frame.f_locals["channel"]
-                with contextlib.suppress(KeyError, TypeError):
-                    self._interrupted[channel] = self._readable[channel]
-            frame = frame.f_back
-
     def _output_several(self, channel: object, value: Any) -> None:
         if isinstance(channel, int) and self._interrupted.pop(channel, None) is not None:
             return
@@ -446,9 +438,6 @@ class Gpio:
         """Warn about the user's line, ``depth`` calls above this one."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
-
-
-_QUICK_CALLS = {Gpio.input.__code__, Gpio.output.__code__}
 
 
 class Wave:

@@ -12,6 +12,7 @@ import pytest
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action, Phase, ShutdownMachine, ThreadState
 from minirospy.client.signals import SignalWatchdog
+from minirospy.signal_dispatch import is_dispatching_signal
 
 
 @pytest.fixture
@@ -171,6 +172,20 @@ def test_a_nudge_in_a_critical_section_waits_for_its_end(
             watchdog._on_signal(signal.SIGINT, None)
         assert not lifecycle.is_shutdown_requested
     assert lifecycle.is_shutdown()
+
+
+@pytest.mark.parametrize("is_nudge", [True, False])
+def test_hooks_can_see_that_a_signal_has_interrupted_a_call(
+    lifecycle: Lifecycle, watchdog: SignalWatchdog, *, is_nudge: bool
+) -> None:
+    seen: list[bool] = []
+    lifecycle.add_hook(lambda: seen.append(is_dispatching_signal()))
+    watchdog._is_nudge = is_nudge
+    watchdog._on_signal(signal.SIGINT, None)
+    # At the next call of rospy nothing else is interrupted.
+    lifecycle.deferral.poll()
+    assert seen == [is_nudge]
+    assert not is_dispatching_signal()
 
 
 def test_a_nudge_while_a_link_is_sending_waits(lifecycle: Lifecycle) -> None:

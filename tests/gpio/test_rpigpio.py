@@ -17,6 +17,7 @@ from minirospy.gpio import rpigpio as GPIO  # noqa: N812 - as users know it
 from minirospy.gpio.board import Board
 from minirospy.gpio.model import Function, Setup
 from minirospy.gpio.rpigpio import Gpio, Wave
+from minirospy.signal_dispatch import dispatching_signal
 
 
 @pytest.fixture
@@ -312,7 +313,8 @@ def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, boar
         # What a signal at the first step of the call does: its handler runs before anything else.
         if event == "call" and frame.f_code in calls:
             sys.setprofile(None)
-            bcm.cleanup()
+            with dispatching_signal():
+                bcm.cleanup()
 
     sys.setprofile(interrupt)
     assert bcm.input(11) == 1
