@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
 
@@ -32,25 +32,13 @@ def roswtf(argv: Sequence[str] | None = None) -> int:
     return ROSWTF.main(argv)
 
 
-class _DoctorParser(Parser):
-    """Takes ``name:=value`` from among the words."""
-
-    def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, the launch files' as ``args``. Raises CommandLineError."""
-        options = super().parse([word for word in words if ":=" not in word])
-        options["args"] = dict(
-            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
-        )
-        return options
-
-
 _ABOUT_ROSWTF = """roswtf is a tool for verifying a ROS installation and running system. Checks
 provided launchfile if provided, else current stack or package."""
 
 
 def _parser(name: str) -> Parser:
     is_roswtf = name == "roswtf"
-    parser = _DoctorParser(
+    parser = AssignmentParser(
         name,
         "Checks this machine, its network and the graph, and prints what to do. "
         "Exit status: 0 without problems, 1 with, 2 usage error.",

@@ -19,7 +19,15 @@ from minirospy.errors import UsageError, did_you_mean
 if TYPE_CHECKING:
     from re import Pattern
 
-__all__ = ["CommandLineError", "Misuse", "Parser", "attach_completer", "completer_of"]
+__all__ = [
+    "AssignmentParser",
+    "CommandLineError",
+    "Misuse",
+    "Parser",
+    "attach_completer",
+    "completer_of",
+    "split_assignments",
+]
 
 _COMPLETER = "minirospy_completer"
 _HELP_COLUMN = 24
@@ -244,6 +252,22 @@ class Parser(argparse.ArgumentParser):
             parts.append(_rows("Arguments:", shown))
         parts += [_filled(text) for text in (self.description, self.epilog) if text]
         return "\n".join(parts)
+
+
+class AssignmentParser(Parser):
+    """Takes NAME:=VALUE from among the words, as a launch file's arguments are given."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
+        """Return the arguments by name, what is assigned as ``args``. Raises CommandLineError."""
+        plain, assigned = split_assignments(words)
+        return {**super().parse(plain), "args": assigned}
+
+
+def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Return the words without NAME:=VALUE, and those by name; without special names such as __ns, which a node reads."""
+    assigned = [word for word in words if ":=" in word]
+    values = dict(word.split(":=", 1) for word in assigned if not word.startswith("__"))
+    return [word for word in words if ":=" not in word], values
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import minirospy
 from minirospy import private_files
 from minirospy.cli.command import warn
-from minirospy.cli.parser import Misuse, Parser, attach_completer
+from minirospy.cli.parser import Misuse, Parser, attach_completer, split_assignments
 from minirospy.cli.verbs import Command
 from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
@@ -75,7 +75,7 @@ class _MasterParser(Parser):
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raises CommandLineError."""
-        return super().parse([word for word in words if ":=" not in word])
+        return super().parse(split_assignments(words)[0])
 
 
 def _parser(name: str) -> Parser:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy import private_files
 from minirospy.cli.command import RosText, WordedError
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError, UsageError
@@ -191,20 +191,8 @@ def _child(options: LaunchOptions, environment: Environment, packages: Packages)
     )
 
 
-class _LaunchParser(Parser):
-    """Takes ``name:=value`` from among the words."""
-
-    def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
-        options = super().parse([word for word in words if ":=" not in word])
-        options["args"] = dict(
-            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
-        )
-        return options
-
-
 def _parser() -> Parser:
-    parser = _LaunchParser(
+    parser = AssignmentParser(
         "roslaunch",
         "Runs the nodes of launch files, and a master where there is none. Ctrl-C stops them all.",
         _USAGE,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from minirospy import private_files
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError, NotFoundError, UsageError
@@ -33,20 +33,8 @@ def rosunit(argv: Sequence[str] | None = None) -> int:
     return ROSUNIT.main(argv)
 
 
-class _RostestParser(Parser):
-    """Takes ``name:=value`` from among the words."""
-
-    def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, the launch file's as ``args``. Raises CommandLineError."""
-        options = super().parse([word for word in words if ":=" not in word])
-        options["args"] = dict(
-            word.split(":=", 1) for word in words if ":=" in word and not word.startswith("__")
-        )
-        return options
-
-
 def _rostest_parser() -> Parser:
-    parser = _RostestParser(
+    parser = AssignmentParser(
         prog="rostest",
         usage="rostest [options] PACKAGE FILE [arg:=value ...]\n       rostest [options] FILE [arg:=value ...]",
         description="Runs each <test> of a launch file, with the file's nodes and a master of its own on a free port.",
