@@ -106,7 +106,7 @@ class Victim:
 
 
 Attack = Callable[[int, int], "Iterator[None]"]
-"""(port, number of peers) -> the attack, which goes on while the good client asks between its yields."""
+"""(port, number of peers) -> the attack, a generator; the good client makes its calls between its yields."""
 
 
 def silent(port: int, peers: int) -> Iterator[None]:
@@ -238,7 +238,7 @@ def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, as
 
 
 def ask_node(api: str, service: str) -> None:
-    """Call the node's Slave API and its service once. Raises OSError where there is no good answer."""
+    """Call the node's Slave API and its service once. Raises OSError without a good answer."""
     with ServerProxy(api) as proxy:
         proxy.getPid("/good")
     with _connect(port_of(service)) as sock:
@@ -308,11 +308,11 @@ def main() -> int:
             ("a frame of 4 GiB, says its length", b"\xff\xff\xff\xff"),
         ):
             attack(f"node, subscriber: {what}", node, bad_publisher(uri, frames), 0, ask)
-        told = node.lines
+        lines = node.lines
     if not options.json:
-        print(f"\nthe node's lines, {len(told)}, of which the first of each kind:")
+        print(f"\nthe node's lines, {len(lines)}, of which the first of each kind:")
         seen: set[str] = set()
-        for line in told:
+        for line in lines:
             kind = "".join(letter for letter in line if not letter.isdigit())[:60]
             if kind not in seen:
                 seen.add(kind)

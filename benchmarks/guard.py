@@ -116,7 +116,7 @@ def peer() -> None:
 
     rospy.init_node("guard_peer")
     answers = rospy.Publisher("/answers", UInt64, queue_size=10, tcp_nodelay=True)
-    rospy.Subscriber("/asks", UInt64, answers.publish, tcp_nodelay=True)
+    rospy.Subscriber("/requests", UInt64, answers.publish, tcp_nodelay=True)
     rospy.Subscriber("/stream", UInt64, lambda message: answers.publish(message) if message.data else None)
     rospy.Subscriber("/images", Image, lambda message: answers.publish(len(message.data)))
     # The other end waits for the service: by then it receives what is published here.
@@ -140,15 +140,15 @@ def measure_ours(meter: Meter, others: list[psutil.Process]) -> None:
     def on_answer(_message: Any) -> None:
         left[0] -= 1
         if left[0] > 0:
-            asks.publish(1)
+            requests.publish(1)
         else:
             answered.set()
 
     rospy.Subscriber("/answers", UInt64, on_answer, tcp_nodelay=True)
-    asks = rospy.Publisher("/asks", UInt64, queue_size=10, tcp_nodelay=True)
+    requests = rospy.Publisher("/requests", UInt64, queue_size=10, tcp_nodelay=True)
     stream = rospy.Publisher("/stream", UInt64, queue_size=0)
     images = rospy.Publisher("/images", Image, queue_size=2)
-    for publisher in (asks, stream, images):
+    for publisher in (requests, stream, images):
         publisher.wait_for_subscribers(1, 10)
     single = rospy.ServiceProxy("/service", SetBool)
     persistent = rospy.ServiceProxy("/service", SetBool, persistent=True)
@@ -163,7 +163,7 @@ def measure_ours(meter: Meter, others: list[psutil.Process]) -> None:
 
     def there_and_back() -> int:
         left[0] = 1000
-        asks.publish(1)
+        requests.publish(1)
         wait()
         return 1000
 
@@ -251,7 +251,7 @@ def once() -> int:
     """Measure, print and return the exit status."""
     slower = report(measure_all())
     if slower:
-        print(f"slower than it was: {', '.join(slower)}. `make bench` tells more.", file=sys.stderr)
+        print(f"slower than it was: {', '.join(slower)}. `make bench` shows more.", file=sys.stderr)
     return 1 if slower else 0
 
 

@@ -163,7 +163,7 @@ def _dead_subscribers(port: int) -> dict[str, float]:
     """Return the delay until a live subscriber is notified, with fifty more that never answer."""
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         dead = f"http://127.0.0.1:{silent.getsockname()[1]}/"
-        told, live = threading.Event(), Dummy()
+        notified, live = threading.Event(), Dummy()
         client = Client(port)
         for number in range(50):
             client.call("registerSubscriber", f"/dead{number}", "/busy", "a/B", f"{dead}{number}/")
@@ -171,7 +171,7 @@ def _dead_subscribers(port: int) -> dict[str, float]:
         begin = time.monotonic()
         client.call("registerPublisher", "/pub", "/busy", "a/B", "http://127.0.0.1:1/")
         while not live.calls and time.monotonic() - begin < 60:
-            told.wait(0.0005)
+            notified.wait(0.0005)
         delay = time.monotonic() - begin
         client.close()
         return {"told_beside_50_dead_ms": delay * 1e3}

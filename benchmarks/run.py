@@ -85,7 +85,7 @@ class Peers:
 
 
 class Worker(NamedTuple):
-    """A process that says lines of JSON and is told words."""
+    """A process that prints lines of JSON and reads words."""
 
     process: subprocess.Popen[str]
 
@@ -269,7 +269,7 @@ def main() -> int:
     wanted = options.cases.split(",") if options.cases else list(CASES)
     unknown = [case for case in wanted if case not in CASES]
     if unknown:
-        parser.error(f"there is no case {', '.join(unknown)}: they are {', '.join(CASES)}")
+        parser.error(f"unknown cases {', '.join(unknown)}: they are {', '.join(CASES)}")
     rounds: dict[str, dict[str, list[float]]] = {stack: defaultdict(list) for stack in stacks}
     for number in range(options.rounds):
         for case in wanted:

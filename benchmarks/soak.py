@@ -3,7 +3,7 @@
     python benchmarks/soak.py --minutes 60
 
 Nodes come and go (with and without a good-bye, and twice under one name), topics, services and parameters change,
-tools look, clients hang up in the middle of a request. Each ten seconds a line tells the master's memory, files,
+tools look, clients hang up in the middle of a request. Each ten seconds a line prints the master's memory, files,
 threads and journal; the exit status is 1 where memory or files grew between the middle and the end.
 """
 

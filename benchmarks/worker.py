@@ -1,7 +1,7 @@
 """One process of a benchmark: `worker.py ROLE name=value ...`. Only the rospy API, so it runs on any rospy.
 
-A worker prints a line of JSON when it is ready, one when it has measured, and one with what it cost when it has
-been told to stop; the lines "go" and "stop" come to it on its standard input.
+A worker prints a line of JSON when it is ready, one when it has measured, and one with its cost at the
+end; the lines "go" and "stop" come to it on its standard input.
 """
 
 import json

@@ -6,7 +6,7 @@ tests/test_course.py plays the same pages and fails where a page does not tell t
 What is played of a page, in its order:
 
 - a block ```console. `$ command` is typed into terminal 1, `terminal 2$ command` into terminal 2. What follows is the
-  output. `...` in a line stands for any text, `...` alone for any lines; times may be other ones. A last line `...`
+  output. `...` in a line matches any text, `...` alone for any lines; times may be other ones. A last line `...`
   says that the program still runs. `terminal 2:` shows what a running program prints next, `<Ctrl-C>` or `<q>` is a key.
 - any other block behind a line that ends with a file's name (Save this as `~/name`:) is saved as that file.
 
@@ -60,7 +60,7 @@ LOOKS = re.compile(
 )
 TIME = re.compile(r"\b1\d{9}\.\d+")
 REDRAWN = re.compile(r"\r\x1b\[2K(?:\x1b\[1A\x1b\[2K)+")
-"""How a program goes back to draw its picture anew: in the record the new one stands below the old one."""
+"""How a program goes back to redraw its picture: in the record, the new one follows the old one."""
 CONTROL = re.compile(r"\x1b\][^\x07\x1b]*(\x07|\x1b\\)|\x1b\[[0-?]*[ -/]*[@-~]|\x1b[=>()][B0]?|\r")
 TAKE_TERMINAL = """
 import fcntl, os, sys, termios
@@ -178,7 +178,7 @@ class Terminal:
         self.skips = False
         """The page showed `...` last: lines that it does not show may come."""
         self.is_busy = True
-        """A program runs, as the page tells it."""
+        """A program runs, as on the page."""
 
     def read(self) -> None:
         """Read what has arrived."""
@@ -260,7 +260,7 @@ class Player:
     def _save(self, step: Step) -> None:
         file = self._home / step.path.removeprefix("~/")
         if not file.parent.is_dir():
-            raise CourseError(f"{step.place}: there is no folder for {step.path}")
+            raise CourseError(f"{step.place}: the folder of {step.path} does not exist")
         file.write_text(step.text, encoding="utf-8")
         self.record.append(f"({step.path} is saved)\n")
 

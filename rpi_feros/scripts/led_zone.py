@@ -12,7 +12,7 @@ ALL_LEDS = list(range(2, 8))
 def set_zone(request: safetyZoneRequest) -> safetyZoneResponse:
     if not 0 <= request.zone < len(ZONES):
         return safetyZoneResponse(
-            success=False, message=f"There is no zone {request.zone}: 0 to {len(ZONES) - 1}."
+            success=False, message=f"Zone {request.zone} does not exist: 0 to {len(ZONES) - 1}."
         )
     colour, leds = ZONES[request.zone]
     GPIO.output(ALL_LEDS, [led in leds for led in ALL_LEDS])

@@ -30,7 +30,7 @@ class Runner:
     def _run(self, runs: int) -> None:
         rate = rospy.Rate(self._frequency)
         for done in range(runs):
-            # At the beginning of a run: what is told right before the result may come after it, and is lost.
+            # At the start of a run: feedback right before the result may arrive after it, and is lost.
             self._server.publish_feedback(runningLedFeedback(currentRun=done + 1))
             for led in LEDS:
                 if self._server.is_preempt_requested():

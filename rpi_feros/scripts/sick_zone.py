@@ -19,16 +19,16 @@ def main() -> None:
     rospy.init_node("sick_zone")
     rospy.wait_for_service("/set_led_zone_state")
     set_zone = rospy.ServiceProxy("/set_led_zone_state", safetyZone)
-    told = None
+    published = None
 
     def measured(scan: LaserScan) -> None:
-        nonlocal told
+        nonlocal published
         zone = zone_of(min(scan.ranges))
-        if zone == told:
+        if zone == published:
             return
         try:
             rospy.loginfo(set_zone(zone).message)
-            told = zone
+            published = zone
         except rospy.ServiceException as error:
             rospy.logwarn(error)
         except rospy.ROSInterruptException:
