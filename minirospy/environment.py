@@ -156,7 +156,7 @@ def is_local(environ: Mapping[str, str]) -> bool:
 
 
 def export_local(environ: MutableMapping[str, str]) -> None:
-    """Have the programs that are started with ``environ`` stay on this machine, where MINIROSPY_LOCAL asks for it.
+    """Restrict the programs that are started with ``environ`` to this machine if MINIROSPY_LOCAL is set.
 
     Those of other ROS clients do not know the variable. Raises UsageError as Environment.read.
     """

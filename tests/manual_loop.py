@@ -39,7 +39,7 @@ class ManualLoop(asyncio.SelectorEventLoop):
 
 
 def run_manually(scene: Callable[[ManualLoop], Coroutine[Any, Any, None]]) -> None:
-    """Run a scene on a loop of its own, whose clock stands still until the scene advances it."""
+    """Run a scene on a new loop, whose clock only the scene advances."""
     loop = ManualLoop()
     try:
         loop.run_until_complete(scene(loop))
@@ -49,7 +49,7 @@ def run_manually(scene: Callable[[ManualLoop], Coroutine[Any, Any, None]]) -> No
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Let sockets and threads do their part until the condition holds; the loop's clock stands still meanwhile."""
+    """Let sockets and threads do their part until the condition holds; the loop's clock does not advance meanwhile."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:

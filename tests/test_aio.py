@@ -396,7 +396,7 @@ def test_a_message_that_does_not_fit_is_told_of(master: str, caplog: pytest.LogC
 
 
 def test_a_topic_that_is_left_and_joined_at_once(graph: MasterProxy) -> None:
-    """By several tasks, before the master has heard of it, or while it hears of the end."""
+    """By several tasks, before the registration has reached the master, or during the unregistration."""
 
     async def main() -> None:
         async with Node("a") as node, Node("b") as other:

@@ -1,4 +1,4 @@
-"""The course tells the truth: each command of its pages, typed into real terminals, answers what the page shows."""
+"""The pages of the course are true: each command, typed into real terminals, prints what the page shows."""
 
 from __future__ import annotations
 

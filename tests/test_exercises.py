@@ -61,7 +61,7 @@ def test_an_argument_that_lacks_its_colon() -> None:
 
 
 def test_copied_into_a_workspace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What stands in their CMakeLists.txt is what catkin_make takes."""
+    """catkin_make accepts their CMakeLists.txt."""
     source = tmp_path / "src"
     source.mkdir()
     for name in ("rpi_feros", "launch"):

@@ -119,7 +119,7 @@ class SimpleActionClient:
         return self.gh.get_result()
 
     def get_state(self) -> int:
-        """Return the goal's state, one of GoalStatus; LOST where there is no goal."""
+        """Return the goal's state, one of GoalStatus; LOST without a goal."""
         gh = self.gh
         return visible_state(gh.get_goal_status()) if gh else GoalStatus.LOST
 

@@ -31,7 +31,7 @@ class TerminalHandler(logging.Handler):
         """Write one line."""
         name = SEVERITIES.get(record.levelno, record.levelname)
         stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
-        # There may be no terminal any more, which is no fault of the program.
+        # The terminal may have been closed, which is not an error of the program.
         with contextlib.suppress(OSError, ValueError):
             stream.write(f"[{name}] [{record.created:f}]: {self.format(record)}\n")
             stream.flush()

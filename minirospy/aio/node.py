@@ -328,7 +328,7 @@ class Node:
     async def get_param(self, name: str, default: object = _UNSPECIFIED) -> Any:
         """Return a parameter's value, or ``default``.
 
-        Raises KeyError where it is not set and there is no default, MasterUnreachableError.
+        Raises KeyError where it is neither set nor has a default, MasterUnreachableError.
         """
         try:
             return await self._node.master("getParam", self.resolve(name))

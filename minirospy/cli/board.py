@@ -195,7 +195,7 @@ def _act(board: Board, key: str) -> None:
 
 
 class _Keys:
-    """Single keys from the terminal, without Enter and without echo; none where stdin is no terminal."""
+    """Single keys from the terminal, without Enter and without echo; none where stdin is not a terminal."""
 
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}

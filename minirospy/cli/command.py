@@ -138,7 +138,7 @@ def run(
         return complain(name, error, status, text)
     except UnicodeEncodeError as error:
         wrong = error.object[error.start : error.end]
-        return complain(name, UsageError(f"{wrong!r} was typed, which is no UTF-8 text"), 2)
+        return complain(name, UsageError(f"the argument {wrong!r} is not UTF-8 text"), 2)
     except BrokenPipeError:
         # The reader (`| head`) has gone.
         _flush()

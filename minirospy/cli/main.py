@@ -30,7 +30,7 @@ def _dispatch(words: list[str]) -> int:
     entry = find_verb(words[0])
     if entry is None:
         hint = did_you_mean(words[0], (each.verb for each in COMMANDS if each.verb))
-        raise UsageError(f"there is no `minirospy {words[0]}`{hint} (`minirospy -h` shows what there is)")
+        raise UsageError(f"unknown command `minirospy {words[0]}`{hint} (`minirospy -h` shows what there is)")
     return entry.load_main()(words[1:])
 
 

@@ -54,7 +54,7 @@ class Misuse(UsageError):
 
 
 class _Help(argparse.HelpFormatter):
-    """Help as wide as the terminal; argparse asks shutil for that, whose import costs more than its own."""
+    """Help as wide as the terminal; argparse gets the width from shutil, whose import costs more than its own."""
 
     def __init__(self, prog: str, *args: int, **kwargs: Any) -> None:
         try:

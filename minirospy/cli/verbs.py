@@ -130,7 +130,9 @@ class Family(NamedTuple):
     def _refuse(self, name: str) -> int:
         """Report a verb that does not exist."""
         hint = did_you_mean(name, map(self.verb_name, self.verbs))
-        error = UsageError(f"there is no `{self.name} {name}`{hint} (`{self.name} -h` shows what there is)")
+        error = UsageError(
+            f"unknown command `{self.name} {name}`{hint} (`{self.name} -h` shows what there is)"
+        )
         if self.shows_help_on_error:
             print(self.help())
         return complain(self.name, error, self.help_status.unknown)

@@ -251,7 +251,7 @@ class RosStreamHandler(_DeferringHandler):
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # There is no terminal, or not any more, which is no fault of the program.
+            # Without a terminal, or with one that was closed, which is not an error of the program.
             pass
 
 
@@ -305,7 +305,7 @@ def _configured_by_file(session: Session) -> bool:
 
         try:
             if not path.is_file():
-                raise FileNotFoundError("there is no such file")
+                raise FileNotFoundError("the file does not exist")
             if path.suffix in (".yaml", ".yml"):
                 import yaml
 

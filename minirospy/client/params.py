@@ -52,7 +52,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return a parameter's value, or ``default`` where it is not set.
 
     Bytes and dates come as xmlrpc.client.Binary and DateTime, as from rospy.
-    Raises KeyError where it is not set and there is no default, ROSException where the master fails.
+    Raises KeyError where it is neither set nor has a default, ROSException where the master fails.
     """
     value = _get(current_session().resolve(param_name))
     if value is not NOT_SET:

@@ -317,7 +317,7 @@ class PublishedTopic(SharedTopic):
 
 
 def _checked_size(queue_size: int | None) -> int | None:
-    """Return a Publisher's queue_size as rospy reads it: a negative one is no limit. Raises ValueError."""
+    """Return a Publisher's queue_size as rospy reads it: a negative one means unlimited. Raises ValueError."""
     if queue_size is None:
         return None
     try:

@@ -152,5 +152,5 @@ class Board:
 
 def _checked(pin: int) -> int:
     if not (isinstance(pin, int) and 0 <= pin < PINS):
-        raise BoardError(f"there is no pin {pin!r}: BCM numbers are 0 to {PINS - 1}")
+        raise BoardError(f"pin {pin!r} does not exist: BCM numbers are 0 to {PINS - 1}")
     return pin

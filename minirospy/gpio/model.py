@@ -184,7 +184,7 @@ class BoardModel:
 
 def _pin(pin: int) -> int:
     if not (isinstance(pin, int) and 0 <= pin < PINS):
-        raise OperationError(f"there is no pin {pin!r}: BCM numbers are 0 to {PINS - 1}")
+        raise OperationError(f"pin {pin!r} does not exist: BCM numbers are 0 to {PINS - 1}")
     return pin
 
 

@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """Carry ``operation`` out; None asks only for the Done."""
+    """Carry ``operation`` out; None requests only the Done."""
 
     number: int
     operation: Operation | MovePerson | None

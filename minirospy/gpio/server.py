@@ -135,7 +135,7 @@ class _Server:
         if self._saving is not None:
             self._saving.cancel()
             self._saving = None
-        # A removed folder (a test's, a cleaned /tmp) is no reason to fail the clients.
+        # A removed folder (a test's, a cleaned /tmp) must not fail the clients.
         with contextlib.suppress(OSError):
             _write_private(self._place.state_path, encode_board(self._model.pins, self._model.person))
 

@@ -187,7 +187,7 @@ def global_name(value: object, name: str, caller_id: str) -> str:
 def node_name(value: object, name: str, caller_id: str) -> str:
     """Return the name of a node, resolved as the caller sees it."""
     found = _short_text(value, name)
-    # rosmaster lets in much that is no legal name: many a robot's topics have a dash.
+    # rosmaster accepts many names that are not legal: many robots have topics with a dash.
     if ":" in found or " " in found or has_controls(found):
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return _resolve(found, caller_id)

@@ -1,4 +1,4 @@
-"""The life of an action's goal, as tables: what the server may make of it, and what a client concludes from what it hears.
+"""The life of an action's goal, as tables: the transitions of the server, and those of a client by the statuses that it receives.
 
 In: a state and an event. Out: the next state, or the states to pass through, or None where that cannot be.
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself where that page leaves things open.
@@ -26,7 +26,7 @@ __all__ = [
 
 
 class GoalState(IntEnum):
-    """What a server tells of a goal: the numbers of actionlib_msgs/GoalStatus."""
+    """The status of a goal, as the server publishes it: the numbers of actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -183,7 +183,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
     },
     _C.DONE: _ENDED,
 }
-"""The client's side: the states that it passes through, in order, when it hears of a goal's status.
+"""The client's side: the states that it passes through, in order, when it receives a goal's status.
 
 A status may have been missed (a list replaces the one before), so one may lead over several states. What is
 not named cannot follow.
@@ -215,7 +215,7 @@ _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
     """Return what a client in ``state`` passes through when it receives ``status``; None where that cannot follow.
 
-    Raises KeyError on a status that no server tells.
+    Raises KeyError on a status that servers do not publish.
     """
     if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
         raise KeyError(status)

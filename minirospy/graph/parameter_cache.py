@@ -1,7 +1,7 @@
 """What a node knows of parameters that it has asked for before: values in, news of changes in, values out.
 
-Pure. A change makes the node forget what it concerns, and the next read asks the master: so news that overtake
-each other, and the empty dictionary that stands for "deleted" as well as for "empty", do no harm.
+Pure. A change makes the node forget what it concerns, and the next read queries the master: so updates that overtake
+each other, and the empty dictionary that means "deleted" as well as "empty", do no harm.
 Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
 """
 

@@ -1,4 +1,4 @@
-"""The parameter server's tree, and who is to be told of a change.
+"""The parameter server's tree, and the nodes to notify of a change.
 
 Pure: calls in, values and updates out. Keys are global names. Source:
 http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster where that is silent.

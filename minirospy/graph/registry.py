@@ -44,7 +44,7 @@ class RegistryFullError(MinirospyError):
 
 
 class PublisherUpdate(NamedTuple):
-    """Tell the subscriber at ``uri`` the full list of a topic's publishers, as it is when it is told."""
+    """Send the subscriber at ``uri`` the full list of a topic's publishers, as it is when it is sent."""
 
     uri: str
     topic: str
@@ -178,7 +178,7 @@ class Registry:
         return actions
 
     def unregister_parameter(self, node: str, key: str, uri: str) -> None:
-        """``node`` is told no more."""
+        """``node`` is not notified any more."""
         entry = self._nodes.get(node)
         if entry and entry.uri == uri:
             self._leave(node, key, _PARAMETER)

@@ -33,8 +33,8 @@ class SubscriptionPlan:
     """The publishers that the master named, and how often each has failed.
 
     A link that ends while the master still names its publisher is tried again, with pauses that double:
-    the master tells of a publisher that left, not of a cable that was pulled. One that refused is asked
-    again when the master next tells of the topic: it may publish another type by then.
+    the master reports a publisher that left, not a cable that was pulled. One that refused is called
+    again at the next update of the topic: it may publish another type by then.
     """
 
     def __init__(self) -> None:

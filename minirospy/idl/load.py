@@ -143,7 +143,7 @@ def read_definition(path: Path) -> str:
 def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
     """Return a package's definitions as Python: file below the package's folder (``msg/_Bool.py``) -> its text.
 
-    With them goes the empty ``py.typed``, which tells mypy to believe the annotations (PEP 561).
+    With them goes the empty ``py.typed``, which makes mypy use the annotations (PEP 561).
     Raise DefinitionError, NotFoundError.
     """
     from minirospy.idl.emit import emit_message, emit_package, emit_service

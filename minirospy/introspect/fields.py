@@ -68,7 +68,7 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
 def field_type(message_class: type[Message], path: str) -> str:
     """Return the ROS type of the field at a path of a message class.
 
-    Raise NotFoundError where there is no such field or the class of an inner message is not installed.
+    Raise NotFoundError where the field does not exist or the class of an inner message is not installed.
     """
     from minirospy.idl.load import message_class as load_class
 

@@ -31,7 +31,7 @@ def logger_levels(graph: Graph, node: str) -> dict[str, str]:
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """Return the level of one logger. Raise as :func:`logger_levels`, and NotFoundError where there is no such logger."""
+    """Return the level of one logger. Raise as :func:`logger_levels`, and NotFoundError if the logger does not exist."""
     levels = logger_levels(graph, node)
     if logger not in levels:
         raise NotFoundError(f"logger of node {node}", logger, levels)

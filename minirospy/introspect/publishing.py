@@ -26,7 +26,7 @@ def values_to_publish(
     """Yield the YAML values of each message with ``fields``; at least one.
 
     ``arguments`` are those of one message; without them a file is read, or standard input as it comes. Raises
-    UsageError where there are no values, NotFoundError where there is no file, ValueTextError on what is not YAML.
+    UsageError without values, NotFoundError if the file does not exist, ValueTextError on what is not YAML.
     """
     if arguments or (file is None and not fields):
         yield parse_arguments(arguments)

@@ -126,7 +126,7 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 def find_topic(graph: Graph, name: str) -> TopicField | None:
     """Return the topic that ``name`` (global) is, or is a field of: ``/pose/header/stamp``.
 
-    None where there is no such topic, or its type is not known yet. A topic of the whole name comes
+    None if the topic does not exist, or its type is not known yet. A topic of the whole name comes
     before a field of a shorter one.
     """
     types = {topic: type_ for topic, type_ in graph.master.get_topic_types().items() if type_ != _ANY}

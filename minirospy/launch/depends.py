@@ -30,7 +30,7 @@ def file_needs(
 ) -> dict[str, FileNeeds]:
     """Return the needs of each launch file, and of those that they include. Raises LaunchError.
 
-    It is no fault where an arg has no value or a file of parameters is missing: that need not be there yet. ``warn``
+    An arg without a value or a missing parameter file is not an error: they may be generated later. ``warn``
     is called for each file that cannot be included.
     """
     sources = []

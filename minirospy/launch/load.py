@@ -123,7 +123,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
     for word in what:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not Path(word).exists():
-            raise MinirospyError(f"[{word}] is no launch file: an argument is written {name}:={value}")
+            raise MinirospyError(f"[{word}] is not a launch file: an argument is written {name}:={value}")
 
     if len(what) == 2 and not Path(what[0]).is_file():
         package, file = what

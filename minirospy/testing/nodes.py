@@ -60,7 +60,7 @@ class _NodeTest(unittest.TestCase):
         """Return a private parameter that is a time."""
         value = self.param(name, default)
         if not isinstance(value, int | float) or isinstance(value, bool) or value < 0:
-            self.fail(f"bad parameter ({name}): [{value}] is no number of seconds")
+            self.fail(f"bad parameter ({name}): [{value}] is not a number of seconds")
         return float(value)
 
     def listed(self, name: str) -> list[dict[str, Any]]:

@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 CHUNK = 64 * 1024
-"""Bytes that one receive asks for while messages are small."""
+"""Size of one receive while messages are small, in bytes."""
 
 LENGTH_BYTES = 4
 """Bytes of the length in front of a frame or a connection header."""

@@ -45,7 +45,7 @@ Body = bytes | bytearray
 
 
 class HttpHead(NamedTuple):
-    """What stands in front of a body. ``start`` is the first line, ``headers`` have lower-case names."""
+    """The start line and the headers of a message. ``start`` is the first line, ``headers`` have lower-case names."""
 
     start: str
     headers: dict[str, str]
@@ -54,7 +54,7 @@ class HttpHead(NamedTuple):
     keep_alive: bool
     """Whether the connection serves another request after this one."""
     plain_length: int
-    """The length of the body, where nothing but a Content-Length tells of it; else -1."""
+    """The length of the body where only a Content-Length gives it; else -1."""
 
 
 class HttpMessage(NamedTuple):
@@ -351,7 +351,7 @@ def _read_head(data: bytes) -> HttpHead:
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
-        # Who reads a space in front of the colon in another way than we may be told another story.
+        # A proxy that reads a space before the colon differently would see another request (request smuggling).
         if not separator or not name or name[-1] in " \t" or name[0] in " \t":
             raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
         name, value = name.lower(), value.strip()

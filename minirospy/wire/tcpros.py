@@ -33,7 +33,7 @@ ANY = "*"
 
 
 class InterfaceType(NamedTuple):
-    """What a peer is told of a message or service type: name (``pkg/Name``), md5sum, full text."""
+    """A message or service type in a connection header: name (``pkg/Name``), md5sum, full text."""
 
     name: str
     md5sum: str
@@ -65,7 +65,7 @@ def publisher_header(
 ) -> Header:
     """Return what a publisher answers with; ``extra`` are the user's fields.
 
-    They win, as with rospy: a relay of AnyMsg tells the type of what it relays.
+    They win, as with rospy: a relay of AnyMsg sends the type of what it relays.
     """
     return {
         "callerid": caller_id,

@@ -126,7 +126,7 @@ def _patterns() -> _Patterns:
         "</member>",
         "<value><struct>",
         rf"</struct>{_SPACE}</value>",
-        # What stands where it is not expected, and all behind it, is a token that nothing is known of.
+        # Text in an unexpected place, and all after it, is an unknown token.
         "(?s:.+)",
     )
     return _Patterns(

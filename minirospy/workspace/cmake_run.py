@@ -230,7 +230,9 @@ class _Run:
             folder = self._folder / name
             if not (folder / "CMakeLists.txt").is_file():
                 raise BuildError(
-                    str(file), node.line, f"add_subdirectory({name}): there is no {folder / 'CMakeLists.txt'}"
+                    str(file),
+                    node.line,
+                    f"add_subdirectory({name}): {folder / 'CMakeLists.txt'} does not exist",
                 )
             places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())
             below = _Run(folder, {**self._known, **places}, self._macros, self._depth)

@@ -93,7 +93,7 @@ class Install(NamedTuple):
                 near = did_you_mean(
                     source.name, os.listdir(source.parent) if source.parent.is_dir() else (), 1
                 )
-                raise _error(self.command, f"{self.command.name}: there is no [{name}]{near}")
+                raise _error(self.command, f"{self.command.name}: [{name}] does not exist{near}")
 
 
 class Test(NamedTuple):
@@ -289,7 +289,7 @@ class _Collector:
         if not names and "FILES" not in given:
             names = list(there)
         if not folder.is_dir() and (names or "FILES" not in given):
-            raise _error(command, f"{command.name}: there is no folder [{place}]")
+            raise _error(command, f"{command.name}: folder [{place}] does not exist")
 
         for name in names:
             path = folder / name
@@ -297,7 +297,7 @@ class _Collector:
                 raise _error(command, f"{command.name}: [{name}] does not end in .{kind}")
             if not path.is_file():
                 hint = did_you_mean(name, there, 1)
-                raise _error(command, f"{command.name}: there is no [{name}] in folder [{place}]{hint}")
+                raise _error(command, f"{command.name}: [{name}] does not exist in folder [{place}]{hint}")
             if not _TYPE_NAME.match(path.stem):
                 raise _error(
                     command,

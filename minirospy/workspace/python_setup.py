@@ -55,7 +55,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
     scripts = tuple(folder / name for name in _names(file, given, "scripts"))
     for name, path in [*modules.items(), *((path.name, path) for path in scripts)]:
         if not path.exists():
-            raise BuildError(str(file), 0, f"[{name}] is named, but there is no {path}")
+            raise BuildError(str(file), 0, f"[{name}] is named, but {path} does not exist")
 
     missing = {name: path for name, path in packages.items() if not path.exists()}
     return PythonSetup(
@@ -63,7 +63,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
         modules,
         scripts,
         tuple(
-            f"{file}: packages=[...] names [{name}], but there is no folder {path}"
+            f"{file}: packages=[...] names [{name}], but folder {path} does not exist"
             for name, path in missing.items()
         ),
     )

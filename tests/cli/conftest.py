@@ -45,7 +45,7 @@ class Robot(NamedTuple):
 
 @pytest.fixture
 def robot(master: str) -> Iterator[Robot]:
-    """/robot: publishes /button_state, /ns/chatter, /poly (latched), hears /listen, serves /set_led_state, /fail."""
+    """/robot: publishes /button_state, /ns/chatter, /poly (latched), subscribes to /listen, serves /set_led_state, /fail."""
     loop = LoopThread("robot")
     stopped: list[str] = []
     heard: list[bytes] = []

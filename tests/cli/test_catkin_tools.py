@@ -51,7 +51,7 @@ def test_find(workspace: Path, capsys: Capture) -> None:
 
 def test_find_where_there_can_be_nothing(workspace: Path, capsys: Capture) -> None:
     assert catkin_find(["--lib", "a"]) == 2
-    assert capsys.readouterr().err == "catkin_find: ERROR: there is no search for a package in lib\n"
+    assert capsys.readouterr().err == "catkin_find: ERROR: no search for a package in lib\n"
     assert catkin_find(["--libexec"]) == 2
 
 

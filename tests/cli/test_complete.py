@@ -311,7 +311,7 @@ def test_a_message_to_be_changed(workspace: Path) -> None:
     assert tab("rostopic pub /t std_msgs/Empty ") == ['"{}"']
     assert tab("rostopic pub /t std_msgs/Bool true ") == []
     assert tab("rostopic pub /t std_msgs/Nothing ") == []
-    # A vertical tab stands for a line feed: a candidate is one line.
+    # A vertical tab represents a line feed: a candidate is one line.
     assert tab("rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\vy: 0.0\vz: 0.0"']
     assert tab("rostopic pub /t my_robot/Leds ") == [
         "\"leds:\v- name: ''\v  place:\v  - 0.0\v  - 0.0\von: false\""
@@ -490,7 +490,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         monkeypatch.setattr(completers, "LIVE_SECONDS", 0.2)
         took: list[float] = []
-        # A call gives up after five by itself; a machine that stands still meanwhile gets two looks more.
+        # A call gives up after five by itself; a machine that stalls meanwhile gets two more attempts.
         while len(took) < 3 and min(took, default=9.0) > 4:
             start = time.monotonic()
             assert tab("rostopic echo ") == []

@@ -41,14 +41,14 @@ class Row(NamedTuple):
 
     ``good``: something that works on the graph of the fixture ``graph``; None where that starts a program or a
     master. ``unknown``: with a name that nobody has; "" where the verb takes no name. ``dead``: about the node that
-    does not answer. ``asks``: whether a master is asked. ``streams``: only Ctrl-C ends it. ``quiet``: an unknown name
+    does not answer. ``uses_master``: whether it needs a master. ``streams``: only Ctrl-C ends it. ``quiet``: an unknown name
     is an empty answer, as of a search. ``waits``: it is waited for, with a warning.
     """
 
     good: str | None = ""
     unknown: str = ""
     dead: str = ""
-    asks: bool = True
+    uses_master: bool = True
     streams: bool = False
     quiet: bool = False
     waits: bool = False
@@ -95,14 +95,14 @@ ROWS = {
     "rosconsole set": Row(None, "/nope rosout info", "/ghost rosout info"),
     "rosconsole echo": Row("-l debug", "/nope", streams=True, waits=True),
     "rosgraph": Row("", streams=True),
-    "rosmsg-proto": Row("msg std_msgs/Bool", "msg std_msgs/Nope", asks=False),
-    "rosclean check": Row("", asks=False),
-    "rosclean purge": Row("", asks=False),
-    "rosversion": Row("rospy", "nope", asks=False),
-    "rosrun": Row(None, "std_msgs nope", asks=False),
-    "roscore": Row(None, asks=False),
-    "rosmaster": Row(None, asks=False),
-    "minirospy": Row("-V", "nope", asks=False),
+    "rosmsg-proto": Row("msg std_msgs/Bool", "msg std_msgs/Nope", uses_master=False),
+    "rosclean check": Row("", uses_master=False),
+    "rosclean purge": Row("", uses_master=False),
+    "rosversion": Row("rospy", "nope", uses_master=False),
+    "rosrun": Row(None, "std_msgs nope", uses_master=False),
+    "roscore": Row(None, uses_master=False),
+    "rosmaster": Row(None, uses_master=False),
+    "minirospy": Row("-V", "nope", uses_master=False),
     **{
         f"{command} {verb}": row
         for command, kind in (
@@ -110,12 +110,12 @@ ROWS = {
             ("rossrv", Kind("std_srvs/SetBool", "std_srvs/Nope")),
         )
         for verb, row in {
-            "show": Row(kind.known, kind.unknown, asks=False),
-            "info": Row(kind.known, kind.unknown, asks=False),
-            "list": Row("", asks=False),
-            "md5": Row(kind.known, kind.unknown, asks=False),
-            "package": Row(kind.known.partition("/")[0], "nope", asks=False),
-            "packages": Row("", asks=False),
+            "show": Row(kind.known, kind.unknown, uses_master=False),
+            "info": Row(kind.known, kind.unknown, uses_master=False),
+            "list": Row("", uses_master=False),
+            "md5": Row(kind.known, kind.unknown, uses_master=False),
+            "package": Row(kind.known.partition("/")[0], "nope", uses_master=False),
+            "packages": Row("", uses_master=False),
         }.items()
     },
 }
@@ -144,7 +144,7 @@ REPORTED_BY_ROS = {"rosnode cleanup": "ERROR: connection refused to [http://loca
 USAGE_STATUS = {"rosgraph": 255}
 """The exit status of a usage error, unless it is 2: as ROS has it."""
 
-GRAPH = [name for name, row in ROWS.items() if row.asks]
+GRAPH = [name for name, row in ROWS.items() if row.uses_master]
 
 
 def scripts() -> dict[str, tuple[str, str]]:
@@ -504,10 +504,10 @@ def test_an_output_that_cannot_encode(graph: Robot) -> None:
     ],
 )
 def test_words_that_are_no_text(line: str, graph: Robot) -> None:
-    """A byte that is no UTF-8, as Python hands it on."""
+    """A byte that is not UTF-8, as Python passes it on."""
     result = run(f"{line} \udcff")
     assert (result.status, result.out) == (TYPED_WRONG, RULE if line == "rosnode info" else "")
-    assert "no UTF-8 text" in one_line(result, line)
+    assert "not UTF-8 text" in one_line(result, line)
 
 
 # --- Ctrl-C

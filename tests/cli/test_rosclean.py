@@ -1,4 +1,4 @@
-"""cli/rosclean: sizes as du shows them; what purge removes, and what it asks before."""
+"""cli/rosclean: sizes as du shows them; what purge removes, and its confirmation."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def test_there_is_no_database(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "status", "text"),
     [
         (["install"], 2, "which packages?"),
-        (["install", "--from-paths", "nowhere"], 2, "there is no folder nowhere"),
+        (["install", "--from-paths", "nowhere"], 2, "folder nowhere does not exist"),
         (["check", "lmap"], 1, "package [lmap] not found"),
         (["instal"], 2, "did you mean install or init?"),
     ],

@@ -64,7 +64,7 @@ def test_info_shows_connections(robot: Any, program: Start, command: Any) -> Non
     (name,) = [each for each in command("rosnode", "list").out.split() if each != "/robot"]
     there = command("rosnode", "info", "/robot").out
     assert f"Connections:\n * topic: /button_state\n    * to: {name}\n    * direction: outbound" in there
-    # A Unix socket has no ports: nothing stands there, as real ROS has it of what tells none.
+    # A Unix socket has no ports: real ROS prints nothing for a connection without them.
     is_unix = sys.platform == "linux"
     transport, ports = ("UNIXROS", "") if is_unix else ("TCPROS", r" \(\d+ - \S+:\d+\) \[\d+\]")
     assert re.search(rf"outbound{ports}\n    \* transport: {transport}\n", there)

@@ -148,7 +148,7 @@ def test_a_service_that_does_not_answer(master: str, command: Any) -> None:
         ghost.register_service("/gone", "rosrpc://localhost:9", "http://localhost:9/")
     for verb in ("type", "call", "args", "info"):
         status, out, err = command("rosservice", verb, "/gone")
-        # What the master alone knows is told all the same.
+        # What the master knows is printed all the same.
         assert (status, out) == (2, "Node: /ghost\nURI: rosrpc://localhost:9\n" if verb == "info" else "")
         assert err.startswith("rosservice: ERROR: service [/gone] does not answer at rosrpc://localhost:9 (")
         assert "`rosnode cleanup` forgets nodes that have ended" in err

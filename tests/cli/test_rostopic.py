@@ -93,7 +93,7 @@ def test_help_and_wrong_words(command: Any) -> None:
     assert (status, out) == (64, overview)
     assert (
         err
-        == "rostopic: ERROR: there is no `rostopic lst`; did you mean list? (`rostopic -h` shows what there is)\n"
+        == "rostopic: ERROR: unknown command `rostopic lst`; did you mean list? (`rostopic -h` shows what there is)\n"
     )
     assert command("rostopic", "list", "--bad").status == 2
 
@@ -253,7 +253,7 @@ def test_hz_and_bw(robot: Any, program: Start) -> None:
     feeder.start()
     try:
         average = 0.0
-        # A machine that stands still for a moment makes an average wrong, but not for long.
+        # A machine that stalls makes an average wrong, but not for long.
         while not 5.0 < average < 40.0:
             line = rate.stdout.readline()
             while not line.startswith("average rate: "):

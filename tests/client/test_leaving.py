@@ -81,13 +81,13 @@ def test_a_script_that_just_ends(master: str) -> None:
 
 LOOPS = {
     "a sleep": "rospy.sleep(60)",
-    "a loop that asks": """
+    "a loop that polls": """
 rate = rospy.Rate(20)
 while not rospy.is_shutdown():
     rate.sleep()
 rospy.sleep(0.05)
 print("cleaned up", flush=True)""",
-    "a loop that never asks": """
+    "a loop that never polls": """
 while True:
     sum(range(10000))
     rospy.sleep(0.001)""",
@@ -108,4 +108,4 @@ def test_ctrl_c_ends(master: str, what: str) -> None:
     process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
-    assert ("cleaned up" in output) == (what == "a loop that asks")
+    assert ("cleaned up" in output) == (what == "a loop that polls")

@@ -72,7 +72,7 @@ SECONDS = 3.0
 
 
 def in_time(program: Callable[[], float]) -> None:
-    """Check that ``program`` ends within SECONDS. A machine that stands still meanwhile gets two more attempts."""
+    """Check that ``program`` ends within SECONDS. A machine that stalls meanwhile gets two more attempts."""
     took = [program()]
     while min(took) >= SECONDS and len(took) < 3:
         took.append(program())
@@ -486,9 +486,9 @@ time.sleep(60)
 def test_a_loop_that_polls_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
-rospy.init_node("asks")
+rospy.init_node("caller")
 took = 9
-while took > 1:  # a turn in which the machine stood still tells nothing
+while took > 1:  # a turn in which the machine stalled shows nothing
     begun = time.monotonic()
     rospy.is_shutdown()
     time.sleep(0.9)
@@ -527,7 +527,7 @@ print("done", flush=True)
 def test_a_program_that_was_notified_keeps_its_clean_up(master: str) -> None:
     script = """
 import time, rospy
-rospy.init_node("told")
+rospy.init_node("notified")
 print("ready", flush=True)
 try:
     rospy.wait_for_service("/nobody")
@@ -741,7 +741,7 @@ def test_two():
 
 
 @pytest.mark.parametrize(
-    ("argument", "told"),
+    ("argument", "output"),
     [
         ("a:=b:=c", "invalid command-line parameters: [a:=b:=c] has more than one :="),
         ("_p:=[1,", "invalid command-line parameters: [_p:=[1,]: while parsing a flow node"),
@@ -749,7 +749,7 @@ def test_two():
         ("_p:=99999999999", "invalid command-line parameters: [_p:=99999999999]: the integer"),
     ],
 )
-def test_a_wrong_argument_is_reported_in_one_line(master: str, argument: str, told: str) -> None:
+def test_a_wrong_argument_is_reported_in_one_line(master: str, argument: str, output: str) -> None:
     script = f"""
 import rospy
 try:
@@ -761,7 +761,7 @@ except rospy.ROSInitException as error:
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith(told)
+    assert done.stdout.startswith(output)
     assert done.stdout.count("\n") == 1
 
 
@@ -815,8 +815,8 @@ except rospy.ROSInitException as error:
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=GUARD, check=False
     )
-    told = f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311\n"
-    assert (done.returncode, done.stdout, done.stderr) == (0, told, "")
+    output = f"ROS_MASTER_URI [{uri}] is not of the form http://host:port, as http://localhost:11311\n"
+    assert (done.returncode, done.stdout, done.stderr) == (0, output, "")
 
 
 @POSIX_ONLY

@@ -164,7 +164,7 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
 
 
 def test_a_call_of_what_is_not_there_fails_with_one_error(started: list[Program]) -> None:
-    """rospy tells of its own insides before it."""
+    """rospy prints its own internals before it."""
     client = start(
         started,
         """

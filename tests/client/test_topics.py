@@ -82,9 +82,9 @@ def test_a_first_message_without_subscriber_is_logged_once(
         proxy.register_subscriber("/t", "std_msgs/Bool", "http://127.0.0.1:1/")
         proxy.close()
     _, errors = finished(start(UNHEARD.format(latch=latch)))
-    told = "the first message on /t went to nobody: 1 known to the master, not connected yet"
-    assert errors.count(told) == (1 if subscriber and not latch else 0)
-    assert errors.count("\n") == errors.count(told)
+    warning = "the first message on /t went to nobody: 1 known to the master, not connected yet"
+    assert errors.count(warning) == (1 if subscriber and not latch else 0)
+    assert errors.count("\n") == errors.count(warning)
 
 
 def test_waiting_for_subscribers(start: Start) -> None:
@@ -202,21 +202,21 @@ def test_listeners_are_notified_in_order_and_a_faulty_one_ends_nothing(start: St
     output, errors = finished(
         start("""
 rospy.init_node("talker")
-told = []
+calls = []
 class Listener(rospy.SubscribeListener):
     def peer_subscribe(self, topic_name, topic_publish, peer_publish):
         threading.Event().wait(0.05)
-        told.append("come")
+        calls.append("come")
         raise ValueError("bad listener")
     def peer_unsubscribe(self, topic_name, num_peers):
-        told.append("gone")
+        calls.append("gone")
 publisher = rospy.Publisher("/t", Bool, Listener(), queue_size=1)
 for _ in range(3):
     subscriber = rospy.Subscriber("/t", Bool)
     publisher.wait_for_subscribers()
     subscriber.unregister()
     eventually(lambda: publisher.get_num_connections() == 0)
-print(eventually(lambda: len(told) == 6), told)
+print(eventually(lambda: len(calls) == 6), calls)
 """)
     )
     assert output == "True ['come', 'gone', 'come', 'gone', 'come', 'gone']\n"

@@ -53,9 +53,9 @@ def test_levels_and_snapshot(board: Board) -> None:
 
 
 def test_refusals(board: Board) -> None:
-    with pytest.raises(BoardError, match=r"^there is no pin 99: BCM numbers are 0 to 53$"):
+    with pytest.raises(BoardError, match=r"^pin 99 does not exist: BCM numbers are 0 to 53$"):
         board.press(99)
-    with pytest.raises(BoardError, match=r"^there is no pin -1"):
+    with pytest.raises(BoardError, match=r"^pin -1 does not exist"):
         board.get(-1)
     with pytest.raises(BoardError, match=r"^a level is 0 or 1, not 2$"):
         board.set(17, 2)

@@ -39,7 +39,7 @@ def test_set_and_list(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "status", "complaint"),
     [
-        (["press", "99"], 1, "there is no pin 99: BCM numbers are 0 to 53"),
+        (["press", "99"], 1, "pin 99 does not exist: BCM numbers are 0 to 53"),
         (["press", "x"], 2, "invalid int value: 'x'"),
         (["press"], 2, "the following arguments are required: pin"),
         (["set", "7", "2"], 2, "invalid choice: 2"),
@@ -215,7 +215,7 @@ def test_keys_press_buttons_and_move_the_person(kind: str, monkeypatch: pytest.M
 
 
 def _read_all(terminal: int) -> None:
-    """Read until the other side is closed, which Linux tells as an error."""
+    """Read until the other side is closed, which Linux reports as an error."""
     with contextlib.suppress(OSError):
         while os.read(terminal, 65536):
             pass

@@ -40,7 +40,7 @@ MESSAGES: list[Message] = [
     PersonMoved(None),
     Changed(7, BoardModel().pins[7], True, 12.5),
     Done(5),
-    Refused(6, "there is no pin 99"),
+    Refused(6, "pin 99 does not exist"),
 ]
 
 

@@ -26,7 +26,7 @@ def serve():
         if goal.goal == 1:
             for number in (10, 11, 12):
                 server.publish_feedback(TestFeedback(number))
-            # Feedback and result travel by connections of their own: after its result a goal hears no feedback.
+            # Feedback and result have separate connections: after its result a goal gets no feedback.
             rospy.sleep(0.2)
             server.set_succeeded(TestResult(1), "reached")
         elif goal.goal == 2:

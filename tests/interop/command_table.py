@@ -767,7 +767,7 @@ def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
 
 
 def _until_filled(stream: Iterable[str], count: int) -> Iterator[str]:
-    """``count`` lines; that nothing has come yet is no line."""
+    """Yield ``count`` lines, without those that report no messages yet."""
     for line in stream:
         if line != "no new messages\n":
             yield line

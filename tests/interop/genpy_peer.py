@@ -73,7 +73,7 @@ def load(name, kinds=("msg", "srv")):
 
 
 def element(type_, value):
-    """Return a field's value; what is no plain value of its type stays as it is."""
+    """Return a field's value; anything but a plain value of its type stays as it is."""
     if type_ in TIMES and isinstance(value, tuple):
         made = TIMES[type_]()
         made.secs, made.nsecs = value

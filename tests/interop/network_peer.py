@@ -1,6 +1,6 @@
 """A node on one of two machines, on any rospy, real or ours: what it does is the first argument.
 
-robot    publish /beat ("subscribed" tells of each connection), repeat /order on /heard, serve /flag and the action
+robot    publish /beat ("subscribed" reports each connection), repeat /order on /heard, serve /flag and the action
          /count, until the input ends
 laptop   use all of the robot, print what came, and end
 listen   print "beat" when /beat comes again after a second's silence, until the input ends

@@ -199,7 +199,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
         "PATH": path,
         "HOME": str(folder),
         "LANG": "C.UTF-8",
-        # Python is what is compared; genmsg asks for this where catkin makes messages.
+        # Python is what is compared; genmsg calls this where catkin makes messages.
         "ROS_LANG_DISABLE": "gencpp:genlisp",
         "ROS_VERSION": "1",
     }

@@ -38,7 +38,7 @@ def modules() -> Path:
     npm = shutil.which("npm")
     if not npm or not shutil.which("node"):
         pytest.skip(
-            "npm's clients of ROS 1 are not tested: there is no node and npm here (apt-get install npm)"
+            "npm's clients of ROS 1 are not tested: node and npm are not installed (apt-get install npm)"
         )
     digest = hashlib.sha256((FOREIGN / "package.json").read_bytes()).hexdigest()[:12]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "minirospy-tests"
@@ -68,7 +68,7 @@ class Peer:
         """Start ``script`` of the folder foreign."""
         # A module is looked for beside the real place of its script, then in NODE_PATH.
         environ = {**os.environ, "NODE_PATH": str(modules), "ROS_PACKAGE_PATH": str(MSGS), **variables}
-        environ.setdefault("CMAKE_PREFIX_PATH", str(MSGS))  # rosnodejs asks for it, whatever it says
+        environ.setdefault("CMAKE_PREFIX_PATH", str(MSGS))  # rosnodejs needs the variable, with any value
         process = await asyncio.create_subprocess_exec(
             "node",
             str(FOREIGN / script),
@@ -90,9 +90,9 @@ class Peer:
             line = await self.line()
             assert line, f"it ended without {what}: {self.said}"
             if line.startswith('{"what":'):
-                told = json.loads(line)
-                assert told["what"] != "error", told
-                self.said.setdefault(told["what"], []).append(told["value"])
+                event = json.loads(line)
+                assert event["what"] != "error", event
+                self.said.setdefault(event["what"], []).append(event["value"])
         return self.said[what].pop(0)
 
     async def end(self) -> None:

@@ -621,7 +621,7 @@ WRONG: list[tuple[str, Plain]] = [
     ("sensor_msgs/JointState", {"name": [5]}),
     ("sensor_msgs/JointState", {"name": [None]}),
 ]
-# Type, value, what real genpy raises (its text is of no help, or it is no SerializationError at all), our text.
+# Type, value, what real genpy raises (its text does not help, or it is not a SerializationError), our text.
 WRONG_OTHERWISE: list[tuple[str, Plain, str, str]] = [
     ("std_msgs/String", {"data": "\ud800"}, "UnicodeEncodeError", "surrogates not allowed"),
     ("std_msgs/UInt8MultiArray", {"data": "abc"}, "SerializationError", "field data must be a list or tuple"),

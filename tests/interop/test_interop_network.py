@@ -1,4 +1,4 @@
-"""Two machines: network namespaces with addresses of their own and a router between them, which can be told to drop.
+"""Two machines: network namespaces with addresses of their own and a router between them, which drops packets on demand.
 
 ::
 
@@ -201,7 +201,7 @@ class Program:
 def built() -> Iterator[Network]:
     """Return the machines; where they cannot be made, the tests are skipped with the reason."""
     network = Network()
-    why: object = "there is no `ip` (apt-get install iproute2)" if shutil.which("ip") is None else ""
+    why: object = "`ip` is missing (apt-get install iproute2)" if shutil.which("ip") is None else ""
     try:
         if not why:
             network.build()

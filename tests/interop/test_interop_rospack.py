@@ -249,7 +249,7 @@ found["in"] = rospkg.get_package_name(tree + "/a/src/deep")
 print(json.dumps(found))
 """
 
-# What rosdep's database says, where it is installed: here, that boost is no package.
+# What rosdep's database says, where it is installed: here, that boost is not a package.
 ROSDEP = """
 def init_rospack_interface(): return {"view": 1}
 def is_view_empty(view): return False

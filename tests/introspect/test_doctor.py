@@ -140,9 +140,9 @@ def said(environ: dict[str, str], place: MasterPlace) -> list[Finding]:
             {"ROS_HOSTNAME": "nowhere.invalid"},
             HERE,
             "problem",
-            "ROS_HOSTNAME=nowhere.invalid is no name that this machine itself knows",
+            "ROS_HOSTNAME=nowhere.invalid is not a name that this machine knows",
         ),
-        ({"ROS_IP": "192.0.2.1"}, AFAR, "warning", "ROS_IP=192.0.2.1 is no address of this machine"),
+        ({"ROS_IP": "192.0.2.1"}, AFAR, "warning", "ROS_IP=192.0.2.1 is not an address of this machine"),
         (
             {"ROS_HOSTNAME": "localhost", "ROS_IP": "192.0.2.1"},
             HERE,

@@ -89,7 +89,7 @@ def test_without_a_master(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 
 
 def test_the_args_of_a_file_as_they_are(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """With the values of the defaults, and those alone that apply; what cannot be told stays as it is written."""
+    """With the values of the defaults, and those alone that apply; what cannot be resolved stays as written."""
     file = package / "a.launch"
     file.write_text(
         '<launch><arg name="need" doc="a thing"/><arg name="a" default="1"/><arg name="b" default="$(arg a)2"/>'

@@ -34,9 +34,9 @@ def mask(text):
 
 
 class Story:
-    """What callbacks say and what is logged, from whichever thread, in order; shown where the case asks for it.
+    """What callbacks say and what is logged, from whichever thread, in order; shown where the case requests it.
 
-    Lines of the terminal are turned off: what stands there is the business of other cases.
+    The terminal's log lines are turned off: other cases cover them.
     """
 
     def __init__(self, level=logging.DEBUG):
@@ -95,7 +95,7 @@ class _LogLines(logging.Handler):
 
 
 class RawClient:
-    """A client by hand: sends what it is told, keeps what it hears."""
+    """A scripted client: sends on demand, keeps what it receives."""
 
     def __init__(self, ns):
         self._changed = threading.Condition()
@@ -193,7 +193,7 @@ class RawClient:
 
 
 class RawServer:
-    """A server by hand: keeps the goals and cancels that it hears, tells what it is told to tell."""
+    """A scripted server: keeps the goals and cancels that it receives, publishes on demand."""
 
     def __init__(self, ns):
         self._changed = threading.Condition()

@@ -108,7 +108,7 @@ class Other:
 def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
     """Return what ``look()`` finds, at the first of ten looks where all of it is true.
 
-    For what takes a certain time: on a machine that stands still now and then it takes longer, but not ten times.
+    For what takes a certain time: on a machine that stalls now and then it takes longer, but not ten times.
     """
     for _ in range(10):
         found = look()

@@ -170,21 +170,21 @@ class Graph:
 
 def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() -> None:
     async def scene(clock: ManualLoop) -> None:
-        told: list[float] = []
+        notified: list[float] = []
         for fraction in range(10):
-            told.clear()
+            notified.clear()
             notifier = Notifier(Graph(), Turns(), 5.0)
-            notifier.here["http://n:1/"] = lambda topic, uris: told.append(clock.time())
+            notifier.here["http://n:1/"] = lambda topic, uris: notified.append(clock.time())
             # The answer falls anywhere between two ticks of the clock.
             await clock.advance(0.001 * fraction)
             registered = clock.time()
             notifier.hold("http://n:1/", "/t")
             await clock.advance(0.0195)
             notifier.send(PublisherUpdate("http://n:1/", "/t"))
-            while not told:
+            while not notified:
                 await clock.advance(0.0005)
             # One tick more, since a timer may be early by the clock's resolution.
-            assert 0.02 <= told[0] - registered < 0.032
+            assert 0.02 <= notified[0] - registered < 0.032
             await notifier.close()
 
     run_manually(scene)
@@ -192,17 +192,17 @@ def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() ->
 
 def test_update_after_the_pause_or_of_another_topic_is_sent_immediately() -> None:
     async def scene(clock: ManualLoop) -> None:
-        told: list[str] = []
+        notified: list[str] = []
         notifier = Notifier(Graph(), Turns(), 5.0)
-        notifier.here["http://n:1/"] = lambda topic, uris: told.append(topic)
+        notifier.here["http://n:1/"] = lambda topic, uris: notified.append(topic)
         notifier.hold("http://n:1/", "/t")
         notifier.send(PublisherUpdate("http://n:1/", "/other"))
         await clock.advance(0.0)
-        assert told == ["/other"]
+        assert notified == ["/other"]
         await clock.advance(0.031)
         notifier.send(PublisherUpdate("http://n:1/", "/t"))
         await clock.advance(0.0)
-        assert told == ["/other", "/t"]
+        assert notified == ["/other", "/t"]
         await notifier.close()
 
     run_manually(scene)

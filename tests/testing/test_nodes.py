@@ -39,7 +39,7 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
     code = "import sys; from minirospy.cli.ros.rostest import rostest; sys.exit(rostest())"
     command = [sys.executable, "-c", code, "--package=p", f"--pkgdir={tmp_path}", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
-    told = done.stdout.split("[ROSTEST]---")[1]
+    output = done.stdout.split("[ROSTEST]---")[1]
     for line in (
         "[p.rosunit-advertised/test_advertise_topics][passed]",
         "[p.rosunit-advertised/test_advertise_services][passed]",
@@ -50,5 +50,5 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
         "Topic [/orders/nobody] is not subscribed to",
         "bad parameter (topics): it is a list as [{name: /chatter, timeout: 5}]",
     ):
-        assert line in told, line
+        assert line in output, line
     assert done.returncode == 2

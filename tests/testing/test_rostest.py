@@ -70,13 +70,13 @@ def test_each_outcome(tmp_path: Path) -> None:
         "FAILURE: Duplicate tests named [twice] in rostest suite",
     ):
         assert line in said
-    told = out[len(said) :]
-    assert "[tested.rosunit-bad/test_fail][FAILURE]" in told
-    assert "1 != 2 : one is not two" in told
-    assert 'unittest/case.py", line' not in told
-    assert "[tested.rosunit-second-try/test_twice][passed]" in told
-    assert " * TESTS: 8\n\x1b[1;31m * ERRORS: 2\x1b[0m\n\x1b[1;31m * FAILURES: 5\x1b[0m" in told
-    assert " * testcrash\n * testmissing\n * testno_package\n * testtwice\n" in told
+    output = out[len(said) :]
+    assert "[tested.rosunit-bad/test_fail][FAILURE]" in output
+    assert "1 != 2 : one is not two" in output
+    assert 'unittest/case.py", line' not in output
+    assert "[tested.rosunit-second-try/test_twice][passed]" in output
+    assert " * TESTS: 8\n\x1b[1;31m * ERRORS: 2\x1b[0m\n\x1b[1;31m * FAILURES: 5\x1b[0m" in output
+    assert " * testcrash\n * testmissing\n * testno_package\n * testtwice\n" in output
     results = tmp_path / "test_results" / "tested"
     assert cases(results / "rosunit-good.xml") == ["test_one", "test_two"]
     assert len(cases(results / "rostest-test_all.xml")) == 9
@@ -215,7 +215,7 @@ ROSUNIT_USAGE = [
         ("rostest", ("-c", "tested", "all.test"), 2, "--clear option is only valid with --reuse-master"),
         ("rostest", ("OUTSIDE",), 1, "is in no package (no package.xml above it)"),
         ("rosunit", (), 2, "You must supply a test file."),
-        ("rosunit", ("no.py",), 1, "there is no file no.py to test"),
+        ("rosunit", ("no.py",), 1, "test file no.py does not exist"),
         ("rosunit", ("OUTSIDE",), 1, "type rosunit --package NAME FILE"),
     ],
 )

@@ -289,9 +289,9 @@ def good(cmake: str) -> str:
         (
             good("add_message_files(FILES Ledd.msg)"),
             3,
-            "there is no [Ledd.msg] in folder [msg]; did you mean Led.msg?",
+            "[Ledd.msg] does not exist in folder [msg]; did you mean Led.msg?",
         ),
-        (good("add_service_files(FILES Led.srv)"), 3, "add_service_files: there is no folder [srv]"),
+        (good("add_service_files(FILES Led.srv)"), 3, "add_service_files: folder [srv] does not exist"),
         (good("add_message_files(FILES Led)"), 3, "[Led] does not end in .msg"),
         ("add_message_files(FILES Led.msg)", 3, "generate_messages() is missing"),
         (
@@ -310,11 +310,11 @@ def good(cmake: str) -> str:
             "did you mean std_msgs?",
         ),
         ("catkin_python_setup()", 3, "needs a setup.py"),
-        ("catkin_install_python(PROGRAMS scripts/x.py DESTINATION lib)", 3, "there is no [scripts/x.py]"),
+        ("catkin_install_python(PROGRAMS scripts/x.py DESTINATION lib)", 3, "[scripts/x.py] does not exist"),
         ("if(A", 3, "if( is not closed"),
         ("if(A)", 3, "if() without endif()"),
         ("if(A B)\nendif()", 3, "if(): AND or OR is expected instead of [B]"),
-        ("add_subdirectory(nowhere)", 3, "add_subdirectory(nowhere): there is no"),
+        ("add_subdirectory(nowhere)", 3, "add_subdirectory(nowhere): "),
         ("include(CMakeLists.txt)", 1, "includes or calls itself"),
         ("if(" + "(" * 3000 + "1" + ")" * 3000 + ")\nendif()", 1, "is nested too deeply"),
         ("# \0", 1, "is not UTF-8 text"),
@@ -415,7 +415,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     (folder / "setup.py").write_text(
         "from setuptools import setup\nsetup(py_modules=['q'], package_dir={'': 'src'})\n"
     )
-    assert "[q] is named, but there is no" in mistakes(scene).text
+    assert "[q] is named, but " in mistakes(scene).text
     (folder / "setup.py").write_text("x = (\n")
     assert mistakes(scene).line == 1
     for line, text in {
@@ -484,7 +484,7 @@ def test_missing_folder_of_a_python_package_is_a_warning(scene: Scene) -> None:
 
     assert report.made == "Python package tools"
     assert report.warnings == (
-        f"{folder / 'setup.py'}: packages=[...] names [gone], but there is no folder {folder / 'src' / 'gone'}",
+        f"{folder / 'setup.py'}: packages=[...] names [gone], but folder {folder / 'src' / 'gone'} does not exist",
     )
 
 
@@ -658,7 +658,7 @@ def test_catkin_make_isolated(scene: Scene, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize(
     ("words", "status", "text"),
     [
-        (["-C", "nowhere"], 2, "there is no folder nowhere"),
+        (["-C", "nowhere"], 2, "folder nowhere does not exist"),
         (["--nonsense"], 2, "unrecognized arguments: --nonsense"),
         (["led_msg"], 1, "package [led_msg] not found; did you mean led_msgs?"),
         (["--source", "source"], 1, "The specified source space does not exist"),
@@ -787,5 +787,5 @@ def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.C
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1
-    error = f"{folder / 'CMakeLists.txt'}:3: install: there is no [lanch]; did you mean launch?\n"
+    error = f"{folder / 'CMakeLists.txt'}:3: install: [lanch] does not exist; did you mean launch?\n"
     assert capsys.readouterr().err == f"catkin_make: ERROR: {error}"

@@ -144,7 +144,7 @@ def test_commands_that_cannot_be_run_are_errors(
 ) -> None:
     scene.package("p", "add_rostest(test/no.test)")
     assert catkin_make(["-C", str(scene.root), "run_tests"]) == 1
-    assert "CMakeLists.txt:3: there is no [test/no.test] to test" in capsys.readouterr().err
+    assert "CMakeLists.txt:3: test file [test/no.test] does not exist" in capsys.readouterr().err
     scene.package("q", "catkin_add_nosetests(test)", "", {"test/test_q.py": ""})
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert catkin_make(["-C", str(scene.root), "run_tests_q"]) == 1

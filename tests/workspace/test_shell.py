@@ -159,7 +159,7 @@ def test_roscd_to_an_unknown_package_names_the_nearest(shell: Shell) -> None:
 
 def test_roscd_to_a_missing_folder_is_an_error(shell: Shell) -> None:
     done = shell.run("roscd my_robot/nothing")
-    assert (done.status, done.err) == (1, f"roscd: ERROR: there is no folder {shell.package}/nothing\n")
+    assert (done.status, done.err) == (1, f"roscd: ERROR: folder {shell.package}/nothing does not exist\n")
 
 
 def test_roscd_to_the_logs(shell: Shell) -> None:
@@ -214,7 +214,7 @@ def test_rosed(shell: Shell) -> None:
     assert shell.run("rosed my_robot all.launch") == expected
     assert shell.run("rosed my_robot launch/all.launch") == expected
     done = shell.run("rosed my_robot nothing.py")
-    expected_complaint = f"there is no file nothing.py in package [my_robot], which is in {shell.package}"
+    expected_complaint = f"file nothing.py does not exist in package [my_robot], which is in {shell.package}"
     assert (done.status, done.err) == (1, f"rosed: ERROR: {expected_complaint}\n")
 
 
@@ -243,14 +243,14 @@ def test_roscp(shell: Shell) -> None:
     assert (shell.root / "copy.launch").read_bytes() == (shell.package / "launch" / "all.launch").read_bytes()
     done = shell.run("roscp my_robot nothing copy")
     assert done.status == 1
-    assert done.err.startswith("roscp: ERROR: there is no file nothing in package [my_robot]")
+    assert done.err.startswith("roscp: ERROR: file nothing does not exist in package [my_robot]")
 
 
 def test_roscat(shell: Shell) -> None:
     assert shell.run("roscat my_robot 'a map.yaml'") == (0, ["{}"], "")
     done = shell.run("roscat my_robot nothing")
     assert (done.status, done.out) == (1, [])
-    assert done.err.startswith("roscat: ERROR: there is no file nothing in package [my_robot]")
+    assert done.err.startswith("roscat: ERROR: file nothing does not exist in package [my_robot]")
 
 
 def test_rosmv(shell: Shell) -> None:

@@ -55,7 +55,7 @@ def _init_parser() -> Parser:
 
 def _init(folder: Path) -> None:
     if not folder.is_dir():
-        raise UsageError(f"there is no folder {folder}")
+        raise UsageError(f"folder {folder} does not exist")
     file = folder.resolve() / "CMakeLists.txt"
     if file.exists():
         raise UsageError(f'File "{file}" already exists')

@@ -48,7 +48,7 @@ def catkin_find(argv: Sequence[str] | None = None) -> int:
 
 
 def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 2, as catkin does, where there is no such package."""
+    """Run the command; return 2, as catkin does, if the package does not exist."""
     return FIND_PKG.main(argv)
 
 
@@ -85,7 +85,7 @@ def _find(
     odd = [name for name in chosen if name not in known]
     if odd:
         which = "for a package" if package else "without a package"
-        raise UsageError(f"there is no search {which} in {', '.join(odd)}")
+        raise UsageError(f"no search {which} in {', '.join(odd)}")
     for workspace in _workspaces():
         found = list(_found(workspace, chosen or known, package, path))
         if first_only:

@@ -95,14 +95,14 @@ def _parser(command: str, suffix: str) -> Parser:
     for flags in (("--no-color",), ("--merge",), ("-v", "--verbose"), ("-k", "--keep-going")):
         parser.accept(*flags, help="accepted for compatibility, without effect")
     parser.accept("--override-build-tool-check", help="accepted")
-    parser.accept("--use-ninja", "--use-gmake", "--use-nmake", help="accepted; there is no make")
+    parser.accept("--use-ninja", "--use-gmake", "--use-nmake", help="accepted; make is not used")
     parser.accept("-j", "--jobs", nargs="?", help="accepted: there is nothing to wait for")
     parser.accept("-l", "--load-average", nargs="?", help="accepted")
     parser.accept(
         "--cmake-args", nargs="*", help="-DNAME=VALUE: what CMakeLists.txt sees as ${NAME}; also without this"
     )
     for option in ("--make-args", "--catkin-make-args"):
-        parser.accept(option, nargs="*", help="accepted; there is no make")
+        parser.accept(option, nargs="*", help="accepted; make is not used")
     return parser
 
 
@@ -125,7 +125,7 @@ def _catkin_make(
     """Build a workspace whose folders' names end in ``suffix``."""
     root = directory.resolve()
     if not root.is_dir():
-        raise UsageError(f"there is no folder {directory}")
+        raise UsageError(f"folder {directory} does not exist")
     workspace = Workspace(
         root,
         root / source,
@@ -177,7 +177,7 @@ def _check_folders(command: str, workspace: Workspace) -> None:
 
 
 def _where_to_build(command: str, workspace: Workspace) -> str:
-    """Return what to do where there is no folder src: most often the current folder is src, or devel."""
+    """Return what to do if folder src does not exist: most often the current folder is src, or devel."""
     for above in workspace.root.parents:
         source = above / workspace.source.name
         if workspace.root.is_relative_to(source) or (

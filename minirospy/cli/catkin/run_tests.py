@@ -52,7 +52,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
                 continue
             path = plan.folder / test.path
             if not path.exists():
-                raise BuildError(str(plan.cmake_lists), test.line, f"there is no [{test.path}] to test")
+                raise BuildError(str(plan.cmake_lists), test.line, f"test file [{test.path}] does not exist")
             results.mkdir(parents=True, exist_ok=True)
             command = _COMMANDS[test.kind](plan, test, results)
             print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)

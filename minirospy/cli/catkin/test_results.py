@@ -43,12 +43,12 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 where all passed, 1 after errors or failures, or where there is no such folder."""
+    """Run the command; return 0 where all passed, 1 after errors or failures, or if the folder does not exist."""
     return COMMAND.main(argv)
 
 
 def read_counts(file: Path) -> Counts:
-    """Return what a file counts, all its suites together. Raises ValueError, with why it is no file of results."""
+    """Return the counts of a file, summed over its suites. Raises ValueError with the reason where it is not a result file."""
     try:
         root = ElementTree.fromstring(file.read_bytes())
         if root.tag not in ("testsuite", "testsuites"):

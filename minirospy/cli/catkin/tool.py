@@ -113,7 +113,7 @@ class _CatkinParser(Parser):
 def _workspace_of(folder: Path | None) -> Workspace:
     start = folder or Path.cwd()
     if not start.is_dir():
-        raise UsageError(f"there is no folder {start}")
+        raise UsageError(f"folder {start} does not exist")
     return Workspace.at(find_workspace(start))
 
 
@@ -144,7 +144,7 @@ def _build_parser() -> Parser:
         parser.accept(flag, help="accepted")
     parser.accept("--cmake-args", nargs="*", help="-DNAME=VALUE: what CMakeLists.txt sees as ${NAME}")
     for flag in ("--make-args", "--catkin-make-args"):
-        parser.accept(flag, nargs="*", help="accepted; there is no make")
+        parser.accept(flag, nargs="*", help="accepted; make is not used")
     return parser
 
 

@@ -5,7 +5,7 @@ the cursor; candidates go out as the shell is to insert them: quoted where they 
 each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none). One that ends in ``/`` or ``=``
 goes on; after any other comes a space.
 
-Verbs and options come from the command's own parser: there is no second list of them. So does what completes an
+Verbs and options come from the command's own parser, not from a second list. So does what completes an
 argument or an option's value: see minirospy.cli.parser.Parser.add_argument. Nothing here ends in an error, and the
 answer of a master is awaited no longer than a person waits. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """

@@ -163,7 +163,7 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
         entries = [entry for entry in os.scandir(folder) if hidden or not entry.name.startswith(".")]
     except OSError:
         return []
-    # A link to itself is no folder, and no fault.
+    # A link to itself is neither a folder nor an error.
     return sorted(entry.name + "/" if os.path.isdir(entry) else entry.name for entry in entries)
 
 
@@ -264,7 +264,7 @@ def launch_nodes(place: Place) -> Iterable[str]:
     if not place.given:
         return []
     file = _launch_file(place)
-    # A value that is not typed yet is no fault, and faults (collected in the list) hide no node.
+    # A value that is not typed yet is not an error, and errors (collected in the list) hide no node.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.runnables()), place.word)

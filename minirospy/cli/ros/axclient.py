@@ -44,7 +44,7 @@ class NodeParser(Parser):
 def _parser() -> Parser:
     parser = NodeParser(
         "axclient.py",
-        description="Send a goal to an action server: asks for each field, shows the feedback, prints the result. "
+        description="Send a goal to an action server: prompt for each field, show the feedback, print the result. "
         "Ctrl-C cancels the goal.",
     )
     parser.add_argument("action", help="the server's name, as /run_led", completer="nothing")
@@ -131,7 +131,7 @@ def _found_type(action: str, timeout: float | None) -> str:
             if type_.endswith("ActionGoal"):
                 return type_[: -len("Goal")]
             if type_ not in ("", "*"):
-                raise UsageError(f"{action} is no action: {action}/goal is of type {type_}")
+                raise UsageError(f"{action} is not an action: {action}/goal is of type {type_}")
             if not waited:
                 print(f"Waiting for an action server at {action} ...", flush=True)
             if timeout is not None and waited >= timeout:

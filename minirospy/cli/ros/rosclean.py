@@ -43,7 +43,7 @@ def _check() -> None:
 
 
 def _purge_parser() -> Parser:
-    parser = Parser("rosclean purge", "Remove log files; asks before it does.")
+    parser = Parser("rosclean purge", "Remove log files, after confirmation.")
     parser.add_argument("-y", dest="yes", action="store_true", help="remove them without a question")
     parser.add_argument("--size", type=int, metavar="MB", help="keep the newest, so many MB of them")
     return parser

@@ -1,6 +1,6 @@
-"""rosdep: what packages need that is no package here, and how it is installed.
+"""rosdep: the dependencies of packages that are not packages here, and how to install them.
 
-Tutorials say `rosdep install --from-paths src --ignore-src -r -y`. rosdep asks a database on the network and calls the
+Tutorials say `rosdep install --from-paths src --ignore-src -r -y`. rosdep queries a database on the network and calls the
 system's package manager. Here nothing is fetched and nothing is installed: what ROS itself brings along is minirospy's,
 and of the rest it is said what is missing, and what to type for it.
 Source: http://docs.ros.org/en/independent/api/rosdep/html/commands.html.
@@ -104,7 +104,7 @@ def _missing(
 
     for path in from_paths:
         if not path.is_dir():
-            raise UsageError(f"--from-paths: there is no folder {path}")
+            raise UsageError(f"--from-paths: folder {path} does not exist")
 
     here = Packages()
     folders = Packages.below(*from_paths).folders()
@@ -233,7 +233,7 @@ class _IgnoringParser(Parser):
 
 
 def _nothing_parser(verb: str) -> Parser:
-    return _IgnoringParser(f"rosdep {verb}", "Nothing: there is no database.")
+    return _IgnoringParser(f"rosdep {verb}", "Nothing: this rosdep has no database.")
 
 
 def _nothing() -> None:
@@ -245,12 +245,10 @@ FAMILY = Family(
     "rosdep command",
     (
         Verb("check", "Check whether all that packages need is there", _check_parser, _check),
-        Verb("init", "Nothing: there is no database to set up", partial(_nothing_parser, "init"), _nothing),
+        Verb("init", "Nothing: this rosdep has no database", partial(_nothing_parser, "init"), _nothing),
         Verb("install", "Say how what is missing is installed", _install_parser, _install),
-        Verb("keys", "List what packages need that is no package here", _keys_parser, _keys),
+        Verb("keys", "List the dependencies that are not packages here", _keys_parser, _keys),
         Verb("resolve", "Print what a key means", _resolve_parser, _resolve),
-        Verb(
-            "update", "Nothing: there is no database to update", partial(_nothing_parser, "update"), _nothing
-        ),
+        Verb("update", "Nothing: this rosdep has no database", partial(_nothing_parser, "update"), _nothing),
     ),
 )

@@ -49,14 +49,14 @@ def _parser() -> Parser:
     )
     parser.accept("-t", "--use-test-depends")
     parser.add_argument(
-        "-i", "--ignore-unset-args", action="store_true", help="an argument without a default is no fault"
+        "-i", "--ignore-unset-args", action="store_true", help="accept arguments without a default"
     )
     return parser
 
 
 def _check(path: Path, variables: Sequence[str], output_file: Path | None, ignore_unset_args: bool) -> int:
     if not path.exists():
-        raise MinirospyError(f"there is no launch file or folder [{path}]")
+        raise MinirospyError(f"launch file or folder [{path}] does not exist")
     os.environ.update(dict(word.split("=", 1) for word in variables if "=" in word))
     files = [path] if path.is_file() else sorted(path.rglob("*.launch"))
     faults = [line for file in files for line in _faults(file, ignore_unset_args=ignore_unset_args)]

@@ -418,7 +418,7 @@ _VERBS = {
         takes_package=False,
     ),
     "rosdep": _Verb(_rosdep, "[package] (alias: rosdeps)", "All names that a package and what it needs ask for."),
-    "rosdep0": _Verb(_rosdep0, "[package] (alias: rosdeps0)", "The names that a package asks for."),
+    "rosdep0": _Verb(_rosdep0, "[package] (alias: rosdeps0)", "The names that a package depends on."),
     "vcs": _Verb(_vcs, "[package]", "Nothing: no package.xml says where its source is kept."),
     "vcs0": _Verb(_vcs, "[package]", "Nothing: no package.xml says where its source is kept."),
 }  # fmt: skip

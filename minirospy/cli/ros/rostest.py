@@ -163,7 +163,7 @@ def _rosunit(
         raise Misuse("You must supply a test file.")
     path = Path(file)
     if not path.is_file():
-        raise MinirospyError(f"there is no file {path} to test")
+        raise MinirospyError(f"test file {path} does not exist")
     package = package or _package_of(path, "rosunit", "--package NAME")[0]
     name = name or path.stem
 

@@ -1,6 +1,6 @@
 """rosversion: the version of a package, or of the ROS distribution.
 
-Source: http://wiki.ros.org/rosversion. minirospy is no distribution: -d prints ROS_DISTRO where a workspace or a real
+Source: http://wiki.ros.org/rosversion. minirospy is not a distribution: -d prints ROS_DISTRO where a workspace or a real
 ROS has set it, else noetic, the last of ROS 1 and the one whose files and wire these are.
 """
 

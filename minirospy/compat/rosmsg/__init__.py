@@ -163,7 +163,7 @@ def _run(mode: str, words: Sequence[str]) -> int:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder for whose path ``rfilter`` is true; none where there is no such folder."""
+    """Return the names in a folder for whose path ``rfilter`` is true; none if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]

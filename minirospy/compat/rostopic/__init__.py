@@ -56,7 +56,7 @@ class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Any], Any] | None]:
-    """Return (type, topic, function that returns the field of a message); three times None where there is no topic.
+    """Return (type, topic, function that returns the field of a message); three times None without such a topic.
 
     ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
     """

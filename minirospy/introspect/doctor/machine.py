@@ -100,8 +100,8 @@ def _host_findings(
         )
 
     if not own:
-        what = "neither an IP address nor a" if by_ip else "no"
-        yield problem("variables", f"{variable} is {what} name that this machine itself knows", correct)
+        what = "neither an IP address nor a" if by_ip else "not a"
+        yield problem("variables", f"{variable} is {what} name that this machine knows", correct)
     elif host in ("0.0.0.0", "::"):
         yield problem(
             "variables", f"{variable} is every address and none: nobody can connect to a node there", correct
@@ -127,7 +127,7 @@ def _host_findings(
     elif not any(map(is_own_address, own)):
         yield warning(
             "variables",
-            f"{variable} is {'' if is_address else ' '.join(own) + ', '}no address of this machine: right only behind NAT "
+            f"{variable} is {'' if is_address else ' '.join(own) + ', '}not an address of this machine: right only behind NAT "
             "or in a container",
             correct,
         )

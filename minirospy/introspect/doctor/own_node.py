@@ -135,12 +135,12 @@ class DoctorNode:
 class _Node(Node):
     """A node that notes the master's calls."""
 
-    def __init__(self, name: str, environment: Environment, told: threading.Event) -> None:
+    def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:
         super().__init__(name, environment)
-        self._told = told
+        self._notified = notified
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        self._told.set()
+        self._notified.set()
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:

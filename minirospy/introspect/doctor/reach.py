@@ -94,7 +94,7 @@ class MasterPlace(NamedTuple):
 
     @property
     def own_address(self) -> str:
-        """The address that this machine shows to it; "" where there is no route."""
+        """The address of this machine as the other one sees it; "" without a route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
@@ -178,7 +178,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return the address that this machine shows to another one; "" where there is no route to it. Nothing is sent."""
+    """Return the address of this machine as another one sees it; "" without a route. Nothing is sent."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -84,10 +84,10 @@ roscd() {
         *) _ros_usage roscd 2 || return ;;
     esac
     if [ ! -d "$folder" ]; then
-        printf '%s\n' "roscd: ERROR: there is no folder $folder" >&2
+        printf '%s\n' "roscd: ERROR: folder $folder does not exist" >&2
         return 1
     fi
-    # `builtin`, so that nobody's `cd` that prints or asks comes in between.
+    # `builtin`, so that a user's `cd` function does not interfere.
     builtin cd -- "$folder" || return
 }
 
@@ -127,7 +127,7 @@ _ros_file() {
     done < <(find -L "$folder" -name '.?*' -prune -o -name __pycache__ -prune -o -type f -name "${3##*/}" -path "*/$3" -print 2>/dev/null | sort)
     case ${#_ros_found[@]} in
         0)
-            printf '%s\n' "$1: ERROR: there is no file $3 in package [$2], which is in $folder" >&2
+            printf '%s\n' "$1: ERROR: file $3 does not exist in package [$2], which is in $folder" >&2
             return 1
             ;;
         1) return ;;

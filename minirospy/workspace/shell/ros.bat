@@ -74,5 +74,5 @@
 :file
 @if exist "%ROS_FOUND%%~1" set "ROS_FOUND=%ROS_FOUND%%~1" & exit /b 0
 @for /f "delims=" %%f in ('dir /s /b "%ROS_FOUND%%~1" 2^>nul') do @set "ROS_FOUND=%%f" & exit /b 0
-@>&2 echo there is no file "%~1" in "%ROS_FOUND%"
+@>&2 echo file "%~1" does not exist in "%ROS_FOUND%"
 @exit /b 1

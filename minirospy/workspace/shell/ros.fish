@@ -91,7 +91,7 @@ function roscd --description 'go to the folder of a package'
         set folder (_ros_folder roscd $argv); or return
     end
     if not test -d "$folder"
-        printf '%s\n' "roscd: ERROR: there is no folder $folder" >&2
+        printf '%s\n' "roscd: ERROR: folder $folder does not exist" >&2
         return 1
     end
     cd $folder
@@ -122,7 +122,7 @@ function _ros_file --argument-names name package file --description 'put the pat
     set --global _ros_found (find -L $folder -name '.?*' -prune -o -name __pycache__ -prune -o -type f -name $base -path "*/$file" -print 2>/dev/null | sort)
     switch (count $_ros_found)
         case 0
-            printf '%s\n' "$name: ERROR: there is no file $file in package [$package], which is in $folder" >&2
+            printf '%s\n' "$name: ERROR: file $file does not exist in package [$package], which is in $folder" >&2
             return 1
         case 1
             return

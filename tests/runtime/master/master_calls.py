@@ -456,7 +456,7 @@ CALLS: list[tuple[Any, ...]] = [
     ("getParamNames", "/x"),
     ("getParam", "/x", "/"),
     ("deleteParam", "/x", "/"),
-    # --- which of two mistakes is told
+    # --- which of two errors is reported
     ("getPid", 5, 1, 2),
     ("registerPublisher", 5),
     ("subscribeParam", 5, 5),
@@ -467,7 +467,7 @@ CALLS: list[tuple[Any, ...]] = [
 ]
 
 SCENE: list[tuple[Any, ...]] = [
-    # What two nodes are told: "{0}" and "{1}" are their Slave APIs.
+    # Notifications of two nodes: "{0}" and "{1}" are their Slave APIs.
     ("registerSubscriber", "/sub", "/t", "a/B", "{0}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),

@@ -1,4 +1,4 @@
-"""runtime/master/master over real sockets: the answers of real rosmaster (master_answers.json), and what it tells nodes."""
+"""runtime/master/master over real sockets: the answers of real rosmaster (master_answers.json), and its calls to nodes."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def answers(uri: str) -> list[Any]:
 
 
 def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]]:
-    """Return what the nodes of SCENE are told after each call, sorted; ``expected`` says for how many to wait."""
+    """Return the notifications of the nodes of SCENE after each call, sorted; waits for ``expected`` of them."""
     nodes = [Slave(), Slave()]
     found: list[list[Any]] = []
 
@@ -81,12 +81,12 @@ def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]
             for at, (method, *args) in enumerate(referee().SCENE):
                 words = [a.format(*(n.uri for n in nodes)) if isinstance(a, str) else a for a in args]
                 getattr(proxy, method)(*words)
-                told = [
+                received = [
                     [n, *node.next()] for n, node in enumerate(nodes) for _ in range(counted(expected, at, n))
                 ]
                 if expected is None:
-                    told = [[n, *each] for n, node in enumerate(nodes) for each in node.all_until_quiet()]
-                found.append(sorted((shown(each) for each in told), key=str))
+                    received = [[n, *each] for n, node in enumerate(nodes) for each in node.all_until_quiet()]
+                found.append(sorted((shown(each) for each in received), key=str))
         for node in nodes:
             assert node.called.empty()
     finally:
@@ -233,33 +233,33 @@ def test_an_update_does_not_meet_the_answer_to_a_registration(
 
 
 def test_a_deferred_update_is_sent_a_moment_later(proxy: ServerProxy, slaves: list[Slave]) -> None:
-    told = slaves[0]
+    node = slaves[0]
     for number in range(20):
-        proxy.registerSubscriber("/node", f"/t{number}", "std_msgs/Bool", told.uri)
-        proxy.subscribeParam("/node", told.uri, f"/p{number}")
+        proxy.registerSubscriber("/node", f"/t{number}", "std_msgs/Bool", node.uri)
+        proxy.subscribeParam("/node", node.uri, f"/p{number}")
         proxy.registerPublisher("/pub", f"/t{number}", "std_msgs/Bool", "http://127.0.0.1:1/")
         proxy.setParam("/other", f"/p{number}", 1)
-    found = sorted(told.next() for _ in range(40))
+    found = sorted(node.next() for _ in range(40))
     assert found == sorted(
         [("paramUpdate", "/master", f"/p{number}/", 1) for number in range(20)]
         + [("publisherUpdate", "/master", f"/t{number}", ["http://127.0.0.1:1/"]) for number in range(20)]
     )
-    assert told.called.empty()
+    assert node.called.empty()
 
 
 def test_param_updates(proxy: ServerProxy, slaves: list[Slave]) -> None:
-    told = slaves[0]
-    proxy.subscribeParam("/node", told.uri, "/a/b")
+    node = slaves[0]
+    proxy.subscribeParam("/node", node.uri, "/a/b")
     proxy.setParam("/other", "/a/b", {"c": 1})
-    assert told.next() == ("paramUpdate", "/master", "/a/b/", {"c": 1})
+    assert node.next() == ("paramUpdate", "/master", "/a/b/", {"c": 1})
     proxy.setParam("/other", "/a/b/c", 2)
-    assert told.next() == ("paramUpdate", "/master", "/a/b/c/", 2)
+    assert node.next() == ("paramUpdate", "/master", "/a/b/c/", 2)
     proxy.setParam("/other", "/a", {"b": 3})
-    assert told.next() == ("paramUpdate", "/master", "/a/b/", 3)
-    # Who sets it is not told; who deletes it is somebody else.
+    assert node.next() == ("paramUpdate", "/master", "/a/b/", 3)
+    # The node that sets it is not notified; another one deletes it.
     proxy.setParam("/node", "/a/b", 4)
     proxy.deleteParam("/other", "/a/b")
-    assert told.next() == ("paramUpdate", "/master", "/a/b/", {})
+    assert node.next() == ("paramUpdate", "/master", "/a/b/", {})
 
 
 def test_many_calls_in_one(proxy: ServerProxy) -> None:

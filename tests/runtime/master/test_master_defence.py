@@ -65,7 +65,7 @@ BAD: dict[str, tuple[bytes, str]] = {
         "400 not an HTTP header",
     ),
     "headers of more than 64 KiB": (b"POST / HTTP/1.1\r\nX: " + b"x" * 70_000, "400 HTTP header too long"),
-    "a Content-Length that is no number": (
+    "a Content-Length that is not a number": (
         b"POST / HTTP/1.1\r\nContent-Length: \xb2\r\n\r\n",
         "400 bad Content-Length",
     ),
@@ -82,7 +82,7 @@ BAD: dict[str, tuple[bytes, str]] = {
         b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nfffffffff\r\n",
         "413 an HTTP body of",
     ),
-    "a chunk size that is no number": (
+    "a chunk size that is not a number": (
         b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n+5\r\n",
         "400 bad chunk size",
     ),
@@ -122,7 +122,7 @@ BAD: dict[str, tuple[bytes, str]] = {
     "nil": (valued(b"<value><nil/></value>"), "400 ROS has no nil"),
     "a method that is not there": (called("nope", "/x"), "fault"),
     "a call without a caller_id": (called("getPid"), "missing required caller_id parameter"),
-    "a caller_id that is no text": (called("getPid", 5), "caller_id must be a string"),
+    "a caller_id that is not text": (called("getPid", 5), "caller_id must be a string"),
     "too few or too many arguments": (called("registerPublisher", "/x", "/t"), "Error: bad call arity"),
     "a name with a space or colon": (
         called("registerPublisher", "/x", "/t a", "a/B", "http://x:1/"),

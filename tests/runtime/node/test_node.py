@@ -141,7 +141,7 @@ def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize(
-    ("host", "master", "told"),
+    ("host", "master", "warns"),
     [
         ("localhost", "192.0.2.1", True),
         ("127.0.0.1", "192.0.2.1", True),
@@ -150,25 +150,25 @@ def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.Mon
     ],
 )
 def test_a_node_on_loopback_warns_of_a_master_on_another_host(
-    host: str, master: str, told: bool, caplog: pytest.LogCaptureFixture
+    host: str, master: str, warns: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scene() -> None:
         async with running({"ROS_MASTER_URI": f"http://{master}:11411", "ROS_HOSTNAME": host}):
             pass
 
     run(scene)
-    assert ("set ROS_IP" in caplog.text) == told
+    assert ("set ROS_IP" in caplog.text) == warns
 
 
 def test_parameter_updates_are_delivered_in_order() -> None:
-    told: list[int] = []
+    values: list[int] = []
     both, later = threading.Event(), threading.Event()
 
     def on_parameter(key: str, value: int) -> None:
         if value == 1:
             # Two workers would tell of the second meanwhile.
             later.wait(0.1)
-        told.append(value)
+        values.append(value)
         if value == 2:
             later.set()
             both.set()
@@ -177,7 +177,7 @@ def test_parameter_updates_are_delivered_in_order() -> None:
     node.parameter_changed("/p", 1)
     node.parameter_changed("/p", 2)
     assert both.wait(30)
-    assert told == [1, 2]
+    assert values == [1, 2]
 
 
 def test_other_threads_may_query_the_tables_while_they_change() -> None:

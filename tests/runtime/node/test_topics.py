@@ -136,7 +136,7 @@ async def subscribe_to(
     node: Node,
     deliver: Callable[[memoryview, Header], None],
 ) -> Subscription:
-    """Return a subscription that the master told of one publisher, which ``foreign`` plays."""
+    """Return a subscription that was notified of one publisher, which ``foreign`` plays."""
     subscription = node.make_subscription("/t", STRING, deliver)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
@@ -243,8 +243,8 @@ def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
 
     run(scene)
     lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
-    (told,) = [line for line in lines if "cannot connect to the publisher of /t" in line]
-    assert "Its address is right" in told
+    (line,) = [line for line in lines if "cannot connect to the publisher of /t" in line]
+    assert "Its address is right" in line
 
 
 @pytest.mark.parametrize(
@@ -498,7 +498,7 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
 
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
-    """Return what a node asks its master comes late, where the method's name begins so, and is not taken back."""
+    """Delay the calls of a node to its master whose method has this prefix; they are not cancelled."""
     ask = node._registrations.call
 
     async def ask_late(method: str, *args: Any) -> Any:
@@ -693,7 +693,7 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             port = master.port
             await master.close()
             await eventually(lambda: "What is connected goes on" in caplog.text)
-            publication.publish(serialize_frame(b"while there is no master"))
+            publication.publish(serialize_frame(b"without a master"))
             await eventually(lambda: len(box.bodies) == 1)
             restarted = Master(host="127.0.0.1", port=port)
             await restarted.start()

@@ -168,11 +168,11 @@ def test_a_bad_uri_is_reported_immediately() -> None:
 
 def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -> None:
     async def test() -> None:
-        told: list[tuple[float, str, int]] = []
+        received: list[tuple[float, str, int]] = []
         loop = asyncio.get_running_loop()
 
         def serve(method: str, args: Any) -> list[Any]:
-            told.append((loop.time(), args[1], len(args[2])))
+            received.append((loop.time(), args[1], len(args[2])))
             return [1, "", 0]
 
         server = RpcServer(serve)
@@ -181,13 +181,17 @@ def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -
         lists = {"/many": ["http://x:1/"] * 1000, "/few": ["http://x:1/"]}
         notifier = Notifier(Publishers(lambda topic: lists[topic]), Turns(), 5.0)
         notifier.send(PublisherUpdate(uri, "/many"))
-        await until(lambda: len(told) == 1)
+        await until(lambda: len(received) == 1)
         for _ in range(5):
             notifier.send(PublisherUpdate(uri, "/many"))
         notifier.send(PublisherUpdate(uri, "/few"))
-        await until(lambda: len(told) == 3)
-        assert [(topic, count) for _, topic, count in told] == [("/many", 1000), ("/few", 1), ("/many", 1000)]
-        assert told[2][0] - told[0][0] > 0.05
+        await until(lambda: len(received) == 3)
+        assert [(topic, count) for _, topic, count in received] == [
+            ("/many", 1000),
+            ("/few", 1),
+            ("/many", 1000),
+        ]
+        assert received[2][0] - received[0][0] > 0.05
         # It rests: a node whose pause is over takes neither memory nor time.
         await until(lambda: not notifier._nodes)
         await notifier.close()
@@ -198,10 +202,10 @@ def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -
 
 def test_an_update_that_waited_lists_later_publishers_too() -> None:
     async def test() -> None:
-        told: list[int] = []
+        received: list[int] = []
 
         def serve(_: str, args: Any) -> list[Any]:
-            told.append(len(args[2]))
+            received.append(len(args[2]))
             return [1, "", 0]
 
         server = RpcServer(serve)
@@ -210,14 +214,14 @@ def test_an_update_that_waited_lists_later_publishers_too() -> None:
         publishers = ["http://x:1/"] * 300
         notifier = Notifier(Publishers(lambda _: list(publishers)), Turns(), 5.0)
         notifier.send(PublisherUpdate(uri, "/many"))
-        await until(lambda: told)
+        await until(lambda: received)
         # This one pauses, while a publisher comes at a time when nobody subscribes.
         notifier.send(PublisherUpdate(uri, "/many"))
         notifier.send(PublisherUpdate(f"http://127.0.0.1:{server.port}/other", "/many"))
-        await until(lambda: len(told) == 2)
+        await until(lambda: len(received) == 2)
         publishers.append("http://x:2/")
-        await until(lambda: len(told) == 3)
-        assert told == [300, 300, 301]
+        await until(lambda: len(received) == 3)
+        assert received == [300, 300, 301]
         await notifier.close()
         await server.close()
 
@@ -228,8 +232,8 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def test() -> None:
-        told: list[str] = []
-        server = RpcServer(lambda _, args: told.append(args[1]) or [1, "", 0])  # type: ignore[func-returns-value]
+        received: list[str] = []
+        server = RpcServer(lambda _, args: received.append(args[1]) or [1, "", 0])  # type: ignore[func-returns-value]
         await server.start()
         uri = f"http://127.0.0.1:{server.port}/"
         notifier = Notifier(Publishers(lambda _: []), Turns(), 60.0)
@@ -241,9 +245,9 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
             patch.setattr(socket, "socket", none_left)
             notifier.send(PublisherUpdate(uri, "/lost"))
             await until(lambda: not notifier._nodes)
-        notifier.send(PublisherUpdate(uri, "/told"))
-        await until(lambda: told)
-        assert told == ["/told"]
+        notifier.send(PublisherUpdate(uri, "/notified"))
+        await until(lambda: received)
+        assert received == ["/notified"]
         assert notifier._line.under_way + notifier._suspect_line.under_way <= 1
         await notifier.close()
         await server.close()
@@ -297,22 +301,26 @@ def test_unrequested_bytes_of_a_server_are_not_an_answer() -> None:
 
 def test_a_node_on_the_loop_is_notified_without_a_call() -> None:
     async def test() -> None:
-        told: list[tuple[float, str, int]] = []
+        received: list[tuple[float, str, int]] = []
         loop = asyncio.get_running_loop()
         notifier = Notifier(
             Publishers(lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1)), Turns(), 5.0
         )
         # Nobody listens there.
-        notifier.here["http://127.0.0.1:9/"] = lambda topic, uris: told.append(
+        notifier.here["http://127.0.0.1:9/"] = lambda topic, uris: received.append(
             (loop.time(), topic, len(uris))
         )
         for topic in ("/many", "/few", "/few", "/many"):
             notifier.send(PublisherUpdate("http://127.0.0.1:9/", topic))
-        await until(lambda: len(told) == 2)
+        await until(lambda: len(received) == 2)
         notifier.send(PublisherUpdate("http://127.0.0.1:9/", "/many"))
         await until(lambda: not notifier._nodes)
-        assert [(topic, count) for _, topic, count in told] == [("/many", 1000), ("/few", 1), ("/many", 1000)]
-        assert told[2][0] - told[0][0] > 0.05
+        assert [(topic, count) for _, topic, count in received] == [
+            ("/many", 1000),
+            ("/few", 1),
+            ("/many", 1000),
+        ]
+        assert received[2][0] - received[0][0] > 0.05
         assert not notifier._line.under_way
         await notifier.close()
 

@@ -34,10 +34,10 @@ def connect(server: RpcServer) -> socket.socket:
 
 
 def test_a_client_with_many_requests_delays_no_other_and_gets_answers_in_order() -> None:
-    told: list[str] = []
+    called: list[str] = []
 
     def dispatch(method: str, args: Sequence[Any]) -> str:
-        told.append(method)
+        called.append(method)
         return method
 
     async def scene() -> bytes:
@@ -47,7 +47,7 @@ def test_a_client_with_many_requests_delays_no_other_and_gets_answers_in_order()
         with connect(server) as greedy, connect(server) as modest:
             greedy.sendall(b"".join(call(f"greedy{number}") for number in range(50)))
             modest.sendall(call("modest"))
-            await until(lambda: len(told) == 51)
+            await until(lambda: len(called) == 51)
             await until(lambda: all(each.is_idle for each in server.connections))
             greedy.setblocking(False)
             answers = b""
@@ -57,16 +57,16 @@ def test_a_client_with_many_requests_delays_no_other_and_gets_answers_in_order()
         return answers
 
     answers = asyncio.run(scene())
-    assert told.index("modest") < 10
+    assert called.index("modest") < 10
     places = [answers.index(b"greedy%d<" % number) for number in range(50)]
     assert places == sorted(places)
 
 
 def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> None:
-    told: list[str] = []
+    called: list[str] = []
 
     def dispatch(method: str, args: Sequence[Any]) -> int:
-        told.append(method)
+        called.append(method)
         return 1
 
     async def scene() -> int:
@@ -75,16 +75,16 @@ def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> No
         await server.start()
         with connect(server) as greedy:
             greedy.sendall(call("more") * 50)
-            await until(lambda: told)
+            await until(lambda: called)
             for each in list(server.connections):
                 each.end()
-            before = len(told)
+            before = len(called)
             for _ in range(5):
                 await asyncio.sleep(0)
         await server.close()
         return before
 
-    assert asyncio.run(scene()) == len(told) < 50
+    assert asyncio.run(scene()) == len(called) < 50
 
 
 def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,14 +119,14 @@ def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: p
 
 @pytest.mark.parametrize("last_closes", [False, True])
 def test_a_client_is_not_read_from_while_its_method_waits(last_closes: bool) -> None:
-    told: list[str] = []
+    called: list[str] = []
 
     async def scene() -> bytes:
         go_on = asyncio.Event()
 
         async def dispatch(method: str) -> str:
             await go_on.wait()
-            told.append(method)
+            called.append(method)
             return method
 
         server = RpcServer(lambda method, _: dispatch(method))
@@ -153,7 +153,7 @@ def test_a_client_is_not_read_from_while_its_method_waits(last_closes: bool) -> 
         return answers
 
     answers = asyncio.run(scene())
-    assert told == [f"greedy{number}" for number in range(501 if last_closes else 1000)]
+    assert called == [f"greedy{number}" for number in range(501 if last_closes else 1000)]
     assert last_closes or answers.count(b"HTTP/1.1 200") == 1000
 
 
