@@ -50,6 +50,8 @@ class Reader12(BagReader):
                 raise BagUnindexedError
             if position > limit:
                 raise BagUnindexedError("the index is behind the file's end")
+            if header.end < position == limit:
+                raise BagUnindexedError("the index is missing")
 
             while position < limit:
                 self.stream.seek(position)
@@ -97,8 +99,9 @@ class Reader12(BagReader):
             self._indexes[number].between(start, end) for number in connections
         )
         for entry in entries:
-            connection, time, body, _ = self.message_at(entry.offset)
-            yield Block(None, body, [(time, ranks[connection.id], entry.offset, 0, len(body))])
+            connection, time, body, position = self.message_at(entry.offset)
+            assert isinstance(position, int)
+            yield Block(None, body, [(time, ranks[connection.id], position, 0, len(body))])
 
     def message_at(self, position: Position) -> StoredMessage:
         """See :meth:`BagReader.message_at`."""

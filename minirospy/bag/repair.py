@@ -13,7 +13,7 @@ from typing import BinaryIO, NamedTuple
 from minirospy.bag import compression, records
 from minirospy.bag.chunks import Found, StoredChunk, scan_into, size_of
 from minirospy.bag.index import read_entries
-from minirospy.bag.records import Chunk, ChunkInfo, Connection, Record
+from minirospy.bag.records import BagHeader, Chunk, ChunkInfo, Connection, Record
 from minirospy.errors import BagCompressionError, BagFormatError
 
 __all__ = ["Repair"]
@@ -67,16 +67,12 @@ class Repair:
         return record.position, StoredChunk(chunk, record.data_position)
 
     def run(self) -> Iterator[int]:
-        """Read the chunks; yield the position of each. Raise BagFormatError if not even the bag header is whole."""
+        """Read the chunks; yield the position of each. Raise BagFormatError if it is not a bag, BagEncryptedError."""
         stream = self._stream
         stream.seek(0)
         records.read_version(stream)
         limit = size_of(stream)
-        stream.seek(len(records.MAGIC))
-        header = records.read_record(stream, limit)
-        records.parse_bag_header(header)
-
-        position = self.end = header.end
+        position = self.end = self._read_header(limit)
         while position < limit:
             yield position
             try:
@@ -107,6 +103,18 @@ class Repair:
             self._tail = None
         stream.seek(self.end)
         stream.truncate()
+
+    def _read_header(self, limit: int) -> int:
+        """Return where the first chunk is; a bag header that is damaged has the size of all others."""
+        start = len(records.MAGIC)
+        self._stream.seek(start)
+        try:
+            header = records.read_record(self._stream, limit)
+            records.parse_bag_header(header)
+        except BagFormatError as error:
+            self.problems.append(f"bag header: {error}")
+            return start + len(records.encode_bag_header(BagHeader(0, 0, 0)))
+        return header.end
 
     def _read(self, position: int, limit: int) -> int:
         """Read the record at a position, and what belongs to it; return the position after it."""

@@ -65,6 +65,7 @@ COMMANDS = (
     Entry("ros.rosparam", "main", "FAMILY", "rosparam", "param", "get, set parameters (as rosparam)"),
     Entry("ros.rosmsg", "main", "ROSMSG", "rosmsg", "msg", "show message types (as rosmsg)"),
     Entry("ros.rosmsg", "main_srv", "ROSSRV", "rossrv", "srv", "show service types (as rossrv)"),
+    Entry("ros.rosbag", "main", "FAMILY", "rosbag", "bag", "look into, change and repair bags (as rosbag)"),
     Entry("ros.rosconsole", "main", "FAMILY", "rosconsole", "console",
           "levels of loggers, and what nodes log (as rosconsole)"),
     Entry("ros.rosgraph", "main", "COMMAND", "rosgraph", "graph", "who sends to whom (as rosgraph)"),

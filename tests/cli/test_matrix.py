@@ -120,7 +120,7 @@ ROWS = {
     },
 }
 
-ELSEWHERE = re.compile(r"ros(dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to")
+ELSEWHERE = re.compile(r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to")
 """Commands with matrices or tests of their own."""
 
 TYPED_WRONG = 2
@@ -141,7 +141,7 @@ ROS_STATUS = {
 REPORTED_BY_ROS = {"rosnode cleanup": "ERROR: connection refused to [http://localhost:1/]\n"}
 """What is on stderr of a command that succeeds: the nodes that do not answer."""
 
-USAGE_STATUS = {"rosgraph": 255}
+USAGE_STATUS = {"rosbag": 0, "rosgraph": 255}
 """The exit status of a usage error, unless it is 2: as ROS has it."""
 
 GRAPH = [name for name, row in ROWS.items() if row.uses_master]

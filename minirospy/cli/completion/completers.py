@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "LIVE_SECONDS", "Completer", "Place", "Text", "build_targets", "files", "folders", "kinds", "launch_files",
+    "LIVE_SECONDS", "Completer", "Place", "Text", "bag_files", "build_targets", "files", "folders", "kinds", "launch_files",
     "launch_nodes", "launch_words", "loggers", "machines", "message_text", "message_types", "nodes",
     "nothing", "on_one_line", "package_file", "package_file_and_target", "package_folders", "package_names",
     "package_path", "parameter_value", "parameters", "pins", "prototype_types", "request_text",
@@ -151,6 +151,11 @@ def files(place: Place) -> Iterable[str]:
     head, slash, begun = place.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=begun.startswith("."))]
+
+
+def bag_files(place: Place) -> Iterable[str]:
+    """Return bags, and folders, of this computer."""
+    return [name for name in files(place) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
 
 
 def folders(place: Place) -> Iterable[str]:

@@ -10,6 +10,7 @@ from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagFormatExce
 from minirospy.errors import (
     DefinitionError,
 )
+from minirospy.introspect.bags import class_of
 
 if TYPE_CHECKING:
     from minirospy.bag.chunks import StoredChunk
@@ -190,25 +191,7 @@ def _get_message_type(info: _ConnectionInfo) -> type[Message]:
 
 
 def _make_message_type(info: _ConnectionInfo) -> type[Message]:
-    from minirospy.idl.load import class_from_text
-
     try:
-        found = class_from_text(info.datatype, info.msg_def)
+        return class_of(info.datatype, info.md5sum, info.msg_def, lambda line: print(line, file=sys.stderr))
     except DefinitionError as error:
-        try:
-            found = class_from_text(info.datatype, "")
-        except DefinitionError:
-            raise ROSBagException(f"Error generating datatype {info.datatype}: {error}") from error
-        print(
-            f'WARNING: For type [{info.datatype}] stored md5sum [{info.md5sum}] has invalid message definition."',
-            file=sys.stderr,
-        )
-        return found
-
-    if found._md5sum != info.md5sum:
-        print(
-            f"WARNING: For type [{info.datatype}] stored md5sum [{info.md5sum}] does not match message definition "
-            f'[{found._md5sum}].\n  Try: "rosrun rosbag fix_msg_defs.py old_bag new_bag."',
-            file=sys.stderr,
-        )
-    return found
+        raise ROSBagException(f"Error generating datatype {info.datatype}: {error}") from error
