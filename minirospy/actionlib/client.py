@@ -16,9 +16,8 @@ from minirospy.actionlib.machine import ClientGoalHandle, FeedbackCallback, Goal
 from minirospy.actionlib.spec import TAKES_FAST_ANSWERS
 from minirospy.actionlib.statuses import StatusList
 from minirospy.actionlib.waiting import Waiting
+from minirospy.client.connection import Connection
 from minirospy.idl.protocols import Action, ActionFeedback, ActionResult, Message
-from minirospy.runtime.node.topics import InLink
-from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["ActionClient"]
 
@@ -157,6 +156,6 @@ class _Listener(rospy.SubscribeListener):
         self._notify()
 
 
-def _peer(link: InLink | OutLink) -> str | None:
+def _peer(connection: Connection) -> str:
     """Return the name of the node at the other end of a link."""
-    return link.header.get("callerid") if isinstance(link, InLink) else link.peer
+    return connection.callerid_pub if connection.direction == "i" else connection.endpoint_id

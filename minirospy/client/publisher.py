@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from minirospy.client.connection import Connection, connection_to_subscriber
 from minirospy.client.session import Session
 from minirospy.client.topic import (
     AnyMsg,
@@ -250,13 +251,17 @@ class PublishedTopic(SharedTopic):
         return enough.is_set()
 
     @property
-    def connections(self) -> tuple[OutLink, ...]:
+    def connections(self) -> list[Connection]:
         """The links to subscribers."""
-        return self.publication.links
+        return [connection_to_subscriber(link, self.resolved_name) for link in self.publication.links]
+
+    def get_num_connections(self) -> int:
+        """Return how many links there are."""
+        return len(self.publication.links)
 
     def has_connection(self, endpoint_id: str) -> bool:
         """Return whether the node of this name is connected."""
-        return any(link.peer == endpoint_id for link in self.connections)
+        return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
         """Log that the first message had no subscriber: a warning only where the master knows one that is connecting.

@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
 from minirospy.clock import SignalSafeEvent, wait_for_event
@@ -77,7 +78,7 @@ class Subscriber(Topic[_M_co]):
                 )
             state.join(self, tcp_nodelay)
             # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
-            links = state.connections
+            links = state.links
         self.impl = state
         try:
             self._session.when_ready(state.register)
@@ -150,13 +151,22 @@ class SubscribedTopic(SharedTopic):
         self._registered = False
 
     @property
-    def connections(self) -> tuple[InLink, ...]:
+    def links(self) -> tuple[InLink, ...]:
         """The links to publishers."""
         return self.subscription.links if self.subscription else ()
 
+    @property
+    def connections(self) -> list[Connection]:
+        """The links to publishers, as rospy shows them."""
+        return [connection_to_publisher(link, self.resolved_name) for link in self.links]
+
+    def get_num_connections(self) -> int:
+        """Return how many links there are."""
+        return len(self.links)
+
     def has_connection(self, endpoint_id: str) -> bool:
         """Whether the node with this Slave API is connected."""
-        return any(link.uri == endpoint_id for link in self.connections)
+        return any(link.uri == endpoint_id for link in self.links)
 
     def join(self, handle: Subscriber[Message], tcp_nodelay: bool) -> None:
         self._tcp_nodelay = self._tcp_nodelay or tcp_nodelay
@@ -182,7 +192,7 @@ class SubscribedTopic(SharedTopic):
         with self._session.lock:
             self._added.append(callback)
             self._update()
-            links = self.connections
+            links = self.links
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:

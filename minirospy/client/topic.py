@@ -9,6 +9,7 @@ import logging
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from minirospy.client.connection import Connection
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
 from minirospy.errors import MasterUnreachableError, ROSException, RpcError
@@ -102,8 +103,8 @@ class SharedTopic:
         self.type: str = data_class._type
 
     @property
-    def connections(self) -> tuple[object, ...]:
-        """The links to the other ends."""
+    def connections(self) -> list[Connection]:
+        """The links to the other ends, as rospy shows them."""
         raise NotImplementedError
 
     def leave(self, handle: Any) -> None:
@@ -111,12 +112,12 @@ class SharedTopic:
         raise NotImplementedError
 
     def get_num_connections(self) -> int:
-        """How many links there are."""
-        return len(self.connections)
+        """Return how many links there are."""
+        raise NotImplementedError
 
     def has_connections(self) -> bool:
         """Whether there is a link."""
-        return bool(self.connections)
+        return bool(self.get_num_connections())
 
     def has_connection(self, endpoint_id: str) -> bool:
         """Whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""

@@ -81,3 +81,18 @@ show(taken((6,)))
 show(subscriber.impl.set_queue_size(1), subscriber.impl.set_buff_size(100))
 other = rospy.Publisher("d", Int32, queue_size=5)
 show(other.impl.is_latch, other.impl.enable_latch(), other.impl.is_latch)
+
+# What programs read of a connection.
+met = rospy.Publisher("/met", Int32, queue_size=1, latch=True)
+seen = []
+meeting = rospy.Subscriber("/met", Int32, seen.append)
+met.publish(1)
+show(eventually(lambda: seen and met.impl.connections and meeting.impl.connections))
+for topic in (met, meeting):
+    (connection,) = topic.impl.connections
+    show(
+        type(topic.impl.connections).__name__, connection.direction, connection.name, connection.callerid_pub
+    )
+    show(connection.endpoint_id in (rospy.get_name(), rospy.get_node_uri()), isinstance(connection.id, int))
+    show(connection.type, connection.md5sum, connection.is_latched, connection.done, connection.stat_num_msg)
+    show(sorted(connection.header) if connection.header else None)

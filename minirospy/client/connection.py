@@ -1,0 +1,71 @@
+"""The links of a topic as programs see them in ``impl.connections``: with the attributes of rospy's transports.
+
+Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module.html (class Transport).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.runtime.node.topics import InLink
+    from minirospy.runtime.transport.links import OutLink
+
+__all__ = ["Connection", "connection_to_publisher", "connection_to_subscriber"]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One end of a link, as it was when it was looked at.
+
+    ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` the topic; ``id`` is unique in the node.
+    ``endpoint_id`` is the URI of the publisher's Slave API, or the name of the subscribing node. ``callerid_pub``,
+    ``header``, ``type`` and ``md5sum`` are what a publisher sent; this node as publisher has none. ``stat_bytes`` and
+    ``stat_num_msg`` count what has been received or sent.
+    """
+
+    link: InLink | OutLink
+    name: str
+    direction: str
+    endpoint_id: str
+    id: int
+    transport_type: str
+    stat_bytes: int
+    stat_num_msg: int
+    callerid_pub: str = "unknown"
+    header: dict[str, str] | None = None
+    type: str | None = None
+    md5sum: str | None = None
+    is_latched: bool = False
+    done: bool = False
+
+    def close(self) -> None:
+        """End the link. A subscriber makes it again as long as the publisher is registered."""
+        self.link.close()
+
+
+def connection_to_publisher(link: InLink, topic: str) -> Connection:
+    """Return the subscriber's end of a link."""
+    header = dict(link.header)
+    return Connection(
+        link,
+        topic,
+        "i",
+        link.uri,
+        link.number,
+        link.transport,
+        link.received_bytes,
+        link.received,
+        callerid_pub=header.get("callerid", "unknown"),
+        header=header,
+        type=header.get("type"),
+        md5sum=header.get("md5sum"),
+        is_latched=header.get("latching") == "1",
+        done=link.closed,
+    )
+
+
+def connection_to_subscriber(link: OutLink, topic: str) -> Connection:
+    """Return the publisher's end of a link."""
+    return Connection(link, topic, "o", link.peer, link.number, link.transport, link.sent_bytes, link.sent)
