@@ -126,10 +126,26 @@ class Catalogue:
         self.actions(package)
         if full_name in self._specs:
             return self._specs[full_name]
+        if name in _OF_OTHER_LANGUAGES and name not in files:
+            raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
             raise NotFoundError("message type", full_name, hint=f"did you mean {near[0]}?")
         raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
+
+
+_OF_OTHER_LANGUAGES = {
+    "int": "int32",
+    "long": "int64",
+    "short": "int16",
+    "unsigned": "uint32",
+    "uint": "uint32",
+    "float": "float32 or float64",
+    "double": "float64",
+    "str": "string",
+    "boolean": "bool",
+}
+"""Names of types in C++ and Python -> the types of ROS."""
 
 
 def read_definition(path: Path) -> str:

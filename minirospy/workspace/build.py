@@ -19,6 +19,7 @@ from minirospy.idl.load import Catalogue, compile_package, read_definition, writ
 from minirospy.idl.spec import MessageSpec
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
+from minirospy.workspace.manifest import naming_warning
 from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
@@ -316,8 +317,8 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return a warning for each package that find_package names and that does not exist."""
-        warnings = []
+        """Return warnings of the package's name, and of packages that find_package names and that do not exist."""
+        warnings = [warning] if (warning := naming_warning(plan.name)) else []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
             if name not in known:

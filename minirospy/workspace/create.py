@@ -15,7 +15,7 @@ from minirospy.errors import UsageError
 
 __all__ = ["NewPackage", "create_package"]
 
-_NAME = re.compile(r"^[a-zA-Z][a-zA-Z0-9_-]*$")
+_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_-]*$")
 
 
 class NewPackage(NamedTuple):

@@ -29,6 +29,7 @@ __all__ = [
     "Person",
     "Url",
     "evaluate_condition",
+    "naming_warning",
     "parse_manifest",
     "read_manifest",
 ]
@@ -36,6 +37,7 @@ __all__ = [
 VARIABLES: Mapping[str, str] = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
 """What conditions see where the caller's variables do not say otherwise."""
 
+_CONVENTIONAL_NAME = re.compile(r"^[a-z][a-z0-9_-]*$")
 PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
 
 
@@ -122,6 +124,16 @@ class Manifest(NamedTuple):
     def build_type(self) -> str:
         """What builds the package: catkin unless it says otherwise."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
+
+
+def naming_warning(name: str) -> str | None:
+    """Return catkin's warning of a package's name that does not follow the conventions, else None (REP 144)."""
+    if _CONVENTIONAL_NAME.match(name):
+        return None
+    return (
+        f'Package name "{name}" does not follow the naming conventions. It should start with a lower case letter and '
+        "only contain lower case letters, digits, underscores, and dashes."
+    )
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:

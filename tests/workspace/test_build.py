@@ -342,6 +342,8 @@ def test_mistakes_in_cmake(scene: Scene, cmake: str, line: int, text: str) -> No
         ("std_msgs/Boool b\n", 1, "message type [std_msgs/Boool] not found; did you mean std_msgs/Bool"),
         ("Ledd l\n", 1, "message type [p/Ledd] not found; did you mean p/Led?"),
         ("int46 l\n", 1, "message type [p/int46] not found: did you mean int64?"),
+        ("double x\n", 1, "message type [p/double] not found: did you mean float64?"),
+        ("int x\n", 1, "message type [p/int] not found: did you mean int32?"),
         ("Led l\n", 1, "contains itself"),
     ],
 )
@@ -466,6 +468,14 @@ def test_missing_package_with_a_similar_name_is_a_warning(scene: Scene) -> None:
     assert reports["p"].warnings == (
         f"{folder / 'CMakeLists.txt'}:3: package [std_msg] is not installed; going on without it;"
         " did you mean std_msgs?",
+    )
+
+
+def test_name_against_the_conventions_is_a_warning(scene: Scene) -> None:
+    scene.package("MyPkg", "")
+    assert scene.build()["MyPkg"].warnings == (
+        'Package name "MyPkg" does not follow the naming conventions. It should start with a lower case letter and '
+        "only contain lower case letters, digits, underscores, and dashes.",
     )
 
 

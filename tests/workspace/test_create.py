@@ -32,6 +32,17 @@ def test_a_new_package(
     assert [name for name, _ in read_plan(tmp_path / "rpi_test").needs] == ["rospy", "std_msgs"]
 
 
+def test_name_against_the_conventions_is_a_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As with catkin_create_pkg, whose text this is."""
+    monkeypatch.chdir(tmp_path)
+    assert catkin_create_pkg(["MyPkg"]) == 0
+    assert capsys.readouterr().err.startswith(
+        'WARNING: Package name "MyPkg" does not follow the naming conventions.'
+    )
+
+
 def test_beside_src(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -87,7 +98,7 @@ def test_a_metapackage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ("words", "text"),
     [
         ([], "the following arguments are required: name"),
-        (["1x"], "[1x] is not a name for a package"),
+        (["_x"], "[_x] is not a name for a package"),
         (["../x"], "[../x] is not a name for a package"),
         (["x", "a b"], "[a b] is not the name of a package to depend on"),
         (["x", "-V", "1"], "[1] is not a version: three numbers, as in 0.1.0"),

@@ -101,6 +101,7 @@ def create_package_here(
 ) -> None:
     """Create a package in the current folder."""
     from minirospy.workspace.create import NewPackage, create_package
+    from minirospy.workspace.manifest import naming_warning
 
     parent = Path.cwd()
     package = NewPackage(
@@ -114,7 +115,10 @@ def create_package_here(
         _user(),
         meta,
     )
-    for path in create_package(parent, package):
+    made = create_package(parent, package)
+    if warning := naming_warning(name):
+        warn(warning)
+    for path in made:
         print(f"Created {'folder' if path.is_dir() else 'file'} {path.relative_to(parent).as_posix()}")
 
     print(f"Successfully created files in {parent / name}. Please adjust the values in package.xml.")
