@@ -11,11 +11,12 @@ import time
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy.environment import Environment
 from minirospy.errors import DeserializationError, ServiceException
 from minirospy.escape import escaped
+from minirospy.idl.protocols import Message, ServiceClass
 from minirospy.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
@@ -24,6 +25,9 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from rosgraph_msgs.msg import Log
 
 __all__ = ["RosoutNode"]
 
@@ -43,7 +47,7 @@ class RosoutNode:
         self._log_file = log_file
         self._omits_topics = omits_topics
         self._file: LogFile | None = None
-        self._log_class: Any = None
+        self._log_class: type[Log] | None = None
         self._aggregated: Publication | None = None
 
     async def start(self) -> None:
@@ -96,7 +100,7 @@ class RosoutNode:
         await self._serve("get_loggers", GetLoggers, get_loggers)
         await self._serve("set_logger_level", SetLoggerLevel, set_level)
 
-    async def _serve(self, name: str, class_: Any, handler: AsyncHandler) -> None:
+    async def _serve(self, name: str, class_: ServiceClass, handler: AsyncHandler) -> None:
         await self.node.serve(
             LoopServiceServer(
                 f"/rosout/{name}",
@@ -117,6 +121,7 @@ class RosoutNode:
             self._write(self._file, body)
 
     def _write(self, file: LogFile, body: bytes) -> None:
+        assert self._log_class
         message = self._log_class()
         try:
             message.deserialize(body)
@@ -132,7 +137,7 @@ class RosoutNode:
         file.text(escaped(head) + escaped(message.msg, "\n\t"))
 
 
-def _bytes_of(message: Any) -> bytes:
+def _bytes_of(message: Message) -> bytes:
     buffer = BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from enum import Enum
-from typing import Any, TypeVar
+from typing import TypeVar
 
 __all__ = ["ALONE", "PAUSE", "Need", "Steps", "finish", "is_small"]
 
@@ -40,12 +40,12 @@ def finish(steps: Steps[_T]) -> _T:
             return result
 
 
-def is_small(value: Any, most: int = _SMALL) -> bool:
+def is_small(value: object, most: int = _SMALL) -> bool:
     """Return whether a value of XML-RPC's types takes no more than a few milliseconds to walk through."""
     return _left(value, most) >= 0
 
 
-def _left(value: Any, left: int) -> int:
+def _left(value: object, left: int) -> int:
     """Return what is left of a number of items; it is negative if they do not do."""
     if isinstance(value, (str, bytes)):
         return left - 1 - len(value) // _LETTERS_PER_ITEM

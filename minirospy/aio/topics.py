@@ -8,7 +8,7 @@ import itertools
 import weakref
 from collections import deque
 from collections.abc import AsyncIterator
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from minirospy.aio.handle import Handle, pieces_of, registered
 from minirospy.errors import (
@@ -18,7 +18,7 @@ from minirospy.errors import (
     RpcError,
 )
 from minirospy.idl.message import args_kwds_to_message
-from minirospy.idl.protocols import Message
+from minirospy.idl.protocols import Message, is_stamped
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
@@ -298,10 +298,11 @@ class PublishedTopic:
         with contextlib.suppress(MasterUnreachableError, RpcError):
             await self._node._node.unadvertise(self.publication)
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: Message) -> None:
         """Send a message to all subscribers; may be called from any thread."""
         if self.publication.links or self.publication.latch:
             if self._has_header:
+                assert is_stamped(message)
                 message.header.seq = next(self._sequence)
             self.publication.publish(pieces_of(message).frame())
 

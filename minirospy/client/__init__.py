@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import Any
 
 from minirospy import names
 from minirospy.client.identity import private_parameters
@@ -226,6 +225,6 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
     return names.parse_arguments(sys.argv if argv is None else argv).plain
 
 
-def load_command_line_node_params(argv: Sequence[str]) -> dict[str, Any]:
+def load_command_line_node_params(argv: Sequence[str]) -> dict[str, object]:
     """Return the private parameters of a command line: ``_rate:=5`` is {"rate": 5}. Raises ROSInitException."""
     return private_parameters(names.parse_arguments(argv))

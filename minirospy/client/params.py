@@ -159,7 +159,7 @@ class KeptParameters:
             raise KeyError(key)
         return get_param_cached(key)
 
-    def set_notifier(self, notifier: Callable[[str, Any], object] | None) -> None:
+    def set_notifier(self, notifier: Callable[[str, object], object] | None) -> None:
         """Call ``notifier(key, value)`` when the master reports a change; a deleted one has the value {}."""
         self._notifier = notifier
 

@@ -91,7 +91,7 @@ class Publisher(Topic[_M_co]):
         self.impl = state
         self._session.when_ready(state.register)
 
-    def publish(self, *args: Any, **kwds: object) -> None:
+    def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
         Raises ROSException before init_node and after unregister, ROSSerializationException or TypeError on

@@ -113,7 +113,7 @@ class ParameterTree:
             if not self.has_room(weight):
                 raise ParametersFullError(f"no more than {self._most // 1024**2} MiB in memory")
 
-    def set(self, key: str, value: Any, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
+    def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
         """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
 
         A value in the way of a namespace is replaced by it. Raises ValueError where the root would become
@@ -284,7 +284,7 @@ class ParameterTree:
 _UNSET: Any = object()
 
 
-def weigh_in_steps(key: str, value: Any) -> Steps[int]:
+def weigh_in_steps(key: str, value: object) -> Steps[int]:
     """Return about how many bytes of memory a value takes.
 
     Raises ValueError on one that no answer could hold: it would make the namespaces above ``key`` unreadable.

@@ -47,7 +47,7 @@ class _NodeTest(unittest.TestCase):
         if not holds:
             self.fail(text)
 
-    def param(self, name: str, default: Any = _UNSET) -> Any:
+    def param(self, name: str, default: object = _UNSET) -> Any:
         """Return a private parameter; the test fails where it has neither value nor default."""
         value = rospy.get_param(f"~{name}", None)
         if value is None and default is _UNSET:
@@ -56,7 +56,7 @@ class _NodeTest(unittest.TestCase):
             )
         return default if value is None else value
 
-    def seconds(self, name: str, default: Any = _UNSET) -> float:
+    def seconds(self, name: str, default: object = _UNSET) -> float:
         """Return a private parameter that is a time."""
         value = self.param(name, default)
         if not isinstance(value, int | float) or isinstance(value, bool) or value < 0:

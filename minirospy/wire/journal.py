@@ -40,13 +40,13 @@ class Recovered(NamedTuple):
     damage: str
 
 
-def serialize_record(record: list[Any]) -> bytes:
+def serialize_record(record: list[object]) -> bytes:
     """Return a record's bytes in the file. Raises ValueError or TypeError on a value that msgpack cannot hold."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
 
-def pack_in_steps(value: Any) -> Iterator[bytes]:
+def pack_in_steps(value: object) -> Iterator[bytes]:
     """Yield a large value in pieces, which :func:`unpack` takes all together. Raises as :func:`serialize_record`."""
     packer = msgpack.Packer(default=_encode_other, strict_types=True, autoreset=False)
     yield from _pack_in_steps(value, packer)
@@ -56,7 +56,7 @@ def pack_in_steps(value: Any) -> Iterator[bytes]:
 def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
     if type(value) is list:
         packer.pack_array_header(len(value))
-        items: Iterable[Any] = value
+        items: Iterable[object] = value
     elif type(value) is dict:
         packer.pack_map_header(len(value))
         items = chain.from_iterable(value.items())

@@ -54,7 +54,7 @@ class Serialized:
         self.pieces = pieces
 
 
-def serialize_call(method: str, args: Sequence[Any]) -> bytes:
+def serialize_call(method: str, args: Sequence[object]) -> bytes:
     """Return a call as XML. Raises RpcProtocolError on a value that XML-RPC has no type for."""
     parts = [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
@@ -65,7 +65,7 @@ def serialize_call(method: str, args: Sequence[Any]) -> bytes:
     return "".join(parts).encode()
 
 
-def serialize_response(value: Any) -> bytes:
+def serialize_response(value: object) -> bytes:
     """Return a successful answer as XML."""
     if type(value) is Serialized:
         return b"".join(value.pieces)
@@ -83,7 +83,7 @@ def serialize_fault(code: int, text: str) -> bytes:
     return "".join(parts).encode()
 
 
-def serialize_call_in_steps(method: str, args: Sequence[Any], most: int) -> Steps[list[bytes]]:
+def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> Steps[list[bytes]]:
     """Return a call as pieces of XML, as :func:`serialize_response_in_steps` does an answer."""
     out = Output(most)
     out.parts += [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
@@ -95,7 +95,7 @@ def serialize_call_in_steps(method: str, args: Sequence[Any], most: int) -> Step
     return out.finish()
 
 
-def serialize_response_in_steps(value: Any, most: int) -> Steps[list[bytes]]:
+def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
     """Return a successful answer as pieces of XML. Raises RpcProtocolError where it has more than ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]

@@ -54,7 +54,7 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
     parts.append(f"<value><string>{escape(value)}</string></value>")
 
 
-def _write_list(value: Sequence[Any], parts: list[str], depth: int) -> None:
+def _write_list(value: Sequence[object], parts: list[str], depth: int) -> None:
     parts.append("<value><array><data>")
     for item in value:
         # Most lists are of strings.
@@ -65,7 +65,7 @@ def _write_list(value: Sequence[Any], parts: list[str], depth: int) -> None:
     parts.append("</data></array></value>")
 
 
-def _write_dict(value: Mapping[str, Any], parts: list[str], depth: int) -> None:
+def _write_dict(value: Mapping[str, object], parts: list[str], depth: int) -> None:
     parts.append("<value><struct>\n")
     for key, item in value.items():
         if not isinstance(key, str):
@@ -98,7 +98,7 @@ _WRITERS: dict[type, Callable[[Any, list[str], int], None]] = {
 }
 
 
-def write(value: Any, parts: list[str], depth: int) -> None:
+def write(value: object, parts: list[str], depth: int) -> None:
     """Append a value's XML to ``parts``. Raises RpcProtocolError on what XML-RPC has no type for."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
@@ -169,7 +169,7 @@ def _write_list_in_steps(value: Sequence[Any], out: Output, depth: int) -> Steps
     out.parts.append("</data></array></value>")
 
 
-def _write_dict_in_steps(value: Mapping[str, Any], out: Output, depth: int) -> Steps[None]:
+def _write_dict_in_steps(value: Mapping[str, object], out: Output, depth: int) -> Steps[None]:
     out.parts.append("<value><struct>\n")
     for key, item in value.items():
         if not isinstance(key, str):
@@ -203,7 +203,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
     out.parts.append("</base64></value>")
 
 
-def _writer_of_kin(value: Any) -> Callable[[Any, list[str], int], None]:
+def _writer_of_kin(value: object) -> Callable[[Any, list[str], int], None]:
     """Return the writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
-from typing import Any, Protocol, TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 from minirospy import Node
 from minirospy.actionlib.spec import ActionTypes, action_types
@@ -57,7 +57,7 @@ class GoalError(MinirospyError):
     A server's ``execute`` raises it to abort the goal with a text and a result, in any form that it may return.
     """
 
-    def __init__(self, text: str = "", result: Any = None, state: GoalState = GoalState.ABORTED) -> None:
+    def __init__(self, text: str = "", result: object = None, state: GoalState = GoalState.ABORTED) -> None:
         super().__init__(f"the goal was {state.name.lower()}" + (f": {text}" if text else ""))
         self.text = text
         self.result = result

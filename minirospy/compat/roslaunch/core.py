@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy import names
 from minirospy.environment import Environment, is_own_host
@@ -96,7 +96,7 @@ class Master:
 class Param:
     """A parameter: its global name and value."""
 
-    def __init__(self, key: str, value: Any) -> None:
+    def __init__(self, key: str, value: object) -> None:
         self.key = key
         self.value = value
 

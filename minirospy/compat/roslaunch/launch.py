@@ -6,7 +6,7 @@ import atexit
 import os
 import sys
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from minirospy.compat.roslaunch.config import ROSLaunchConfig
 from minirospy.compat.roslaunch.core import Node, RLException
@@ -24,7 +24,7 @@ from minirospy.launch.runner import RunOptions
 
 __all__ = ["ROSLaunchRunner", "master_options", "replacement_of"]
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+Function = TypeVar("Function", bound=Callable[..., object])
 
 
 class ROSLaunchRunner:

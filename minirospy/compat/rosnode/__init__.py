@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from minirospy.compat.rosgraph import masterapi
 from minirospy.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
@@ -261,7 +261,7 @@ def _sub_rosnode_listnodes(
     return "\n".join((node.uri or "unknown address") if list_uri else node.name for node in found)
 
 
-def _succeed(args: Sequence[Any]) -> object:
+def _succeed(args: Sequence[object]) -> object:
     """Return the value of an answer (code, text, value). Raises ROSNodeException where it is an error."""
     code, text, value = args
     if code != 1:

@@ -100,7 +100,7 @@ class ManifestManager:
                 continue
         return found
 
-    def get_custom_cache(self, key: Hashable, default: Any = None) -> Any:
+    def get_custom_cache(self, key: Hashable, default: object = None) -> Any:
         """Return a value of the user's cache."""
         return self._custom.get(key, default)
 

@@ -59,7 +59,7 @@ class ServerProxy:
     def __repr__(self) -> str:
         return f"<ServerProxy for {self._uri}>"
 
-    def _call(self, method: str, args: tuple[Any, ...]) -> Any:
+    def _call(self, method: str, args: tuple[object, ...]) -> Any:
         try:
             return self._client.call(method, *args)
         except RpcUnreachable as error:
@@ -101,7 +101,7 @@ class MasterProxy:
             raise KeyError(key)
         return value
 
-    def __setitem__(self, key: str, val: Any) -> None:
+    def __setitem__(self, key: str, val: object) -> None:
         self.setParam(key, val)
 
     def __delitem__(self, key: str) -> None:

@@ -6,7 +6,6 @@ import re
 import socket
 import time
 from collections.abc import Iterator
-from typing import Any
 
 from minirospy.errors import MasterUnreachableError, RpcError, RpcFault
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
@@ -119,7 +118,7 @@ def _unreachable(uri: str, place: MasterPlace, trouble: Trouble) -> Finding:
     return problem("master", f"{where}: {trouble.text}", "see docs/network.md")
 
 
-def _status(master: MasterProxy) -> dict[str, Any]:
+def _status(master: MasterProxy) -> dict[str, object]:
     """Return what only minirospy's master reports of itself."""
     try:
         found = master.call("minirospy.status")

@@ -17,7 +17,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy import private_files
 from minirospy.steps import PAUSE, Steps, finish, is_small
@@ -72,7 +72,7 @@ class Journal:
     def __init__(
         self,
         path: Path,
-        snapshot: Callable[[], Iterable[list[Any]]],
+        snapshot: Callable[[], Iterable[list[object]]],
         clock: Callable[[], float] = time.monotonic,
         start_steps: Callable[[Steps[None]], object] = finish,
     ) -> None:
@@ -158,7 +158,7 @@ class Journal:
 
         self._switch_to(file, len(data))
 
-    def append(self, *record: Any) -> None:
+    def append(self, *record: object) -> None:
         """Write one change. Never raises."""
         if self._file is None:
             self.retry()
@@ -178,7 +178,7 @@ class Journal:
             self._fail(error)
             self._log_trouble()
 
-    def store(self, value: Any) -> Steps[int]:
+    def store(self, value: object) -> Steps[int]:
         """Write a large value in parts; return the number by which a record "put" refers to it. Never raises."""
         while self._is_rewriting:
             yield PAUSE
@@ -359,7 +359,7 @@ class Journal:
         self._close_file()
 
 
-def _pieces_of(records: Iterable[list[Any]]) -> Iterator[bytes]:
+def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
     """Yield the bytes of a whole journal, large values in parts."""
     yield HEAD + serialize_record(["boot", boot_id()])
     written: list[bytes] = []

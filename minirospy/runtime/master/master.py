@@ -34,7 +34,7 @@ from minirospy.wire.journal import unpack
 from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 if TYPE_CHECKING:
-    from minirospy.runtime.master.journal import Journal
+    from minirospy.runtime.master.journal import Journal, Left
     from minirospy.runtime.node.node import Node
 
 __all__ = ["Master"]
@@ -178,7 +178,7 @@ class Master(MasterApi):
         """``node``, which has started, is on this loop: it is told of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
-    def serve(self, method: str, args: Sequence[Any]) -> Any:
+    def serve(self, method: str, args: Sequence[object]) -> Any:
         """Return the answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
@@ -297,7 +297,7 @@ class Master(MasterApi):
         self._touch()
         return self.registry.nodes()
 
-    async def _take_up(self, left: Any) -> None:
+    async def _take_up(self, left: Left) -> None:
         recovered, age = left.recovered, left.age
         for record in recovered.records:
             try:

@@ -110,7 +110,7 @@ class Notifier:
         # The last update that was written: the subscribers of one topic all get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
         # The same for a large one, of a topic or a parameter.
-        self._last_large: tuple[str, Any, list[bytes]] = ("", None, [])
+        self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
         # Large calls that wait; bytes of those that are under way; whether one is being written.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
@@ -241,7 +241,7 @@ class Notifier:
     ) -> Steps[None]:
         if isinstance(notice, PublisherUpdate):
             method, name = "publisherUpdate", notice.topic
-            value: Any = self._state.publisher_uris(name)
+            value: object = self._state.publisher_uris(name)
         else:
             method, name = "paramUpdate", notice.key
             value = self._state.parameter(name)

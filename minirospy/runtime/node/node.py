@@ -55,7 +55,7 @@ class Node:
         environment: Environment,
         *,
         on_shutdown: Callable[[str], None] | None = None,
-        on_parameter: Callable[[str, Any], None] | None = None,
+        on_parameter: Callable[[str, object], None] | None = None,
         watch_seconds: float = 2.0,
     ) -> None:
         """``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
@@ -80,7 +80,7 @@ class Node:
 
         self._readers = ReaderSet()
         self._rpc = AsyncRpcClient(same_host=environment.same_host)
-        tables: Mapping[str, Mapping[str, Any]] = {
+        tables: Mapping[str, Mapping[str, Publication | Subscription | ServiceServer]] = {
             "Publisher": self.publications,
             "Subscriber": self.subscriptions,
             "Service": self.services,
@@ -181,7 +181,7 @@ class Node:
         if self._unregistering:
             self._unregistering.cancel()
 
-    async def master(self, method: str, *args: Any) -> Any:
+    async def master(self, method: str, *args: object) -> Any:
         """Call the master as this node and return the value of its answer.
 
         Raises MasterUnreachableError, or RpcRefused with the master's text.
@@ -289,7 +289,7 @@ class Node:
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
-    def parameter_changed(self, key: str, value: Any) -> None:
+    def parameter_changed(self, key: str, value: object) -> None:
         """Pass on a parameter's new value, of which the master has notified this node."""
         if self._on_parameter:
             self._parameter_updates.start(self._on_parameter, key, value)

@@ -54,7 +54,7 @@ _CALLS_AT_ONCE = 100
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
 """The kind of a part, as in the names of the master's calls ("Publisher"), and its topic or name."""
-_Call: TypeAlias = tuple[str, tuple[Any, ...]]
+_Call: TypeAlias = tuple[str, tuple[object, ...]]
 """A method of the Master API, and its arguments after the caller's name."""
 
 
@@ -65,7 +65,7 @@ class Registrations:
         self,
         name: str,
         environment: Environment,
-        tables: Mapping[str, Mapping[str, Any]],
+        tables: Mapping[str, Mapping[str, _Part]],
         rpc: AsyncRpcClient,
         workers: Workers,
         watch_seconds: float,
@@ -121,14 +121,14 @@ class Registrations:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def call(self, method: str, *args: Any) -> Any:
+    async def call(self, method: str, *args: object) -> Any:
         """Call the master as the node and return the value of its answer.
 
         Raises MasterUnreachableError, or RpcRefused with the master's text.
         """
         return unwrap(method, await self._call_master(method, self._name, *args))
 
-    async def _call_master(self, method: str, *args: Any) -> Any:
+    async def _call_master(self, method: str, *args: object) -> Any:
         """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self._environment.master_uri
         # Of a node that closes _wait_for_answers() decides.
@@ -350,7 +350,7 @@ class Registrations:
         for start in range(0, len(calls), _CALLS_AT_ONCE):
             part = calls[start : start + _CALLS_AT_ONCE]
             batch = [{"methodName": method, "params": [self._name, *args]} for method, args in part]
-            answers: Any = None
+            answers: object = None
             if len(part) > 1:
                 with contextlib.suppress(RpcFault, RpcProtocolError):
                     answers = await self._call_master("system.multicall", batch)

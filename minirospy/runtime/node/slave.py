@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from minirospy import names
 from minirospy.graph.calls import (
@@ -59,7 +59,7 @@ class ServedNode(Protocol):
     def unix_name(self) -> str:
         """The name of its Unix socket."""
 
-    def parameter_changed(self, key: str, value: Any) -> None:
+    def parameter_changed(self, key: str, value: object) -> None:
         """Take the new value of a parameter."""
 
     def publishers_changed(self, topic: str, publishers: list[str]) -> object:
@@ -96,7 +96,7 @@ class SlaveApi:
             }
         )
 
-    def dispatch(self, method: str, args: Sequence[Any]) -> Any:
+    def dispatch(self, method: str, args: Sequence[object]) -> object:
         """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
         return self.dispatcher.dispatch(method, args)
 
@@ -122,7 +122,7 @@ class SlaveApi:
 
     def get_bus_info(self, caller_id: str) -> Answer:
         """One row a connection: [id, other end, direction, transport, topic, connected, what]."""
-        rows: list[list[Any]] = []
+        rows: list[list[object]] = []
         port = self._node.tcpros_port
         for publication in list(self._node.publications.values()):
             for out in publication.links:
@@ -160,7 +160,7 @@ class SlaveApi:
         rows = [[s.topic, s.type.name] for s in list(self._node.subscriptions.values())]
         return [SUCCESS, "subscriptions", rows]
 
-    def param_update(self, caller_id: str, key: str, value: Any) -> Answer:
+    def param_update(self, caller_id: str, key: str, value: object) -> Answer:
         """Accept a new value of a parameter that this node subscribed to."""
         self._node.parameter_changed(key, value)
         return [SUCCESS, "", 0]
@@ -170,7 +170,7 @@ class SlaveApi:
         self._node.publishers_changed(topic, publishers)
         return [SUCCESS, "", 0]
 
-    def request_topic(self, caller_id: str, topic: str, protocols: Any) -> Answer:
+    def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
         """Where a subscriber finds the topic, by the first protocol that both sides speak."""
         topic = names.resolve(topic, self._node.name)
         if topic not in self._node.publications:

@@ -56,7 +56,7 @@ class AsyncRpcClient:
         self.under_way: Deadlines[Call] = Deadlines(Call.end_late)
         self.closed = False
 
-    async def call(self, uri: str, method: str, *args: Any, timeout: float = 5.0) -> Any:
+    async def call(self, uri: str, method: str, *args: object, timeout: float = 5.0) -> Any:
         """Return the value that ``method`` at ``uri`` answers, within ``timeout`` seconds.
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError.

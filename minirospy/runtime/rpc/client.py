@@ -42,7 +42,7 @@ class RpcClient:
         self._same_host = same_host
         self._idle: deque[socket.socket] = deque()
 
-    def call(self, method: str, *args: Any) -> Any:
+    def call(self, method: str, *args: object) -> Any:
         """Return the value that ``method`` answers.
 
         Raises RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.

@@ -13,7 +13,7 @@ import socket
 from collections import deque
 from collections.abc import Awaitable, Generator, Sequence
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.steps import ALONE, Steps, is_small
@@ -332,7 +332,7 @@ class Connection:
         del call
         yield from self._serialize_in_steps(method, value, keep_alive)
 
-    def _serialize_in_steps(self, method: str, value: Any, keep_alive: bool) -> Steps[None]:
+    def _serialize_in_steps(self, method: str, value: object, keep_alive: bool) -> Steps[None]:
         """Answer with a value that may be long, or that steps return."""
         pieces: Sequence[bytes]
         try:
@@ -356,7 +356,7 @@ class Connection:
             self._send_pieces(pieces, keep_alive)
             self._go_on()
 
-    async def _answer_later(self, value: Awaitable[Any], keep_alive: bool) -> None:
+    async def _answer_later(self, value: Awaitable[object], keep_alive: bool) -> None:
         try:
             body = serialize_value(await value)
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server

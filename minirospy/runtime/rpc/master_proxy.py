@@ -26,7 +26,7 @@ class SystemState(NamedTuple):
 class BusConnection(NamedTuple):
     """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` where the node reports it."""
 
-    id: Any
+    id: object
     destination: str
     direction: str
     transport: str
@@ -35,7 +35,7 @@ class BusConnection(NamedTuple):
     info: str = ""
 
 
-def unwrap(method: str, answer: Any) -> Any:
+def unwrap(method: str, answer: object) -> Any:
     """Return the value of a ROS API answer. Raises RpcRefused where its status is not 1."""
     match answer:
         case [1, _, value]:
@@ -65,7 +65,7 @@ class MasterProxy:
         except RpcUnreachable as error:
             raise MasterUnreachableError(uri) from error
 
-    def call(self, method: str, *args: Any) -> Any:
+    def call(self, method: str, *args: object) -> Any:
         """Call any method of the API; the caller's id is put in front."""
         try:
             return unwrap(method, self._client.call(method, self.caller_id, *args))
@@ -140,7 +140,7 @@ class MasterProxy:
         """Return a parameter, or a dictionary of those below ``key``."""
         return self.call("getParam", key)
 
-    def set_param(self, key: str, value: Any) -> None:
+    def set_param(self, key: str, value: object) -> None:
         """Set a parameter; a dictionary replaces the namespace ``key``."""
         self.call("setParam", key, value)
 
@@ -180,7 +180,7 @@ class SlaveProxy:
         self.caller_id = caller_id
         self._client = RpcClient(uri, timeout, same_host=same_host)
 
-    def call(self, method: str, *args: Any) -> Any:
+    def call(self, method: str, *args: object) -> Any:
         """Call any method of the API; the caller's id is put in front."""
         return unwrap(method, self._client.call(method, self.caller_id, *args))
 
@@ -196,7 +196,7 @@ class SlaveProxy:
         """Return the node's connections."""
         return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
 
-    def get_bus_stats(self) -> list[Any]:
+    def get_bus_stats(self) -> list[object]:
         """Return statistics, as the node reports them."""
         return list(self.call("getBusStats"))
 
@@ -216,6 +216,6 @@ class SlaveProxy:
         """Return (topic, type) of what the node publishes."""
         return [(topic, type_) for topic, type_ in self.call("getPublications")]
 
-    def request_topic(self, topic: str, protocols: list[list[Any]]) -> list[Any]:
+    def request_topic(self, topic: str, protocols: list[list[object]]) -> list[object]:
         """Return where the topic is found, as [protocol, host, port]."""
         return list(self.call("requestTopic", topic, protocols))

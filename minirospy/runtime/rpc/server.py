@@ -17,7 +17,7 @@ import logging
 import socket
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from itertools import islice
 from typing import Any
 
@@ -49,7 +49,7 @@ _READ_SECONDS = 0.003
 """Connections in one turn of the loop, some 9 ms, and how long they are read from immediately."""
 
 
-Dispatch = Callable[[str, Sequence[Any]], Any]
+Dispatch = Callable[[str, list[Any]], object]
 """Method name and arguments in, value out, or an awaitable of it, or steps that return it; raises RpcFault."""
 
 

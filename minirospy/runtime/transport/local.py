@@ -11,7 +11,7 @@ import os
 import socket
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from minirospy.runtime.transport import sockets
 
@@ -83,7 +83,7 @@ def reach(host: str, port: int) -> socket.socket | None:
     return sock
 
 
-def parse_answer(answer: Any) -> UnixAddress | None:
+def parse_answer(answer: object) -> UnixAddress | None:
     """Return the address out of a publisher's answer to requestTopic; None where it is of another protocol."""
     match answer:
         # A peer must not choose any other socket of this machine, such as a display's or a message bus's.

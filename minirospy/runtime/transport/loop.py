@@ -8,7 +8,7 @@ import contextlib
 import functools
 import threading
 from collections.abc import Callable, Coroutine
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from minirospy.runtime.transport.limits import naming_thread_limit
 
@@ -42,7 +42,7 @@ class LoopThread:
             self.loop.close()
             raise
 
-    def run(self, coroutine: Coroutine[Any, Any, _T], timeout: float | None = None) -> _T:
+    def run(self, coroutine: Coroutine[object, object, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.
 
         Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
@@ -50,7 +50,7 @@ class LoopThread:
         """
         return self.begin(coroutine)(timeout)
 
-    def begin(self, coroutine: Coroutine[Any, Any, _T]) -> Callable[[float | None], _T]:
+    def begin(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
         """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls; return the function that waits."""
         if threading.current_thread() is self._thread:
             coroutine.close()
