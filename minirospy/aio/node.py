@@ -80,6 +80,7 @@ class Node:
             raise ValueError("name must not be empty")
         if "/" in name:
             raise ValueError("namespaces are not allowed in node names: give namespace=")
+
         self._arguments = names.parse_arguments(argv)
         special = self._arguments.special
         self._environment = Environment.read(
@@ -87,10 +88,12 @@ class Node:
             host=special.get("__hostname") or special.get("__ip") or host,
             namespace=special.get("__ns") or namespace,
         )
+
         name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
         """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+
         self._remappings = self._arguments.resolved_remappings(self.name)
         self._rosout = rosout
         self._handlers: list[logging.Handler] = []
@@ -487,6 +490,8 @@ class Node:
             else:
                 client.close()
                 return
+
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._stopping.wait(), _POLL_SECONDS)
+
         raise ROSInterruptException("rospy shutdown")

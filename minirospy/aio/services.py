@@ -76,6 +76,7 @@ class ServiceProxy(Generic[_Response_co]):
                 return await self._exchange(client, request)
             finally:
                 client.close()
+
         async with self._lock:
             if self._client and self._client.has_ended():
                 self.close()
@@ -92,6 +93,7 @@ class ServiceProxy(Generic[_Response_co]):
                 # Cancelled in the middle, the answer would be taken for that of the next call.
                 if not keeping:
                     self.close()
+
         return response
 
     def close(self) -> None:
@@ -108,6 +110,7 @@ class ServiceProxy(Generic[_Response_co]):
             raise ServiceException(f"service [{self.name}] unavailable") from None
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
+
         try:
             return await AsyncServiceClient.connect(
                 uri,
@@ -156,12 +159,14 @@ class Service(Handle):
         self._request_class = service_class._request_class
         self._response_class = service_class._response_class
         self._handler = handler
+
         runtime = node._node
         is_async = inspect.iscoroutinefunction(handler) or inspect.iscoroutinefunction(
             getattr(handler, "__call__", None)  # noqa: B004 - an object whose __call__ is a coroutine function
         )
         type_ = InterfaceType.of(service_class)
         types = {"request_type": self._request_class._type, "response_type": self._response_class._type}
+
         self._server: ServiceServer
         if is_async:
             self._server = LoopServiceServer(
@@ -169,6 +174,7 @@ class Service(Handle):
             )
         else:
             self._server = runtime.make_service(name, type_, self._handle_in_worker, **types)
+
         node._served.add(name)
         self._registration = node._spawn(
             registered(runtime.serve, self._server, f"service [{name}]", node.log)

@@ -100,6 +100,7 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
     command = [sys.executable, "-m", "minirospy.cli.ros.roslaunch", "rpi_feros_bringup", "rpi_led.launch"]
     windows = sys.platform == "win32"
     flags = subprocess.CREATE_NEW_PROCESS_GROUP if windows else 0  # type: ignore[attr-defined,unused-ignore]
+
     with log.open("wb") as output:
         launch = subprocess.Popen(
             command,

@@ -45,6 +45,7 @@ def _parser(name: str) -> Parser:
         "roswtf [launch file]" if is_roswtf else "",
         about=_ABOUT_ROSWTF if is_roswtf else "",
     )
+
     parser.add_argument(
         "others",
         nargs="*",
@@ -52,6 +53,7 @@ def _parser(name: str) -> Parser:
         help="another machine to try too, by its name or address; a launch file to check too (with arg:=value)",
         completer="launch_files",
     )
+
     # Options of ROS's roswtf that have no effect here.
     parser.accept(
         "--all", help="run roswtf against all packages" if is_roswtf else "accepted, without effect"
@@ -62,6 +64,7 @@ def _parser(name: str) -> Parser:
         action="store_true",
         help="only run offline tests" if is_roswtf else "only what needs no network",
     )
+
     add_own = parser.own_options().add_argument if is_roswtf else parser.add_argument
     add_own(
         "--listen", action="store_true", help="then wait for the doctors of other machines, and connect back"

@@ -101,6 +101,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(prog, description=description, **{"formatter_class": _Help, **kwargs})
         if ros_argparse:
             self.usage = ros_usage
+
         self.ros_usage = ros_usage
         self._missing = missing
         self._surplus = surplus

@@ -235,6 +235,7 @@ class RosStreamHandler(_DeferringHandler):
         line = _line(record)
         is_fine = record.levelno < logging.WARNING
         stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
+
         try:
             colour = _COLOUR.get(record.levelno) if self._colorize else None
             if colour and stream.isatty():
@@ -275,6 +276,7 @@ class RosOutHandler(_DeferringHandler):
         node = session.node
         if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
             return
+
         self._busy.yes = True
         try:
             message = self._publisher.data_class()

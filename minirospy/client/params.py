@@ -68,6 +68,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():
         return get_param(param_name, default)
+
     try:
         value = cache.get(name)
     except LookupError:
@@ -78,6 +79,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
         value = _get(name)
         with current_session().lock:
             cache.store(name, value, changes)
+
     if value is not NOT_SET:
         return _as_rospy(copy.deepcopy(value))
     if default is UNSPECIFIED:
@@ -215,6 +217,7 @@ def _check_sendable(value: object) -> None:
     """Raise what rospy raises on a value for which XML-RPC has no type."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
+
     if isinstance(value, int):
         if not -(2**31) <= value < 2**31:
             raise OverflowError("int exceeds XML-RPC limits")

@@ -79,6 +79,7 @@ class Publisher(Topic[_M_co]):
                 SyntaxWarning,
                 stacklevel=2,
             )
+
         size = _checked_size(queue_size)
         fields = dict(headers or {})
         with self._session.lock:
@@ -88,6 +89,7 @@ class Publisher(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, subscriber_listener, size, latch, fields, tcp_nodelay)
+
         self.impl = state
         self._session.when_ready(state.register)
 
@@ -159,9 +161,11 @@ class PublishedTopic(SharedTopic):
                 self.type,
                 handle.type,
             )
+
         self._handles.add(handle)
         if listener:
             self.add_subscriber_listener(listener)
+
         publication.queue_size = queue_size
         publication.latch = publication.latch or latch
         publication.tcp_nodelay = publication.tcp_nodelay or tcp_nodelay

@@ -71,6 +71,7 @@ class Service(Generic[_S_co]):
         if not name or not isinstance(name, str):
             raise ValueError("service name is not a non-empty string")
         warn_of_illegal_name(name)
+
         self._session = current_session()
         self.resolved_name = self._session.resolve(name)
         self.service_class = service_class
@@ -84,6 +85,7 @@ class Service(Generic[_S_co]):
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
+
         with self._session.lock:
             if self._session.offered.setdefault(self.resolved_name, self) is not self:
                 raise ServiceException(f"service [{self.resolved_name}] already registered")
@@ -187,6 +189,7 @@ class ServiceProxy(Generic[_S_co]):
         self.persistent = persistent
         self.uri: str | None = None
         """Where the service was found last, ``rosrpc://host:port``."""
+
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
@@ -315,6 +318,7 @@ class ServiceProxy(Generic[_S_co]):
                 client.close()
                 if self._client is client:
                     self._client = None
+
         response: Message = self.response_class()
         try:
             response.deserialize(memoryview(body) if self._takes_memoryview else body)
@@ -323,6 +327,7 @@ class ServiceProxy(Generic[_S_co]):
                 f"transport error completing service call: receive_once[{self.resolved_name}]: "
                 f"DeserializationError cannot deserialize: {error}"
             ) from error
+
         response._connection_header = client.header
         return response
 

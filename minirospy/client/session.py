@@ -50,6 +50,7 @@ class Session:
             is_down=is_fork and previous is not None and previous.is_shutdown(),
         )
         self.signals = SignalWatchdog(self.lifecycle, self._is_sending)
+
         self.lock = threading.RLock()
         """Orders registrations, and guards the tables."""
         self.clock: Clock = previous.clock if previous else WallClock()
@@ -57,6 +58,7 @@ class Session:
         """Notified of each simulated time."""
         self.has_time: bool = bool(previous and previous.has_time)
         """Whether the time is available: from init_node on, or once a program without a node has set it."""
+
         self.published: dict[str, PublishedTopic] = {}
         self.subscribed: dict[str, SubscribedTopic] = {}
         self.offered: dict[str, Service[object]] = {}
@@ -71,6 +73,7 @@ class Session:
         """What init_node was called with; None before."""
         self.node: Node | None = None
         """The node, once init_node is done."""
+
         self._opened: Node | None = None
         self._loop: LoopThread | None = None
         self._master: MasterProxy | None = None

@@ -151,6 +151,7 @@ def _wait_for_master(session: Session) -> None:
     """Wait until the master answers, and print once that it does not. Raises ROSInterruptException at a shutdown."""
     uri = session.identity.environment.master_uri
     is_reported = False
+
     while not session.lifecycle.is_shutdown_requested:
         try:
             session.master.get_pid()
@@ -171,6 +172,7 @@ def _wait_for_master(session: Session) -> None:
             raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:
             return
+
     raise session.lifecycle.interrupted(f"shut down while waiting for the master at {uri}")
 
 

@@ -104,11 +104,13 @@ class TopicStatisticsCounter:
         if window is None or now < window.start:
             # The first, or simulated time that jumped back.
             window = self._windows[publisher] = _Window(now)
+
         window.delivered += 1
         window.traffic += size + 4
         if window.last_arrival:
             window.periods.append((now - window.last_arrival) / 1e9)
         window.last_arrival = now
+
         if message._has_header:
             sequence, stamp = message.header.seq, message.header.stamp.to_nsec()
             if window.last_sequence is not None:
@@ -117,6 +119,7 @@ class TopicStatisticsCounter:
             # A stamp of zero is none.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
+
         if now - window.start < window.seconds * 1e9:
             return None
         return self._end(publisher, window, now)
@@ -132,11 +135,13 @@ class TopicStatisticsCounter:
             Spread.of(window.periods),
             Spread.of(window.ages),
         )
+
         limits, seconds = self._limits, window.seconds
         if window.delivered > limits.max_elements and seconds / 2 >= limits.min_size:
             seconds /= 2
         elif window.delivered < limits.min_elements and seconds * 2 <= limits.max_size:
             seconds *= 2
+
         self._windows[publisher] = _Window(
             now, seconds, last_arrival=window.last_arrival, last_sequence=window.last_sequence
         )

@@ -60,6 +60,7 @@ class Subscriber(Topic[_M_co]):
         super().__init__(name, data_class, "sub")
         self.callback = callback
         self.callback_args = callback_args
+
         if queue_size is not None:
             if not isinstance(queue_size, int):
                 raise ROSException("queue size must be an integer")
@@ -70,6 +71,7 @@ class Subscriber(Topic[_M_co]):
         if buff_size <= 0:
             raise ROSException("buffer size must be a positive integer")
         self._newest = max(0, queue_size or 0)
+
         with self._session.lock:
             state = self._session.subscribed.get(self.resolved_name)
             if state is None:
@@ -80,11 +82,13 @@ class Subscriber(Topic[_M_co]):
             # Looked up after joining: of a link that is made meanwhile, the message may come twice, but is not lost.
             links = state.links
         self.impl = state
+
         try:
             self._session.when_ready(state.register)
         except ThreadLimitError:
             self.unregister()
             raise
+
         if callback is not None:
             state.replay(data_class, _Callback(callback, callback_args), links)
 
@@ -229,6 +233,7 @@ class SubscribedTopic(SharedTopic):
                 tcp_nodelay=self._tcp_nodelay,
             )
             wait = self._session.begin(node.subscribe(self.subscription))
+
         try:
             if self.resolved_name not in _WITHOUT_STATISTICS:
                 node.workers.start(self._look_for_statistics)
@@ -301,6 +306,7 @@ class SubscribedTopic(SharedTopic):
                     error,
                 )
                 continue
+
             message._connection_header = header
             if statistics:
                 statistics.count(message, header, len(frame))

@@ -214,16 +214,19 @@ class Timer(threading.Thread):
         last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
+
         with current_session().lifecycle.interrupting(self._ended.set):
             while not self._is_over():
                 rate._sleep(self._ended)
                 if self._is_over():
                     return
+
                 real = get_rostime()
                 start = time.perf_counter()
                 self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
                 if self._oneshot:
                     return
+
                 last_duration = time.perf_counter() - start
                 last_expected, last_real = expected, real
                 expected = expected + self._period

@@ -89,14 +89,17 @@ class Dispatcher:
         method = self.methods.get(name)
         if method is None:
             return self._dispatch_system(name, args)
+
         if not args:
             return [ERROR, "missing required caller_id parameter", method.refused]
         most = len(method.parameters) + 1
         if not most - method.optional <= len(args) <= most:
             return [ERROR, "Error: bad call arity", method.refused]
+
         caller_id = args[0]
         if not isinstance(caller_id, str):
             return [ERROR, "caller_id must be a string", method.refused]
+
         try:
             if len(caller_id) > _MAX_CHARACTERS:
                 raise CallRefused(f"the caller_id has more than {_MAX_CHARACTERS} characters")

@@ -66,9 +66,11 @@ class MasterApi(ABC):
         """Receives each change, as it is written to the journal."""
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal, and returns the number that a change refers to it by."""
+
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)
         key = parameters(key=parameter_key)
+
         self.dispatcher = Dispatcher(
             {
                 "getPid": Method(self.get_pid, -1),

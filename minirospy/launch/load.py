@@ -104,6 +104,7 @@ def load_sources(
     anonymous: dict[str, str] = {}
     used: set[str] = set()
     environ = os.environ if environ is None else environ
+
     for file, text, args in sources:
         substitution = Substitution(packages, environ, file, dict(args), anonymous, used)
         reader = _File(spec, substitution, _Args(dict(args)), 0, problems)
@@ -111,9 +112,11 @@ def load_sources(
             reader.read(_read(file) if text is None else text, _Scope())
         except LaunchError as error:
             reader.report(error)
+
     for name in used:
         # An arg that is used is known, though no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
+
     _check_names(spec, problems)
     return spec
 
@@ -260,6 +263,7 @@ class _File:
         self._args = args
         self._depth = depth
         self._problems = problems
+
         self._tags: dict[str, Callable[[Tag, _Scope], _Scope]] = {
             "arg": self._arg,
             "param": self._param,

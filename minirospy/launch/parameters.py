@@ -59,6 +59,7 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
     if tag.flag("subst_value"):
         text = tag.resolve(text)
     where = file or "the text"
+
     try:
         value = parse_value(text) if text.strip() else None
         if value is None:
@@ -70,6 +71,7 @@ def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str,
     except ValueTextError as error:
         why = error.why if len(text) > 60 or file else str(error)
         raise tag.error(f"<rosparam> {where}: {why}") from None
+
     for single, single_value in flatten(name, value):
         yield names.canonicalize(single), single_value
 

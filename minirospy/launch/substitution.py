@@ -107,6 +107,7 @@ class Substitution:
         """Return the text of a Python expression's value. It may do what Python may, as a ``<param command=...>`` does anyway."""
         if "__" in expression:
             raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
+
         functions: dict[str, object] = {
             "arg": lambda name: convert(self._arg(name), "auto"),
             "env": self._env,
@@ -117,6 +118,7 @@ class Substitution:
             "true": True,
             "false": False,
         }
+
         scope = _Names(self, {**vars(builtins), **vars(math), **functions})
         try:
             return str(eval(expression.strip(), {"__builtins__": {}}, scope))

@@ -77,8 +77,10 @@ class Supervisor:
         self._files = files
         self._is_remote_running = is_remote_running
         self._clock = clock
+
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         self._restarts: list[tuple[float, Process]] = []
+
         self.processes: list[Process] = []
         """The nodes that were started and are watched, those that wait to be started again included."""
         self.master: Process | None = None

@@ -176,11 +176,13 @@ class Recorder:
         file, least, text = self._file, self.options.min_space, self.options.min_space_text
         if not file:
             return False
+
         try:
             free = shutil.disk_usage(Path(file.active_name).absolute().parent).free
         except OSError as error:
             client.logwarn("Failed to check filesystem stats [%s].", error.strerror)
             return True
+
         if free < least:
             client.logerr(
                 "Less than %s of space free on disk with %s. Disabling recording.", text, file.active_name
@@ -188,6 +190,7 @@ class Recorder:
             self.status = 1
             self._stop.set()
             return False
+
         if free < 5 * least:
             client.logwarn("Less than 5 x %s of space free on disk with '%s'.", text, file.active_name)
         return True
@@ -214,8 +217,10 @@ class Recorder:
         self._stop.set()
         # What this thread does from now on is its clean-up: a shutdown does not interrupt it.
         client.is_shutdown()
+
         with self._lock:
             self._close()
+
         closing = self._disk.close
         while True:
             try:
@@ -224,6 +229,7 @@ class Recorder:
             except KeyboardInterrupt:
                 client.logwarn("%d MB are still to be written", self._disk.pending // 10**6)
                 closing = self._disk.join
+
         if self._executor:
             self._executor.shutdown()
         self._report_drops()

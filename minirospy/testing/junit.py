@@ -231,6 +231,7 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
     counts = [int(suite.get(key, "0")) for key in ("errors", "failures", "tests")]
     result = Result(test_name, *counts)
     result.time = float(suite.get("time", "0"))
+
     for element in suite.iter("testcase"):
         case = TestCaseResult(f"{prefix}/{element.get('name')}")
         case.classname = element.get("classname") or ""
@@ -244,6 +245,7 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
             elif child.tag == "skipped":
                 case.skipped = child.get("message") or ""
         result.add_test_case_result(case)
+
     result.system_out = suite.findtext("system-out") or ""
     result.system_err = suite.findtext("system-err") or ""
     return result

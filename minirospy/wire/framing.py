@@ -90,6 +90,7 @@ class Pieces(list[Any]):
                 return frame
             # The len() of an array is not in bytes.
             return serialize_frame(frame[4:])
+
         joined: list[bytes] = []
         small: list[bytes] = []
         for piece in self:
@@ -100,6 +101,7 @@ class Pieces(list[Any]):
             else:
                 joined += [b"".join(small), whole] if small else [whole]
                 small = []
+
         if small:
             joined.append(b"".join(small))
         return LargeFrame(tuple(joined), sum(map(len, joined)))
@@ -206,9 +208,11 @@ class FrameReader:
                 frame, self._large = memoryview(self._large), None
                 yield frame
             return
+
         self._end += count
         small, unpack, end = self._small, _LENGTH.unpack_from, self._end
         at = self._start
+
         while end - at >= 4:
             (length,) = unpack(small, at)
             stop = at + 4 + length
@@ -224,6 +228,7 @@ class FrameReader:
             self._start = stop
             yield small[at + 4 : stop]
             at = stop
+
         if at == end:
             self._start = self._end = 0
 

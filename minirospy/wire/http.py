@@ -222,6 +222,7 @@ class HttpReader:
                     pass
                 self._chunked = None
                 return body
+
             # As it comes: to move a long chunk when it is whole would take long.
             while left:
                 if not self._buffer:
@@ -348,6 +349,7 @@ def _read_head(data: bytes) -> HttpHead:
     start, *lines = data.decode("latin-1").replace("\r\n", "\n").split("\n")
     if not _is_start_line(start):
         raise RpcProtocolError(f"not HTTP: {start[:60]!r}")
+
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
@@ -358,6 +360,7 @@ def _read_head(data: bytes) -> HttpHead:
         if name == "content-length" and headers.get(name, value) != value:
             raise RpcProtocolError("two Content-Lengths")
         headers[name] = value
+
     connection = headers.get("connection", "").lower()
     keep_alive = "keep-alive" in connection if "HTTP/1.0" in start else "close" not in connection
     length = headers.get("content-length")

@@ -66,6 +66,7 @@ def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
     else:
         packer.pack(value)
         return
+
     for number, item in enumerate(items):
         if type(item) in (list, dict, str, bytes):
             yield from _pack_in_steps(item, packer)

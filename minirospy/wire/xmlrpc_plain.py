@@ -53,10 +53,12 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
     if tokens and tokens[-1][4] not in {"", "</param>"}:
         # The token of what was not expected is always the last one.
         return None
+
     params: list[Any] = []
     add: Callable[[Any], None] = params.append
     # What is open: the first letters of its end, how the values around it are added, and what it holds.
     opened: list[tuple[str, Callable[[Any], None], Any]] = []
+
     for text, param_text, bare, param_bare, other in tokens:
         if not other:
             add(text or param_text or bare or param_bare)
@@ -93,6 +95,7 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
             opened.append(("</pa", add, None))
         else:
             return None
+
     return None if opened else params
 
 
@@ -129,6 +132,7 @@ def _patterns() -> _Patterns:
         # Text in an unexpected place, and all after it, is an unknown token.
         "(?s:.+)",
     )
+
     return _Patterns(
         re.compile(rf"(?:{declaration})?{_SPACE}<method(?:{call}|Response>){_SPACE}<params>{_SPACE}"),
         re.compile(rf"</params>{_SPACE}</method(?:(Call)|Response)>{_SPACE}"),

@@ -146,10 +146,12 @@ class Reader:
         self._left -= 1
         if self._left < 0:
             raise RpcProtocolError(f"more than {_MAX_ELEMENTS} elements")
+
         if not self.root:
             self.root = tag
         self._tag = tag
         self._clear_text()
+
         if tag == "value":
             self._values.append([])
         elif tag == "array":

@@ -338,10 +338,12 @@ class _Builder:
                     f"generate_messages(DEPENDENCIES {name}): no such package"
                     + did_you_mean(name, sorted(self._folders), 1),
                 )
+
         allowed = {plan.name, *self._closure(plan.message_depends)}
         for file in plan.definitions:
             for spec in self._specs(plan, file):
                 self._check_fields(plan, file, spec, allowed)
+
         named = set(plan.manifest.depends())
         return tuple(
             f"{plan.manifest.path}: messages of [{plan.name}] contain types of [{name}]: add <depend>{name}</depend>"

@@ -330,10 +330,12 @@ class _Collector:
         """Check that package.xml names what is passed on to other packages, for the build and for the run."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
+
         given = keyword_arguments(command.arguments, _PACKAGE_WORDS)
         found = {name for name, _ in self._needs}
         building = self._manifest.depends(Kind.BUILD, Kind.BUILDTOOL)
         running = self._manifest.depends(Kind.EXEC, Kind.BUILD_EXPORT)
+
         for name in given.get("CATKIN_DEPENDS", []):
             if name in found and name not in building:
                 missing = "depend" if name not in running else "build_depend"

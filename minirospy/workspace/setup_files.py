@@ -224,6 +224,7 @@ def _fish(setup: SetUp) -> str:
     chain = "\n".join(
         f"    _minirospy_workspace {_fish_quoted(parent)} put" for parent in reversed(setup.parents)
     )
+
     return (
         _HEAD
         + "set -l _minirospy_prefix (builtin realpath (dirname (status filename)))\n"

@@ -67,6 +67,7 @@ def create_parser(command: str) -> Parser:
     """Return the parser of catkin_create_pkg, or of `catkin create pkg`."""
     parser = Parser(command, "Create a new catkin package in the current folder.")
     add = parser.add_argument
+
     add("name", help="its name: lower-case letters, digits, underscores", completer="nothing")
     add(
         "dependencies",
@@ -75,6 +76,7 @@ def create_parser(command: str) -> Parser:
         help="packages that it needs, such as rospy std_msgs",
         completer="package_names",
     )
+
     add("--catkin-deps", nargs="+", default=[], help="more of them", completer="package_names")
     add("--meta", action="store_true", help="a metapackage: it only names others")
     add("-V", "--pkg_version", default="0.0.0", help="default: 0.0.0", completer="nothing")
@@ -82,6 +84,7 @@ def create_parser(command: str) -> Parser:
     add("-l", "--license", action="append", help="BSD, MIT, ...", completer="nothing")
     add("-a", "--author", action="append", help='as in "Jane Doe <jane@example.com>"', completer="nothing")
     add("-m", "--maintainer", action="append", help="as --author", completer="nothing")
+
     parser.accept("-s", "--sys-deps", nargs="*", help="accepted: libraries for CMake")
     parser.accept("-b", "--boost-comps", nargs="*", help="accepted: parts of boost")
     parser.accept("--rosdistro", nargs=None, help="accepted")

@@ -58,6 +58,7 @@ def _parser(command: str, suffix: str) -> Parser:
         f"Build a workspace: generate its messages, and devel{suffix}/setup.bash to source. "
         "Run it in the folder above src.",
     )
+
     add = parser.add_argument
     add(
         "targets",
@@ -74,6 +75,7 @@ def _parser(command: str, suffix: str) -> Parser:
         help="the workspace (default: here)",
         completer="folders",
     )
+
     add("--source", default="src", help="the folder of packages (default: src)", completer="folders")
     for option, name in (("--build", "build"), ("--devel", "devel"), ("--install-space", "install")):
         add(
@@ -82,6 +84,7 @@ def _parser(command: str, suffix: str) -> Parser:
             help=f"the folder {name}{suffix} by another name",
             completer="folders",
         )
+
     add("--install", action="store_true", help="install what was built")
     add("--pkg", nargs="+", metavar="PKG", help="build these packages only", completer="package_names")
     add(
@@ -92,6 +95,7 @@ def _parser(command: str, suffix: str) -> Parser:
         completer="package_names",
     )
     add("--force-cmake", action="store_true", help="make everything again")
+
     for flags in (("--no-color",), ("--merge",), ("-v", "--verbose"), ("-k", "--keep-going")):
         parser.accept(*flags, help="accepted for compatibility, without effect")
     parser.accept("--override-build-tool-check", help="accepted")

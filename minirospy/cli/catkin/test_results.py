@@ -100,6 +100,7 @@ def _results(test_results_dir: Path, all: bool, verbose: bool) -> int:
     folder = test_results_dir
     if not folder.is_dir():
         raise MinirospyError(f'Test results directory "{folder}" does not exist')
+
     found = [(file, file.relative_to(folder), counts) for file, counts in results_below(folder)]
     total = Counts()
     for file, name, counts in found:
@@ -110,11 +111,13 @@ def _results(test_results_dir: Path, all: bool, verbose: bool) -> int:
                 print(f"Full test results for '{name}'\n{_LINE}\n{text}\n{_LINE}")
         elif all:
             print(f'Skipping "{name}": {counts}')
+
     for _, name, counts in found:
         if isinstance(counts, Counts) and (counts.is_bad or counts.skipped):
             print(f"{name}: {counts}")
         elif isinstance(counts, Counts) and all:
             print(f"{name}: {counts.tests} tests")
+
     print(f"Summary: {total}")
     return int(total.is_bad)
 

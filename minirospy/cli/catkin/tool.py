@@ -205,6 +205,7 @@ def _config_parser() -> Parser:
         "Show where a workspace's folders are; set what `catkin build` does.",
         takes_cmake_words=True,
     )
+
     add = parser.add_argument
     add("--install", action=argparse.BooleanOptionalAction, help="build also installs")
     for name, alias in (("blacklist", "skiplist"), ("whitelist", "buildlist")):
@@ -224,6 +225,7 @@ def _config_parser() -> Parser:
             const=[],
             help=f"no {name}",
         )
+
     add(
         "--cmake-args",
         nargs="*",
@@ -237,6 +239,7 @@ def _config_parser() -> Parser:
         const=[],
         help="nothing of the kind",
     )
+
     for flag in ("--init", "--merge-devel", "--link-devel", "--merge-install"):
         parser.accept(flag, help="accepted")
     parser.accept("--extend", nargs=None, help="accepted: what is sourced is what is extended")

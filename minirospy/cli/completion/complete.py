@@ -176,6 +176,7 @@ def _unquoted(word: str) -> _Word:
         variable = _VARIABLE.match(word, read) if quote != "'" else None
         value = os.environ.get(variable[1] or variable[2]) if variable else None
         read += 1
+
         if letter == "\\" and quote != "'":
             text += word[read : read + 1]
             read += 1
@@ -188,6 +189,7 @@ def _unquoted(word: str) -> _Word:
             quote, at = letter, len(text)
         else:
             text += letter
+
     return _Word(text, quote, at)
 
 

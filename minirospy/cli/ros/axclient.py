@@ -47,6 +47,7 @@ def _parser() -> Parser:
         description="Send a goal to an action server: prompt for each field, show the feedback, print the result. "
         "Ctrl-C cancels the goal.",
     )
+
     parser.add_argument("action", help="the server's name, as /run_led", completer="nothing")
     parser.add_argument(
         "type",

@@ -71,12 +71,14 @@ def _answer(server: SimpleActionServer) -> bool:
         "a": server.set_aborted,
         "p": server.set_preempted,
     }
+
     while True:
         try:
             choice = input(_CHOICES).strip().lower()[:1]
         except EOFError:
             server.set_aborted(text="the person who answered has left")
             return False
+
         if choice == "f":
             server.publish_feedback(ask_for(types.ActionFeedback().feedback, read_answer, _complain))
         elif choice in endings:

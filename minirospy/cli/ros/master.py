@@ -86,9 +86,11 @@ def _parser(name: str) -> Parser:
         about="roscore will start up a ROS Master, a ROS Parameter Server and a rosout logging node",
         ros_epilog="See http://wiki.ros.org/roscore",
     )
+
     add = parser.add_argument
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
+
     # One loop serves every client, in one process.
     parser.accept(
         "-w",
@@ -111,6 +113,7 @@ def _parser(name: str) -> Parser:
         metavar="MASTER_LOGGER_LEVEL",
         help="set rosmaster.master logger level ('debug', 'info', 'warn', 'error', 'fatal')",
     )
+
     parser.accept(
         "--sigint-timeout",
         nargs=None,
@@ -125,6 +128,7 @@ def _parser(name: str) -> Parser:
         metavar="SIGTERM_TIMEOUT",
         help="the SIGTERM timeout used when killing core if SIGINT does not stop the core (in seconds).",
     )
+
     _add_own_options(parser)
     return parser
 
@@ -142,6 +146,7 @@ def _add_own_options(parser: Parser) -> None:
         help="only these may connect, as 192.168.65.0/24 (again for more; default: MINIROSPY_ALLOW, else all)",
     )
     attach_completer(allow, "nothing")
+
     add(
         "--local",
         action="store_true",
@@ -154,6 +159,7 @@ def _add_own_options(parser: Parser) -> None:
     )
     add("--fresh", action="store_true", help="start empty: ignore the journal of a master that was killed")
     add("--no-rosout", action="store_true", help="without the /rosout node, as rosmaster")
+
     parser.accept("--core", group=parser.own_options())
 
 

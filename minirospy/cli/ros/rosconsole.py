@@ -76,6 +76,7 @@ def _set(node: str, logger: str, level: str, arguments: Arguments | None = None)
 
 def _echo_parser() -> Parser:
     parser = Parser("rosconsole echo", "Print what nodes log, until Ctrl-C.")
+
     parser.add_argument(
         "filter",
         metavar="FILTER",
@@ -92,6 +93,7 @@ def _echo_parser() -> Parser:
         default="warn",
         help="only what has at least this level (default: warn)",
     )
+
     parser.add_argument("-1", "--once", action="store_true", help="exit after the first line")
     parser.add_argument(
         "--topic", default="/rosout", help="listen to this topic (default: /rosout)", completer="topics"

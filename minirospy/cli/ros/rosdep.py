@@ -57,6 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser(verb: str, description: str) -> Parser:
     parser = Parser(f"rosdep {verb}", description)
+
     add = parser.add_argument
     add(
         "packages",
@@ -65,6 +66,7 @@ def _parser(verb: str, description: str) -> Parser:
         help="packages (without: those of --from-paths)",
         completer="package_names",
     )
+
     add(
         "--from-paths",
         nargs="+",
@@ -76,6 +78,7 @@ def _parser(verb: str, description: str) -> Parser:
     add("--skip-keys", action="append", default=[], help="keys to leave out", completer="nothing")
     add("-a", "--all", action="store_true", help="all packages that rospack finds")
     add("-r", dest="tolerant", action="store_true", help="what is missing is not an error")
+
     for flags in (
         ("-i", "--ignore-src", "--ignore-packages-from-source"),
         ("-y", "--default-yes"),

@@ -197,6 +197,7 @@ def _parser() -> Parser:
         "Runs the nodes of launch files, and a master where there is none. Ctrl-C stops them all.",
         _USAGE,
     )
+
     add = parser.add_argument
     add("what", nargs="*", help=argparse.SUPPRESS, completer="launch_words")
     add(
@@ -211,6 +212,7 @@ def _parser() -> Parser:
         help="Print command-line arguments for node",
         completer="launch_nodes",
     )
+
     add("--nodes", action="store_true", help="Print list of node names in launch file")
     add(
         "--find-node",
@@ -225,6 +227,7 @@ def _parser() -> Parser:
         help="Run as child service 'NAME'. Required with -u",
         completer="nothing",
     )
+
     add("--local", action="store_true", help="Do not launch remote nodes")
     add("--screen", action="store_true", help="Force output of all local nodes to screen")
     add("--required", action="store_true", help="Force all nodes to be required")
@@ -241,6 +244,7 @@ def _parser() -> Parser:
     add("--skip-log-check", action="store_true", help="skip check size of log folder")
     add("--ros-args", action="store_true", help="Display command-line arguments for this launch file")
     add("--disable-title", action="store_true", help="Disable setting of terminal title")
+
     parser.accept(
         "-w",
         "--numworkers",
@@ -249,6 +253,7 @@ def _parser() -> Parser:
         metavar="NUM_WORKERS",
         help="override number of worker threads. Only valid for core services.",
     )
+
     add(
         "-t",
         "--timeout",
@@ -261,6 +266,7 @@ def _parser() -> Parser:
         metavar="MASTER_LOGGER_LEVEL",
         help="set rosmaster.master logger level ('debug', 'info', 'warn', 'error', 'fatal')",
     )
+
     add(
         "--sigint-timeout",
         type=_seconds,
@@ -273,6 +279,7 @@ def _parser() -> Parser:
         default=2.0,
         help="the SIGTERM timeout used when killing nodes if SIGINT does not stop the node (in seconds).",
     )
+
     _add_own_options(parser)
     return parser
 

@@ -33,12 +33,14 @@ def _parser() -> Parser:
         usage="roslaunch-check [options] FILE|FOLDER [VARIABLE=value ...]",
         description="Loads launch files without running them; status 1 where one has a fault.",
     )
+
     parser.add_argument(
         "path", type=Path, help="a launch file, or a folder of them", completer="launch_files"
     )
     parser.add_argument(
         "variables", nargs="*", help="VARIABLE=value: put into the environment", completer="nothing"
     )
+
     parser.add_argument(
         "-o",
         "--output-file",
@@ -47,6 +49,7 @@ def _parser() -> Parser:
         help="write the result there, as JUnit XML",
         completer="files",
     )
+
     parser.accept("-t", "--use-test-depends")
     parser.add_argument(
         "-i", "--ignore-unset-args", action="store_true", help="accept arguments without a default"

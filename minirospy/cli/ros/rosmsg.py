@@ -180,6 +180,7 @@ def _family(command: str, kind: Kind) -> Family:
     verbs = _Verbs(command, kind)
     word = kind.word
     unknown_type = {f"{word} type": RosText("Cannot locate [{name}]")}
+
     return Family(
         command,
         f"{command} is a command-line tool for displaying information about ROS {word.capitalize()} types.",

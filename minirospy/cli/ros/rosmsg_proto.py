@@ -26,6 +26,7 @@ def _parser() -> Parser:
     parser = Parser("rosmsg-proto", "Print a message or request of default values as YAML.", intermixed=True)
     parser.add_argument("mode", nargs="?", help="msg or srv", completer="kinds")
     parser.add_argument("type", nargs="?", help="pkg/Name, or the Name alone", completer="prototype_types")
+
     parser.add_argument("-f", "--flow_style", choices=("0", "1"), help="1: brackets everywhere; 0: nowhere")
     parser.add_argument("-s", "--silent", action="store_true", help="print no errors")
     parser.add_argument(
@@ -35,6 +36,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "-e", "--empty-arrays", action="store_true", help="arrays of no fixed length are empty"
     )
+
     parser.add_argument(
         "-x",
         "--exclude-slots",

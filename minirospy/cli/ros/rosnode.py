@@ -332,9 +332,11 @@ def _cleanup() -> int:
         )
         if not silent:
             return 0
+
         print("Unable to contact the following nodes:\n" + "\n".join(f" * {node.name}" for node in silent))
         print("Warning: these might include alive and functioning nodes, e.g. in unstable networks.")
         print("Cleanup will purge all information about these nodes from the master.")
+
         while True:
             print("Please type y or n to continue:", flush=True)
             answer = sys.stdin.readline().strip()
@@ -343,6 +345,7 @@ def _cleanup() -> int:
                 return 0
             if answer == "y":
                 break
+
         for node in silent:
             print(f"Unregistering {node.name}")
             forget_node(graph, node)

@@ -116,6 +116,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
     plain: list[str] = []
     rest = iter(words)
     wants_help = False
+
     for word in rest:
         name, equals, value = word.removeprefix("--").partition("=")
         if word in ("-h", "--help"):
@@ -130,10 +131,12 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
             )
         else:
             options[name] = "" if name in _FLAGS else value if equals else next(rest, "")
+
     if len(plain) > 2:
         raise _RospackError(
             "failed to parse command-line options: too many positional options have been specified on the command line"
         )
+
     verb, package = (*plain, "", "")[:2]
     if wants_help or verb == "help":
         return _Line("help", package if verb == "help" else verb, {})
@@ -321,10 +324,12 @@ def _profile(line: _Line, tree: Dependencies) -> None:
     if "zombie-only" in line.options:
         _print_lines(each.folder for each in found if not each.has_package)
         return
+
     try:
         length = int(line.options.get("length", 20))
     except ValueError as error:
         raise _RospackError(f"--length={line.options['length']} is not a number") from error
+
     took = sum(each.seconds for each in found if each.folder in tree.roots)
     print(f"Full tree crawl took {took:.6f} seconds.")
     print("Directories marked with (*) contain no manifest.  You may")

@@ -35,6 +35,7 @@ def _set_parser() -> Parser:
         "[options] parameter value",
         missing=_NO_NAME,
     )
+
     parser.add_argument("parameter", help="the parameter's name", completer="parameters")
     parser.add_argument(
         "value",
@@ -42,6 +43,7 @@ def _set_parser() -> Parser:
         help="YAML: 5, 1.5, true, text, [1, 2], '{x: 1, y: 2}', deg(90)",
         completer="parameter_value",
     )
+
     parser.add_argument(
         "-t",
         "--textfile",
@@ -56,6 +58,7 @@ def _set_parser() -> Parser:
         help="set parameters to contents of binary file",
         completer="files",
     )
+
     _add_verbose(parser)
     return parser
 

@@ -145,12 +145,14 @@ def _replace(command: list[str]) -> int:
                         continue
         except OSError as error:
             raise UsageError(f"cannot run {command[0]}: {error.strerror}") from error
+
     try:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
             # A script without a `#!` line: shells run it themselves.
             os.execv("/bin/sh", ["/bin/sh", *command])
+
         why = error.strerror or str(error)
         if error.errno == errno.ENOENT and os.path.isfile(command[0]):
             with open(command[0], "rb") as file:

@@ -40,6 +40,7 @@ def _rostest_parser() -> Parser:
         description="Runs each <test> of a launch file, with the file's nodes and a master of its own on a free port.",
         epilog="Exit status: 0 all passed, 1 a test could not be run or wrote no results, 2 a test failed.",
     )
+
     add = parser.add_argument
     add("what", nargs="*", help="a package and a file in it, or a file", completer="launch_words")
     add("-t", "--text", action="store_true", help="print everything, write no files of results")
@@ -55,6 +56,7 @@ def _rostest_parser() -> Parser:
         help="folder of results, instead of ~/.ros/test_results",
         completer="folders",
     )
+
     add("-r", "--reuse-master", action="store_true", help="use the master that runs")
     add("-c", "--clear", action="store_true", help="with --reuse-master: delete all its parameters first")
     add(
@@ -131,6 +133,7 @@ def _rosunit_parser() -> Parser:
         intermixed=False,
         epilog="Exit status: 0 all passed, 1 the file could not be run or wrote no results, 2 a test failed.",
     )
+
     add = parser.add_argument
     add(
         "file",
@@ -139,6 +142,7 @@ def _rosunit_parser() -> Parser:
         completer="files",
     )
     add("arguments", nargs=argparse.REMAINDER, help="what the file is given", completer="files")
+
     add("-t", "--text", action="store_true", help="Run with stdout output instead of XML output")
     add("--time-limit", type=float, default=60.0, help="Set time limit for test")
     add("--name", metavar="TEST_NAME", help="Test name", completer="nothing")

@@ -183,6 +183,7 @@ def _echo_parser() -> Parser:
         missing="topic must be specified",
         surplus="you may only specify one input topic",
     )
+
     add = parser.add_argument
     add(
         "topic",
@@ -191,6 +192,7 @@ def _echo_parser() -> Parser:
         completer="topics",
     )
     _add_bag(parser, "echo messages from .bag file")
+
     add("-p", dest="plot", action="store_true", help="echo in a plotting friendly format")
     add(
         "-w",
@@ -206,6 +208,7 @@ def _echo_parser() -> Parser:
         "m (the message) and topic (the topic name).",
         completer="nothing",
     )
+
     add("--nostr", action="store_true", help="exclude string fields")
     add("--noarr", action="store_true", help="exclude arrays")
     add("-c", "--clear", action="store_true", help="clear screen before printing next message")
@@ -289,6 +292,7 @@ def _hz_parser() -> Parser:
         "rostopic hz [options] /topic_0 [/topic_1 [topic_2 [..]]]",
         missing="topic must be specified",
     )
+
     _add_topics(parser)
     _add_window(parser, default=0)
     parser.add_argument(
@@ -302,6 +306,7 @@ def _hz_parser() -> Parser:
         action="store_true",
         help="calculates rate using wall time which can be helpful when clock isn't published during simulation",
     )
+
     _add_tcp_nodelay(parser)
     return parser
 
@@ -454,6 +459,7 @@ def _pub_parser() -> Parser:
         epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
         "Without arguments, messages are read from standard input, with --- between them.",
     )
+
     add = parser.add_argument
     add("topic", help="the topic's name", completer="topics")
     add("type", help="the message type, as std_msgs/Bool", completer="topic_type")
@@ -464,6 +470,7 @@ def _pub_parser() -> Parser:
         help="the message's values; `now` is the time, header: auto is stamped",
         completer="message_text",
     )
+
     add("-v", dest="verbose", action="store_true", help="print verbose output")
     add(
         "-r",
@@ -487,6 +494,7 @@ def _pub_parser() -> Parser:
         help="When publishing with a rate, performs keyword ('now' or 'auto') substitution for each message",
     )
     add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
+
     # Before Noetic, -s was called so.
     parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
     return parser

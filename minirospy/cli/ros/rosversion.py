@@ -36,6 +36,7 @@ def _parser() -> Parser:
         ros_argparse="rosversion",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
     parser.add_argument(
         "package", nargs="?", help="The ROS package name (e.g. 'roscpp')", completer="package_names"
     )

@@ -123,6 +123,7 @@ def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str
             package,
             search_path,
         )
+
     folders = search_path[package]
     for folder in folders:
         path = Path(folder, base_type + ext)
@@ -193,9 +194,11 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
             both += msg_context.get_depends(part.full_name) or ()
         msg_context.set_depends(spec.full_name, list(dict.fromkeys(both)))
         return
+
     bare = (resolve_type(bare_msg_type(type_), spec.package) for type_ in spec.types)
     needed = list(dict.fromkeys(name for name in bare if not is_builtin(name)))
     msg_context.set_depends(spec.full_name, needed)
+
     for name in needed:
         known = msg_context.is_registered(name)
         found = (

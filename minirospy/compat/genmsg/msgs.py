@@ -90,11 +90,13 @@ class MsgSpec:
     ) -> None:
         if len(types) != len(names):
             raise ValueError(f"len of args must match: {len(types)} types, {len(names)} names")
+
         self.types = types
         self.names = names
         self.constants = constants
         self.text = text
         self.full_name = full_name
+
         own_package, _, own_name = full_name.rpartition("/")
         self.package = package or own_package
         self.short_name = short_name or own_name

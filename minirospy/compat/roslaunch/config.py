@@ -163,13 +163,16 @@ def load_config_default(
     if port:
         environment = Environment.read()
         config.set_master(Master(uri=f"http://{environment.uri_host}:{port}/"))
+
     for name, value in (("/rosversion", ROS_VERSION), ("/rosdistro", DISTRO)):
         config.add_param(Param(name, value))
+
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each
         loader.load(file, config, argv=argv)
     for text in roslaunch_strs or ():
         loader.load_string(text, config)
+
     if assign_machines:
         config.assign_machines()
     return config

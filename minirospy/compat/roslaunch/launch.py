@@ -52,17 +52,21 @@ class ROSLaunchRunner:
             raise RLException("run_id is empty")
         if sigint_timeout <= 0 or sigterm_timeout <= 0:
             raise RLException("sigint_timeout and sigterm_timeout must be positive numbers")
+
         self.run_id = run_id
         self.config = config
         self._pid = os.getpid()
         self._environment = config.master.environment
+
         if is_core and config.master.is_running():
             raise RLException("roscore cannot run as another roscore/master is already running.")
+
         self._options = options or RunOptions(
             summary=False,
             timeouts=Timeouts(sigint_timeout, sigterm_timeout),
             master_arguments=master_options(timeout, master_logger_level),
         )
+
         for node in config.nodes:
             node.give_name()
         self._launcher = ApiLauncher(config.spec, self._environment, self._options, run_id)

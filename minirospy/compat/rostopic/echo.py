@@ -43,6 +43,7 @@ class CallbackEcho:
     ) -> None:
         if topic.endswith("/"):
             topic = topic[:-1]
+
         self.topic = topic
         self.msg_eval = msg_eval
         self.plot = plot
@@ -54,6 +55,7 @@ class CallbackEcho:
         self.field_filter = field_filter_fn
         self.fixed_numeric_width = fixed_numeric_width
         self.value_transform = value_transform_fn
+
         self.count = 0
         self.done = False
         self.first = True

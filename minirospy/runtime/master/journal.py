@@ -81,6 +81,7 @@ class Journal:
         self._start_steps = start_steps
         self._snapshot = snapshot
         self._clock = clock
+
         self._file: int | None = None
         self._lock: int | None = None
         self._size = 0
@@ -88,6 +89,7 @@ class Journal:
         self._failed_at: float
         self.trouble = ""
         """Why nothing is written at present."""
+
         # The numbers of large values that are being stored, and the last number.
         self._stored: set[int] = set()
         self._number = 0
@@ -182,10 +184,12 @@ class Journal:
         """Write a large value in parts; return the number by which a record "put" refers to it. Never raises."""
         while self._is_rewriting:
             yield PAUSE
+
         self._number += 1
         number = self._number
         self._stored.add(number)
         is_whole = False
+
         try:
             for piece in pack_in_steps(value):
                 if self._file is not None and number in self._stored:

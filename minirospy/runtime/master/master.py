@@ -304,17 +304,20 @@ class Master(MasterApi):
                 self._replay(*record)
             except (TypeError, ValueError, KeyError, MinirospyError) as error:
                 self.news.append(f"journal: a record was left out: {error}")
+
         self._parts.clear()
         uri = self.registry.node_uri(_OWN_NODE)
         if uri:
             # The /rosout node went with its master; this one brings its own.
             self.registry.forget(_OWN_NODE, uri)
+
         if recovered.damage:
             kept = f"a copy is kept as {left.copy}" if left.copy else "no copy of it could be written"
             self.news.append(
                 f"journal: {recovered.damage}; recovered up to the last whole record "
                 f"({len(recovered.records)} of them), {kept}"
             )
+
         nodes, parameters = self.registry.nodes(), self.parameters.names()
         if not nodes and not parameters:
             return
@@ -322,6 +325,7 @@ class Master(MasterApi):
             f"{_many(nodes, 'node')} and {_many(parameters, 'parameter')} "
             f"of the master that stopped {_ago(age)} ago"
         )
+
         if not (left.same_boot and age < _RESTART_SECONDS) and not await self._anybody_lives(nodes):
             self.registry, self.parameters = Registry(), ParameterTree()
             self.news.append(f"journal: {what} are left behind: none of these nodes answers")
@@ -332,6 +336,7 @@ class Master(MasterApi):
         """One change, as it was noted; whom it told then needs no word now."""
         registry, parameters = self.registry, self.parameters
         actions: Iterable[Notice] = ()
+
         match what, args:
             case "+pub", (node, topic, type_, uri):
                 actions = registry.register_publisher(node, topic, type_, uri).actions
@@ -366,6 +371,7 @@ class Master(MasterApi):
                 parameters.delete(key)
             case _:
                 raise ValueError(f"{what!r} with {len(args)} arguments is unknown")
+
         for action in actions:
             if isinstance(action, NodeShutdown):
                 parameters.unsubscribe_node(action.name, action.uri)

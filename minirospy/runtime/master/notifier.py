@@ -97,20 +97,24 @@ class Notifier:
         self._turns = turns
         self._timeout = timeout
         self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
+
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
         self._nodes: dict[str, _Node] = {}
         # URI and topic -> until when nothing is said of it, the first to end in front.
         self._held: dict[tuple[str, str], float] = {}
+
         self._line = _Line(_CALLS_AT_ONCE)
         self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
         self._starts_soon = False
         self._closed = False
+
         # The last update that was written: the subscribers of one topic all get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
         # The same for a large one, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
+
         # Large calls that wait; bytes of those that are under way; whether one is being written.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
@@ -132,22 +136,26 @@ class Notifier:
         """Call the node that the notice is for, soon."""
         key: object = object()
         end: float | None = None
+
         if isinstance(notice, PublisherUpdate):
             key = notice.topic
             end = self._held.get((notice.uri, notice.topic))
         elif isinstance(notice, ParameterUpdate):
             key = (notice.key,)
             end = self._held.get((notice.uri, PARAMETERS))
+
         node = self._nodes.get(notice.uri)
         is_idle = node is None or node.timer is not None
         if node is None:
             node = self._nodes[notice.uri] = _Node(notice.uri)
+
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
         # A parameter comes after what was sent of its parents and children meanwhile.
         if isinstance(notice, ParameterUpdate) and node.notices.pop(key, None) is None:
             node.parameters += 1
         node.notices[key] = notice
+
         if node.parameters > _MOST_PARAMETERS:
             self._summarize(node)
         if is_idle:
@@ -195,6 +203,7 @@ class Notifier:
         if key is None:
             self._go_on(node)
             return
+
         notice, count = node.notices.pop(key), 0
         line.under_way += 1
         if isinstance(notice, PublisherUpdate):
@@ -245,6 +254,7 @@ class Notifier:
         else:
             method, name = "paramUpdate", notice.key
             value = self._state.parameter(name)
+
         is_known = self._last_large[0] == name and (
             value == self._last_large[1] if method == "publisherUpdate" else value is self._last_large[1]
         )
@@ -258,6 +268,7 @@ class Notifier:
                 self._called(node, line, notice, count, 0, error)
                 return
             self._last_large = (name, value, pieces)
+
         self._is_writing = False
         body = self._last_large[2]
         size = sum(map(len, body))
@@ -270,19 +281,23 @@ class Notifier:
         self, node: _Node, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
         """Go on after a call that listed ``count`` publishers, ``size`` bytes if it was large."""
+
         line.under_way -= 1
         self._large_bytes -= size
         self._start_large()
         if not self._large and not self._large_bytes:
             self._last_large = ("", None, [])
+
         if isinstance(answer, RpcUnreachable):
             if len(self._suspects) > _MOST_SUSPECTS:
                 self._suspects.clear()
             self._suspects.add(node.uri)
         else:
             self._suspects.discard(node.uri)
+
         if isinstance(answer, RpcError):
             _log.info("%s to %s: %s", type(notice).__name__, node.uri, answer)
+
         if self._closed:
             return
         if isinstance(notice, PublisherUpdate) and count > _LONG_LIST:

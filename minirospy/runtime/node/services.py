@@ -80,14 +80,17 @@ class ServiceServer:
         why = check_service_client(fields, self.type)
         if why:
             return why
+
         await tcp.send_header(sock, self._answer)
         if fields.get("probe") == "1":
             sock.close()
             return None
+
         sockets.tune(sock)
         connection = _Connection(sock)
         with self._lock:
             self._open.add(connection)
+
         try:
             self._start(connection, fields)
         except ThreadLimitError as error:
@@ -174,6 +177,7 @@ class LoopServiceServer(ServiceServer):
             response_type=response_type,
             workers=workers,
         )
+
         self._async_handler = handler
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -247,6 +251,7 @@ class AsyncServiceClient:
         )
         address = parse_service_uri(uri)
         sock = (local.reach(*address) if same_host else None) or await tcp.connect(*address, timeout)
+
         try:
             sockets.tune(sock)
             await tcp.send_header(sock, fields)
@@ -255,6 +260,7 @@ class AsyncServiceClient:
         except BaseException:
             sock.close()
             raise
+
         return cls(sock, header)
 
     async def call(self, request: bytes) -> bytes:

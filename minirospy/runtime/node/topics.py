@@ -314,6 +314,7 @@ class Subscription:
     async def _connect(self, uri: str, delay: float) -> None:
         if delay:
             await asyncio.sleep(delay)
+
         lists = self.lists
         try:
             link = await self._open_link(uri)
@@ -333,6 +334,7 @@ class Subscription:
                 # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the last byte.
                 link.sock.close()
                 return
+
             self._links[uri] = link
             if self._on_loop:
                 watch_frames(
@@ -350,6 +352,7 @@ class Subscription:
                     self._limited_log.error("messages of %s are not received: %s", self.topic, error)
                     self._retry(uri, error)
                     return
+
             for notify in self.on_connected:
                 notify()
 

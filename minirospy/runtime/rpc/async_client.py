@@ -234,6 +234,7 @@ class Call:
         self._done: Callable[[Body | RpcError], None] | None = done
         self._loop = asyncio.get_running_loop()
         self._address: _Address = ("", 0)
+
         self._request = [body] if isinstance(body, bytes) else body
         # Of these parts, the first that has not been started.
         self._next = 0
@@ -249,6 +250,7 @@ class Call:
         except RpcUnreachable as error:
             self._finish(error)
             return
+
         self._address = (host, port)
         size = sum(map(len, self._request))
         if size < _LARGE:
@@ -256,6 +258,7 @@ class Call:
         else:
             # Not copied: several calls may send the same one.
             self._request = [serialize_request_head(f"{host}:{port}", path, size), *self._request]
+
         client = self._client
         client.under_way.set(self, self._timeout)
         kept = client.take(self._address)
@@ -321,10 +324,12 @@ class Call:
             self._use(self._connected_by(unix))
             self._send()
             return
+
         literal = _literal(host)
         if not literal:
             self._look_up()
             return
+
         try:
             sock = socket.socket()
         except OSError as error:
@@ -333,12 +338,14 @@ class Call:
             return
         sock.setblocking(False)
         self._use(self._connected_by(sock))
+
         try:
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             number = sock.connect_ex((literal, port))
         except OSError as error:
             self.broken(error)
             return
+
         if not number:
             self._send()
         elif number in _UNDER_WAY:

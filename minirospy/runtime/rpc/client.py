@@ -114,6 +114,7 @@ class RpcClient:
         except BaseException:
             sock.close()
             raise
+
         if messages[0].keep_alive:
             self._idle.append(sock)
         else:

@@ -109,6 +109,7 @@ class Connection:
         self._loop = loop
         self._reader = HttpReader()
         self._state: State = _OPEN
+
         self._out: deque[memoryview] = deque()
         # Bytes in there.
         self._unread = 0
@@ -116,6 +117,7 @@ class Connection:
         self._has_deadline = False
         # Bytes since the time limit was set.
         self._moved = 0
+
         self._task: asyncio.Task[None] | None = None
         # A long request that is being answered in steps, and the bytes of its body.
         self._work: Steps[None] | None = None
@@ -125,6 +127,7 @@ class Connection:
         self._held = 0
         # Set while it is read from in steps.
         self._reading: object | None = None
+
         loop.add_reader(self._fd, self.readable)
 
     @property
@@ -163,15 +166,18 @@ class Connection:
         except RpcProtocolError as error:
             self.refuse(error.status, str(error))
             return
+
         if self._held or not messages:
             self._hold()
             if not self._server.limit_held(self):
                 return
             if self._reader.wants_continue:
                 self._write(self._reader.continue_line())
+
         if self._has_deadline and messages:
             self._has_deadline = False
             self._server.deadlines.drop(self)
+
         self._moved += len(data)
         self._waiting += messages
         self._answer_waiting()
@@ -218,11 +224,13 @@ class Connection:
         """Take what has come: b"" is the end, None is nothing."""
         if data is None:
             return
+
         if self._state is _REFUSED:
             # Whatever it still says.
             if not data:
                 self.end()
             return
+
         if data:
             self._server.connections.move_to_end(self)
             if data.endswith(_END_OF_HEAD):
@@ -275,11 +283,13 @@ class Connection:
         if len(message.body) > _SHORT_BODY:
             self._answer_in_steps(message.body, keep_alive)
             return
+
         try:
             call = parse_call(message.body)
         except RpcProtocolError as error:
             self.refuse(error.status, str(error))
             return
+
         try:
             value = self._server.dispatch(call.method, call.args)
             if type(value) is Serialized:
@@ -310,12 +320,14 @@ class Connection:
         """Read a long request, and answer it."""
         if len(body) > _ALONE_BODY:
             yield ALONE
+
         try:
             call = yield from parse_call_in_steps(body)
         except RpcProtocolError as error:
             self._work = None
             self.refuse(error.status, str(error))
             return
+
         del body
         self._work_bytes = 0
         self._hold()
@@ -324,10 +336,12 @@ class Connection:
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
             self._finish(_fault(call.method, error), keep_alive)
             return
+
         if isinstance(value, Awaitable):
             self._work = None
             self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
             return
+
         method = call.method
         del call
         yield from self._serialize_in_steps(method, value, keep_alive)
@@ -342,6 +356,7 @@ class Connection:
                     value = yield from value
                 finally:
                     self._must_finish = False
+
             if self.is_refused:
                 return
             if isinstance(value, Serialized):
@@ -350,6 +365,7 @@ class Connection:
                 pieces = yield from serialize_value_in_steps(value, MAX_BODY)
         except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
             pieces = (_fault(method, error),)
+
         del value
         self._work = None
         if not self.is_refused:
@@ -433,6 +449,7 @@ class Connection:
         if self._state is _ENDED:
             return
         sent = 0
+
         if not self._out:
             try:
                 sent = self._sock.send(pieces[0])
@@ -444,11 +461,13 @@ class Connection:
             if len(pieces) == 1 and sent == len(pieces[0]):
                 return
             self._loop.add_writer(self._fd, self._writable)
+
         left = sent
         for piece in pieces:
             if left < len(piece):
                 self._out.append(memoryview(piece)[left:])
             left = max(0, left - len(piece))
+
         self._count_unread(sum(map(len, pieces)) - sent)
         self._set_deadline()
         if self._state is _OPEN and self._unread > _MOST_UNREAD:
@@ -486,12 +505,15 @@ class Connection:
         except OSError:
             self.end()
             return
+
         if sent:
             self._count_unread(-sent)
+
         if self._out:
             self._moved += sent
             self._set_deadline()
             return
+
         self._loop.remove_writer(self._fd)
         if self._state is _CLOSING:
             self.end()

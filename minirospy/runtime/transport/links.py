@@ -478,6 +478,7 @@ class _Source:
             data, self._rest = self._rest[:count], self._rest[count:]
             if len(data) == count:
                 return data
+
         parts = [data]
         missing = count - len(data)
         while missing:
@@ -496,6 +497,7 @@ def _deliver_newest(
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
     ended = False
+
     while True:
         for frame in frames:
             total += len(frame)
@@ -508,6 +510,7 @@ def _deliver_newest(
         except _Ended:
             ended = True
             break
+
     for frame in kept:
         deliver(frame if isinstance(frame, SplitFrame) else memoryview(frame))
     if ended:

@@ -59,8 +59,10 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
     """Return a connected, non-blocking socket. Raises OSError, also where the time is up."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
+
     with _time_limit(f"looking for the address of {host}"):
         found = await asyncio.wait_for(_addresses(host, port), timeout)
+
     for family, address in found:
         sock = socket.socket(family, socket.SOCK_STREAM)
         sock.setblocking(False)
@@ -75,6 +77,7 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
             raise
         else:
             return sock
+
     raise last
 
 
