@@ -21,6 +21,13 @@ SHARED = {
     "rospy/passing.py",
     "rostopic/echo.py",
     "rostopic/rates.py",
+    "PyKDL/frames.py",
+    "PyKDL/functions.py",
+    "PyKDL/vectors.py",
+    "tf/composed.py",
+    "tf/euler.py",
+    "tf/matrices.py",
+    "tf/vectors.py",
 }
 """Modules of compat that are not the counterpart of one module."""
 HAND_WRITTEN = sorted(
