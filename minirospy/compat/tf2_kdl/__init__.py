@@ -1,0 +1,1 @@
+"""tf2_kdl: PyKDL's types for tf2_ros; importing it registers them."""

@@ -1,0 +1,1 @@
+"""tf_conversions: PyKDL's frames as tuples, messages and matrices."""
