@@ -298,6 +298,8 @@ class Journal:
 
     def touch(self) -> None:
         """Record that this master is alive, for the age that :meth:`read` returns."""
+        if self._lock is None:
+            return
         with contextlib.suppress(OSError):
             os.utime(self.path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
 

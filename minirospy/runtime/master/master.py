@@ -272,23 +272,25 @@ class Master(MasterApi):
         journal = self._journal = Journal(
             self._journal_path, self._snapshot, start_steps=self._server.turns.start
         )
+        busy: JournalBusyError | None = None
         try:
             await _lock(journal)
         except JournalBusyError as error:
-            self.news.append(f"no journal: {error}")
-            self._journal = None
-            return {}
+            # What is there is not ours.
+            busy = error
         except OSError:
             # What is there can be read all the same. :meth:`Journal.start` finds out whether it can be written.
             pass
 
-        if self._fresh:
+        if busy:
+            self.news.append(f"no journal: {busy}, it is tried again every {RETRY_SECONDS:.0f} s")
+        elif self._fresh:
             journal.discard()
         elif left := journal.read():
             await self._take_up(left)
 
         journal.start()
-        if journal.trouble:
+        if journal.trouble and not busy:
             self.news.append(
                 f"no journal, a crash of the master would lose the graph: {self._journal_path} cannot be written: "
                 f"{journal.trouble}; set ROS_HOME (it is tried again every {RETRY_SECONDS:.0f} s)"

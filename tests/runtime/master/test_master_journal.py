@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Coroutine, Sequence
+from contextlib import ExitStack
 from http.client import HTTPException
 from pathlib import Path
 from typing import Any
@@ -360,13 +361,41 @@ def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.Monke
     async def test() -> None:
         first = await start(path)
         second = await start(path)
-        assert second.news == [f"no journal: {path} is held by another master (pid {os.getpid()})"]
+        assert second.news == [
+            f"no journal: {path} is held by another master (pid {os.getpid()}), it is tried again every 30 s"
+        ]
         call(second, "setParam", "/a", "/p", 1)
         call(first, "setParam", "/a", "/q", 1)
         await second.close()
         await first.close(keep_journal=True)
         third = await start(path)
         assert call(third, "getParamNames", "/x") == ["/q"]
+        await third.close()
+
+    run(test())
+
+
+def test_journal_of_another_master_is_written_once_that_one_has_ended(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 0.0)
+    monkeypatch.setattr(journal_module, "RETRY_SECONDS", 0.0)
+
+    async def test() -> None:
+        first = await start(path)
+        call(first, "setParam", "/a", "/q", 1)
+        second = await start(path)
+        os.utime(path, (0, 0))
+        second._touch()
+        assert path.stat().st_mtime == 0
+        call(second, "setParam", "/a", "/p", 1)
+        assert "held by another master" in call(second, "minirospy.status", "/x")["journal"]
+        await first.close()
+        call(second, "setParam", "/a", "/r", 1)
+        assert str(path) in call(second, "minirospy.status", "/x")["journal"]
+        await second.close(keep_journal=True)
+        third = await start(path)
+        assert call(third, "getParamNames", "/x") == ["/p", "/r"]
         await third.close()
 
     run(test())
@@ -663,20 +692,27 @@ class Killed:
     def __init__(self, port: int) -> None:
         self.port = port
         self.uri = f"http://127.0.0.1:{port}/"
+        self._opened: list[subprocess.Popen[bytes]] = []
         self.first = self.start()
         """The seconds until an empty master answered."""
 
     def start(self) -> float:
         """Start; the seconds until it answers with all that it knew."""
         self.process = self.open()
-        return self.wait()
+        try:
+            return self.wait()
+        except BaseException:
+            self.end()
+            raise
 
     def open(self) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
+        process = subprocess.Popen(
             [str(BIN / "roscore"), "-q", "-p", str(self.port)],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
         )
+        self._opened.append(process)
+        return process
 
     def wait(self) -> float:
         begin = time.monotonic()
@@ -696,8 +732,15 @@ class Killed:
         return self.start()
 
     def end(self) -> None:
-        self.process.terminate()
-        self.process.communicate(timeout=30)
+        """End every master that runs, so that none is left after a test that failed."""
+        for process in self._opened:
+            if process.poll() is None:
+                process.terminate()
+                try:
+                    process.communicate(timeout=30)
+                finally:
+                    process.kill()
+                    process.communicate()
 
 
 class Registering:
@@ -872,14 +915,18 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
         return [await fakes.open() for _ in range(20)]
 
     port = free_port()
-    master = Killed(port)
-    with ServerProxy(master.uri) as proxy:
-        # 20 MB, which take long enough to read that both starts overlap.
-        for number in range(10):
-            proxy.setParam("/test", f"/large/{number}", [f"{number} " + 1000 * "x"] * 2000)
-    oracle = Oracle(master.uri, loop.run(open_all(), 20.0))
     losers = 0
-    try:
+    with ExitStack() as stack:
+        stack.callback(loop.close)
+        stack.callback(lambda: loop.run(fakes.close(), 20.0))
+        master = Killed(port)
+        stack.callback(master.end)
+        with ServerProxy(master.uri) as proxy:
+            # 20 MB, which take long enough to read that both starts overlap.
+            for number in range(10):
+                proxy.setParam("/test", f"/large/{number}", [f"{number} " + 1000 * "x"] * 2000)
+        oracle = Oracle(master.uri, loop.run(open_all(), 20.0))
+        stack.callback(oracle.end)
         for _ in range(crashes):
             assert oracle.lasts(100)
             master.process.kill()
@@ -900,11 +947,6 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
                     assert f"journal-{port} (" in status[2]["journal"]
                     names: Any = proxy.getParamNames("/test")[2]  # type: ignore[index]
                     assert sum(name.startswith("/large/") for name in names) == 10
-    finally:
-        oracle.end()
-        loop.run(fakes.close(), 20.0)
-        loop.close()
-        master.end()
     print(f"{losers} double starts, {oracle.acknowledged} acknowledged calls, no difference")
 
 
