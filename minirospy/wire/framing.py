@@ -177,8 +177,9 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        self._filled = 0
-        self._wanted = 0
+        # Of the large frame: the bytes that have come, and those that are to come.
+        self._filled: int
+        self._wanted: int
 
     def put_back(self, data: bytes) -> None:
         """Begin with these few bytes, where nothing is held."""

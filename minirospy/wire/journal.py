@@ -28,7 +28,6 @@ _TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
 """What msgpack has in front of the length, in four bytes, of a long text or of bytes."""
 
 _FRAME = struct.Struct("<II")
-_MAX_RECORD = 256 * 1024 * 1024
 _DATE, _DATE_TEXT = 1, 2
 
 
@@ -122,7 +121,7 @@ def parse_journal(data: bytes) -> Recovered:
             return Recovered(records, at, "its last record is torn")
         length, checksum = _FRAME.unpack_from(data, at)
         body = data[at + _FRAME.size : at + _FRAME.size + length]
-        if length > _MAX_RECORD or len(body) < length:
+        if len(body) < length:
             return Recovered(records, at, "its last record is torn")
         record = _unpack(body) if zlib.crc32(body) == checksum else None
         if not isinstance(record, list) or not record:

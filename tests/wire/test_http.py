@@ -12,6 +12,7 @@ from minirospy.wire.http import (
     HttpHead,
     HttpMessage,
     HttpReader,
+    _short_head,
     serialize_error,
     serialize_request,
     serialize_response,
@@ -331,6 +332,9 @@ def test_close_forgets_an_incomplete_message() -> None:
     reader.feed(b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n2\r\nd")
     reader.close()
     assert (reader.is_idle, reader.held) == (True, 0)
+    reader.feed(b"POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\nabc")
+    reader.close()
+    assert (reader.is_idle, reader.held) == (True, 0)
     assert [message.body for message in feed(serialize_request("h", "/", b"next"), 5, reader)] == [b"next"]
 
 
@@ -407,3 +411,30 @@ def test_reader_knows_a_body_in_chunks() -> None:
     assert reader.in_chunks
     reader.feed(b"\nabc\r\n0\r\n\r\n")
     assert not reader.in_chunks
+
+
+@pytest.mark.parametrize("step", [7, 1 << 20])
+def test_length_over_the_limit_is_refused_before_the_body_comes(step: int) -> None:
+    reader = HttpReader(100)
+    with pytest.raises(RpcProtocolError, match="101 bytes is over the limit of 100") as caught:
+        feed(b"POST / HTTP/1.1\r\nContent-Length: 101\r\n\r\n", step, reader)
+    assert caught.value.status == 413
+
+
+def test_line_feed_alone_in_front_of_a_carriage_return() -> None:
+    # The last byte is not the one in front of the first.
+    reader = HttpReader()
+    reader.feed(b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n")
+    assert len(reader.feed(b"\n\r")) == 1
+
+
+def test_only_short_heads_are_kept() -> None:
+    # Long ones would fill the memory.
+    for size, keeps in ((300, True), (30_000, False)):
+        before = _short_head.cache_info().misses
+        head_of(b"POST / HTTP/1.1\r\nContent-Length: 0\r\nX: %s\r\n\r\n" % (b"x" * size))
+        assert (_short_head.cache_info().misses > before) is keeps
+
+
+def test_limit_of_a_body_is_as_documented() -> None:
+    assert MAX_BODY == 64 * 1024 * 1024

@@ -90,6 +90,13 @@ def test_dates_and_bytes() -> None:
     assert parse_journal(written([record])).records == [record]
 
 
+def test_bytes_of_a_record() -> None:
+    """A file of an earlier version is read too."""
+    record = ["set", "/d", [datetime.datetime(2020, 1, 2), DateTime("some day")]]
+    body = b"\x93\xa3set\xa2/d\x92\xc7\x13\x012020-01-02T00:00:00\xd7\x02some day"
+    assert serialize_record(record) == framed(body)
+
+
 @pytest.mark.parametrize("value", [object(), {1, 2}, 2**70])
 def test_what_no_journal_holds(value: object) -> None:
     with pytest.raises((TypeError, ValueError)):
@@ -110,6 +117,8 @@ def test_what_no_journal_holds(value: object) -> None:
         (HEAD + framed(b"\xc1"), "the record at byte 20 is damaged"),
         (HEAD + framed(b"\x91\xc7\1\5x"), "the record at byte 20 is damaged"),
         (HEAD + framed(b"\x91"), "the record at byte 20 is damaged"),
+        (HEAD + framed(b""), "the record at byte 20 is damaged"),
+        (HEAD + serialize_record([1]) + framed(b"x" * 99)[:-1], "its last record is torn"),
     ],
 )
 def test_damage_is_named(data: bytes, damage: str) -> None:
@@ -157,6 +166,15 @@ def test_long_text_comes_in_pieces(kind: type) -> None:
     # As long as may be in one piece.
     short = value[:_STEP_BYTES]
     assert len(list(pack_in_steps(short))) == 1
+
+
+def test_long_text_of_any_characters_comes_in_pieces() -> None:
+    value = "\u0151" * (3 * _STEP_BYTES + 5)
+    pieces = list(pack_in_steps([1, value, 2]))
+    # Nothing at first: only what is encoded has a length.
+    assert [len(each) for each in pieces[:6]] == [2, 0, 0, 0, 0, 5]
+    assert max(map(len, pieces)) == 2 * _STEP_BYTES
+    assert unpack(b"".join(pieces)) == [1, value, 2]
 
 
 def test_many_texts_come_in_pieces() -> None:
