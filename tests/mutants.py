@@ -247,13 +247,17 @@ def install(
                 function.__code__ = code
             else:
                 is_installed = False
-    for each in vars(sys.modules[f"minirospy.{mutant.module}"]).values():
-        if hasattr(each, "cache_clear"):
-            each.cache_clear()
+    _clear_caches(mutant.module)
     statement = next((each for each in mutated.body if _holds(each, mutant.line)), None)
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         _assign(sys.modules[f"minirospy.{mutant.module}"], statement, path)
     return is_installed
+
+
+def _clear_caches(module: str) -> None:
+    for each in vars(sys.modules[f"minirospy.{module}"]).values():
+        if hasattr(each, "cache_clear"):
+            each.cache_clear()
 
 
 class _Replace(ast.NodeTransformer):
@@ -352,6 +356,10 @@ class Mutants:
 
             return on_line
 
+        # What is made once is executed by the first test alone.
+        for name in self._trees:
+            importlib.import_module(f"minirospy.{name}")
+            _clear_caches(name)
         begin = time.perf_counter()
         threading.settrace(on_call)
         sys.settrace(on_call)

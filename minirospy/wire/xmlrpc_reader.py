@@ -99,7 +99,7 @@ class Reader:
         self._values: list[list[object]] = []
         self._depth = 0
         self._left = _MAX_ELEMENTS
-        self._tag = ""
+        self._tag: str
         # The bytes that were fed, and those that the long texts take in memory.
         self._fed = 0
         self._memory = 0
