@@ -18,6 +18,8 @@ from minirospy.robots.joints import Dependent, JointError, JointOptions, read_jo
 
 __all__ = ["JointPublisher", "main", "param", "run_node"]
 
+_CONNECT_SECONDS = 0.2
+
 
 def main() -> int:
     """Run the node until it is shut down; return the exit status: 1 where there are no joints to publish."""
@@ -72,6 +74,7 @@ class JointPublisher:
 
     def loop(self) -> None:
         """Publish until the node is shut down."""
+        self._publisher.wait_for_subscribers(timeout=min(1 / self._rate, _CONNECT_SECONDS))
         rate = rospy.Rate(self._rate)
         while not rospy.is_shutdown():
             self.publish()

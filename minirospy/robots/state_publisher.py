@@ -27,6 +27,7 @@ _AHEAD = rospy.Duration(0, 500_000_000)
 """How far ahead fixed frames on /tf are stamped: they hold until the next ones."""
 
 _OLD = rospy.Duration(30)
+_CONNECT_SECONDS = 0.2
 _PREFIX_SECONDS = 1.0
 """How long a value of tf_prefix is used: ROS looks it up for each message, which costs a call of the master's each."""
 
@@ -89,6 +90,8 @@ class StatePublisher:
             self._tf_static.publish(TFMessage(self._stamped(frames.fixed(), rospy.Time.now())))
         else:
             self._timer = rospy.Timer(self._period, self._publish_fixed, reset=True)
+        # Those that listen already get the first frames, too.
+        self._tf.wait_for_subscribers(timeout=_CONNECT_SECONDS)
         self._subscriber = rospy.Subscriber(
             "joint_states", JointState, self.publish, queue_size=1, tcp_nodelay=True
         )

@@ -1,0 +1,59 @@
+"""What the programs have in common: their words, their errors, a buffer that listens."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+from minirospy import client as rospy
+from minirospy.errors import MinirospyError
+from minirospy.escape import escaped
+
+__all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
+
+USAGE_STATUS = 255
+"""Of a usage error: ROS's programs return -1."""
+
+
+class ToolError(MinirospyError):
+    """A program cannot go on: ``text`` on stdout, then ``str()`` on stderr, and the exit status.
+
+    ``level`` is that of the console's line; without one it is plain.
+    """
+
+    def __init__(
+        self, line: str, *, text: str = "", status: int = USAGE_STATUS, level: str = "ERROR"
+    ) -> None:
+        super().__init__(line)
+        self.text = text
+        self.status = status
+        self.level = level
+
+
+def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str] | None) -> int:
+    """Run a program with its words; return its exit status. Ctrl-C, or a reader that has gone, is not an error."""
+    arguments = rospy.myargv(sys.argv)[1:] if words is None else words
+    try:
+        return body(arguments) or 0
+    except ToolError as error:
+        if error.text:
+            print(error.text, flush=True)
+        if str(error):
+            report(str(error), error.level)
+        return error.status
+    except (rospy.ROSInterruptException, KeyboardInterrupt):
+        return 0
+    except BrokenPipeError:
+        # What is still in the buffer has no reader either.
+        sys.stdout = None
+        return 0
+
+
+def report(line: str, level: str = "ERROR") -> None:
+    """Print a line as ROS's console prints it, also before there is a node; without a level as it is.
+
+    An information goes to stdout, the rest to stderr.
+    """
+    head = f"[{level}] [{time.time():.6f}]: " if level else ""
+    print(escaped(head + line, "\n"), file=sys.stdout if level == "INFO" else sys.stderr, flush=True)

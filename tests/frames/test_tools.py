@@ -1,0 +1,247 @@
+"""The programs of tf, tf2_ros and tf2_tools. That their texts are ROS's is shown in tests/interop/test_interop_robots.py."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from minirospy.frames.tools import view
+from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
+from minirospy.frames.tools.monitor import Delays
+from minirospy.urdf.poses import quaternion_from_rpy
+from tests.robots.conftest import SECONDS, Start
+
+STATIC = ("tf2_ros", "static_transform_publisher")
+OLD_STATIC = ("tf", "static_transform_publisher")
+POSE = """\
+- Translation: [1.425, 2.232, 2.876]
+- Rotation: in Quaternion [0.017, 0.133, 0.239, 0.962]
+            in RPY (radian) [0.100, 0.250, 0.500]
+            in RPY (degree) [5.730, 14.324, 28.648]
+"""
+"""What Debian's tf_echo prints of the frames of the fixture."""
+
+
+@pytest.fixture
+def frames(start: Start) -> None:
+    """Frames a -> b on /tf at 10 Hz, b -> c on /tf_static."""
+    start(*OLD_STATIC, *words("1 2 3 0.5 0.25 0.1 /a /b 100"), "__name:=moving")
+    start(*STATIC, *words("0.5 0 0 0 0 0 1 b c"), "__name:=fixed")
+
+
+def words(text: str) -> list[str]:
+    return text.split()
+
+
+def lines_until(process: subprocess.Popen[str], pattern: str) -> str:
+    """Return what a program prints, up to a line that matches."""
+    assert process.stdout
+    read = ""
+    for line in process.stdout:
+        read += line
+        if re.match(pattern, line):
+            return read
+    raise AssertionError(f"the program ended: {read} {process.communicate()}")
+
+
+@pytest.mark.usefixtures("frames")
+class TestEcho:
+    def test_transform_is_printed_as_by_ros(self, start: Start) -> None:
+        echo = start("tf", "tf_echo", "a", "/c", "20")
+        lines_until(echo, "At time")
+        read = lines_until(echo, ".*degree")
+        assert read == POSE
+
+    def test_failure_names_the_frames(self, start: Start) -> None:
+        echo = start("tf", "tf_echo", "a", "nothing", "20")
+        lines_until(echo, r"Failure at \d+\.\d{9}\n")
+        read = lines_until(echo, "Frame b")
+        assert read.startswith(
+            'Exception thrown:"nothing" passed to lookupTransform argument source_frame does not exist. \n'
+            "The current list of frames is:\nFrame "
+        )
+
+    def test_precision_and_rate_are_parameters(self, start: Start) -> None:
+        echo = start("tf", "tf_echo", "b", "c", "_precision:=1", "_rate:=20.0")
+        read = lines_until(echo, ".*degree")
+        assert read.startswith("Precision default value was overriden, new value: 1\n")
+        read = lines_until(echo, ".*degree")
+        assert "- Translation: [0.5, 0.0, 0.0]\n- Rotation: in Quaternion [0.0, 0.0, 0.0, 1.0]\n" in read
+
+    def test_echo_of_tf2_tools_ends_after_its_limit(self, start: Start) -> None:
+        echo = start("tf2_tools", "echo.py", *words("a c -r 5 -l 3 -p 3"))
+        output, errors = echo.communicate(timeout=SECONDS)
+        assert echo.returncode == 0
+        assert POSE in output
+        assert "Traceback" not in errors
+
+    def test_frames_without_a_connection_do_not_end_it(self, start: Start) -> None:
+        start(*STATIC, *words("0 0 0 0 0 0 p q"), "__name:=other")
+        echo = start("tf2_tools", "echo.py", *words("a q -r 5 -l 5"))
+        _, errors = echo.communicate(timeout=SECONDS)
+        assert echo.returncode == 0
+        assert "not part of the same tree" in errors
+        assert "Traceback" not in errors
+
+
+@pytest.mark.usefixtures("frames")
+class TestMonitor:
+    def test_frames_and_nodes_are_listed(self, start: Start) -> None:
+        monitor = start("tf", "tf_monitor")
+        read = lines_until(monitor, r"Node: /moving [\d.]+ Hz")
+        assert "\n\n\nRESULTS: for all Frames\n\nFrames:\n" in read
+        assert re.search(r"^Frame: b published by /moving Average Delay: -0.09\d+ Max Delay: 0$", read, re.M)
+        assert "Frame: c published by /fixed(static) Average Delay: 0 Max Delay: 0" in lines_until(
+            monitor, "Frame: c"
+        )
+
+    def test_chain_between_two_frames_is_followed(self, start: Start) -> None:
+        monitor = start("tf", "tf_monitor", "/a", "c")
+        read = lines_until(monitor, r"Net delay     avg = \S+: max = \S+\n")
+        assert read.startswith("Waiting for transform chain to become available between a and c ")
+        assert "\n\n\nRESULTS: for a to c\nChain is: a -> b -> c\n" in read
+
+
+def test_delays_are_of_each_frame_and_node() -> None:
+    delays = Delays()
+    delays.add("/n", [("b", 1.0), ("c", 2.0)], 3.0, is_static=False)
+    delays.add("/n", [("b", 4.5)], 5.0, is_static=False)
+    delays.add("/s", [("d", 0.0)], 5.0, is_static=True)
+    assert [*delays.frame_lines()] == [
+        "Frame: b published by /n Average Delay: 1.25 Max Delay: 2",
+        "Frame: c published by /n Average Delay: 1 Max Delay: 1",
+        "Frame: d published by /s(static) Average Delay: 0 Max Delay: 0",
+    ]
+    assert [*delays.frame_lines(["d"])] == ["Frame: d published by /s(static) Average Delay: 0 Max Delay: 0"]
+    assert [*delays.node_lines()] == [
+        "Node: /n 1 Hz, Average Delay: 1 Max Delay: 1.5",
+        "Node: /s(static) 1e+08 Hz, Average Delay: 0 Max Delay: 0",
+    ]
+
+
+@pytest.mark.usefixtures("frames")
+@pytest.mark.parametrize("has_dot", [True, False])
+@pytest.mark.parametrize("tool", [("tf", "view_frames"), ("tf2_tools", "view_frames.py")])
+def test_frames_are_drawn(
+    tool: tuple[str, str], has_dot: bool, start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if has_dot and not shutil.which("dot"):
+        pytest.skip("graphviz is not installed")
+    monkeypatch.chdir(tmp_path)
+    if not has_dot:
+        monkeypatch.setenv("PATH", str(tmp_path))
+    program = start(*tool)
+    output, errors = program.communicate(timeout=SECONDS)
+    assert program.returncode == 0, errors
+    graph = Path("frames.gv").read_text(encoding="utf-8")
+    assert re.search(r'"b" -> "c"\[label=" ?Broadcaster: /fixed\\nAverage rate: 10000.0', graph)
+    if has_dot:
+        assert Path("frames.pdf").read_bytes().startswith(b"%PDF")
+    else:
+        texts = {
+            each.text for each in ElementTree.parse("frames.svg").iter("{http://www.w3.org/2000/svg}text")
+        }
+        assert {"a", "b", "c", "Broadcaster: /moving"} <= texts
+    if tool[0] == "tf":
+        assert output.startswith("Listening to /tf for 5.0 seconds\nDone Listening\n")
+
+
+@pytest.mark.usefixtures("frames")
+def test_frames_of_a_node_are_drawn(start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    start("tf2_ros", "buffer_server", "_publish_frame_service:=true")
+    program = start("tf", "view_frames", "--node=/tf_buffer")
+    output, errors = program.communicate(timeout=SECONDS)
+    assert program.returncode == 0, errors
+    assert output.startswith(
+        "Generating graph for node:  /tf_buffer\nWaiting for service /tf_buffer/tf_frames\n"
+    )
+    assert '"b" -> "c"' in Path("frames.gv").read_text(encoding="utf-8")
+
+
+def test_graph_without_frames_says_so() -> None:
+    assert view.tf2_graph([], 1.0) == 'digraph G { "No tf data received" }'
+
+
+def test_names_of_frames_stay_names() -> None:
+    listing = (
+        "true: \n  parent: 'a\"b\\c'\n  broadcaster: '/n'\n  rate: 1.000\n  most_recent_transform: 2.000\n"
+        "  oldest_transform: 1.500\n  buffer_length: 0.500\n"
+    )
+    graph = view.tf2_graph(view.read_records(listing), 1.0)
+    (edge,) = view.read_edges(graph)
+    assert (edge.parent, edge.child) == ('a"b\\c', "true")
+    assert edge.label[:2] == ("Broadcaster: /n", "Average rate: 1.0")
+
+
+@pytest.mark.usefixtures("master")
+@pytest.mark.parametrize(
+    ("tool", "typed", "status", "text"),
+    [
+        (OLD_STATIC, "", 255, "not having the right number of arguments"),
+        (OLD_STATIC, "1 2 3", 255, "not having the right number of arguments"),
+        (STATIC, "1 2 3 0 0 0 1 a b 100", 255, "not having the right number of arguments"),
+        (OLD_STATIC, "1 2 x 0 0 0 a b 100", 255, "z is [x], which is not a number"),
+        (STATIC, "1 2 3 0 0 nan a b", 255, "roll is [nan], which is not a number"),
+        (
+            OLD_STATIC,
+            "1 2 3 0 0 0 /a a 100",
+            1,
+            "target_frame and source frame are the same (a, a) this cannot work",
+        ),
+        (STATIC, "1 2 3 0 0 0 a a", 1, "target_frame and source frame are the same (a, a) this cannot work"),
+        (STATIC, "1 2 3 0 0 0 2 a b", 1, "the quaternion (0 0 0 2) is not of length 1"),
+        (STATIC, "nothing", 255, "Could not read TF from parameter server: nothing"),
+        (("tf", "tf_echo"), "a", 255, "Usage: tf_echo source_frame target_frame [echo_rate]"),
+        (("tf", "tf_echo"), "a b x", 255, "Echo rate must be > 0.0"),
+        (("tf", "tf_echo"), "a b _precision:=0", 255, "Precision must be > 0"),
+        (("tf", "tf_echo"), "a b _precision:=many", 255, "~precision is [many]"),
+        (("tf", "tf_monitor"), "a", 255, "TF_Monitor: usage: tf_monitor framea frameb"),
+        (("tf2_tools", "echo.py"), "", 2, "the following arguments are required: source_frame, target_frame"),
+        (("tf2_tools", "echo.py"), "a b -r 0", 2, "argument -r/--rate: 0.0 must be > 0.0"),
+        (("tf2_ros", "buffer_server"), "_buffer_size:=long", 1, "~buffer_size is [long]"),
+        (("tf", "tf_remap"), "_mappings:=5", 1, "~mappings is [5]"),
+    ],
+)
+def test_usage_errors_are_those_of_ros(
+    tool: tuple[str, str], typed: str, status: int, text: str, start: Start
+) -> None:
+    program = start(*tool, *typed.split())
+    output, errors = program.communicate(timeout=SECONDS)
+    assert program.returncode == status, errors
+    assert text in output + errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.usefixtures("master")
+def test_parameter_is_broadcast(start: Start) -> None:
+    pose = "{translation: {x: 1, y: 2.5, z: 0}, rotation: {x: 0, y: 0, z: 0, w: 1}}"
+    value = f"{{header: {{frame_id: p}}, child_frame_id: q, transform: {pose}}}"
+    # Set by the program's own words: a private parameter, by its full name.
+    start(*STATIC, "/fixed/here", f"_here:={value}", "__name:=fixed")
+    echo = start("tf", "tf_echo", "p", "q", "20")
+    read = lines_until(echo, "- Translation: ")
+    assert read.endswith("- Translation: [1.000, 2.500, 0.000]\n")
+
+
+@pytest.mark.usefixtures("frames")
+def test_frames_are_renamed(start: Start) -> None:
+    start(*OLD_STATIC, *words("7 0 0 0 0 0 x y 50"), "/tf:=/tf_old")
+    start("tf", "tf_remap", "_mappings:=[{old: y, new: new_y}]")
+    echo = start("tf", "tf_echo", "x", "new_y", "20")
+    assert "[7.000, 0.000, 0.000]" in lines_until(echo, "- Translation: ")
+
+
+@pytest.mark.parametrize("angles", [(0.1, 0.2, 0.3), (3, -1.5, -3), (0, 0, 0), (0, math.pi / 2, 0.5)])
+@pytest.mark.parametrize("read", [rpy_of_matrix, euler_of_matrix])
+def test_angles_make_the_same_rotation(angles: tuple[float, float, float], read: type) -> None:
+    rotation = quaternion_from_rpy(*angles)
+    again = quaternion_from_rpy(*read(rotation))
+    assert abs(sum(a * b for a, b in zip(rotation, again, strict=True))) == pytest.approx(1)
