@@ -74,6 +74,8 @@ AROUND = [
     "catkin.find_in_workspaces",
     "rospkg",
     "message_filters",
+    "sensor_msgs.point_cloud2",
+    "angles",
 ]
 """The modules of the second page."""
 
@@ -81,7 +83,7 @@ REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 OF_ROS = (
     "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
-    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
+    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters", "sensor_msgs", "angles",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",

@@ -4,6 +4,7 @@ from geometry_msgs.msg import PointStamped as PointStamped
 from geometry_msgs.msg import PoseStamped as PoseStamped
 from geometry_msgs.msg import Vector3Stamped as Vector3Stamped
 from geometry_msgs.msg import WrenchStamped as WrenchStamped
+
 from minirospy.compat.tf2_geometry_msgs.tf2_geometry_msgs import do_transform_point as do_transform_point
 from minirospy.compat.tf2_geometry_msgs.tf2_geometry_msgs import do_transform_pose as do_transform_pose
 from minirospy.compat.tf2_geometry_msgs.tf2_geometry_msgs import do_transform_vector3 as do_transform_vector3

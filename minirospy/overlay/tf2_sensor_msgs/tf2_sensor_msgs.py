@@ -1,6 +1,7 @@
 """tf2_sensor_msgs.tf2_sensor_msgs, provided by minirospy: point clouds for tf2_ros. Source: http://wiki.ros.org/tf2_sensor_msgs."""
 
 from sensor_msgs.msg import PointCloud2 as PointCloud2
+
 from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import do_transform_cloud as do_transform_cloud
 from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import from_msg_msg as from_msg_msg
 from minirospy.compat.tf2_sensor_msgs.tf2_sensor_msgs import to_msg_msg as to_msg_msg

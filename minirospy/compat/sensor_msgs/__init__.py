@@ -1,0 +1,1 @@
+"""sensor_msgs: what its package offers besides messages."""
