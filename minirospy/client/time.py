@@ -71,16 +71,18 @@ class Time(times.Time):
 
 def get_rostime() -> Time:
     """Return the current time. Raises ROSInitException before init_node."""
-    if not current_session().has_time:
+    session = current_session()
+    if not session.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
-    return _time(current_session().clock.now())
+    return _time(session.clock.now())
 
 
 def get_time() -> float:
     """Return the current time in seconds. Raises ROSInitException before init_node."""
-    if not current_session().has_time:
+    session = current_session()
+    if not session.has_time:
         raise ROSInitException(_NOT_INITIALIZED)
-    return current_session().clock.now() / 1e9
+    return session.clock.now() / 1e9
 
 
 def is_wallclock() -> bool:
