@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
 from minirospy.errors import RpcError, RpcUnreachable
-from minirospy.graph.registry import PublisherUpdate
+from minirospy.graph.parameters import ParameterUpdate
+from minirospy.graph.registry import NodeShutdown, PublisherUpdate
 from minirospy.runtime.master import notifier as notifier_module
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.turns import Turns
+from minirospy.wire.xmlrpc import parse_call
 from tests.manual_loop import ManualLoop, run_manually
 
 ANSWER = b"<methodResponse/>"
@@ -26,13 +27,30 @@ class Scene:
         monkeypatch.setattr(notifier_module, "_CALLS_AT_ONCE", 4)
         monkeypatch.setattr(notifier_module, "_CALLS_TO_SUSPECTS", 1)
         self.under_way: dict[str, Callable[[bytes | RpcError], None]] = {}
+        self.bodies: list[tuple[str, bytes]] = []
+        """What was called, in order: the node's URI, and the request."""
+        self.publishers: list[str] = []
+        self.values: dict[str, object] = {}
         self.notifier = Notifier(self, Turns(), timeout=3.0)  # type: ignore[arg-type]
         monkeypatch.setattr(self.notifier._rpc, "begin", self.begin)
 
     def publisher_uris(self, topic: str) -> list[str]:
-        return []
+        return list(self.publishers)
 
-    def begin(self, uri: str, body: Any, timeout: float, done: Callable[[Any], None]) -> None:
+    def parameter(self, key: str) -> object:
+        return self.values.get(key, {})
+
+    def subscribed_parameters(self, uri: str) -> list[str]:
+        return ["/all/"]
+
+    @property
+    def calls(self) -> list[tuple[str, list[object]]]:
+        """Method and arguments of each call."""
+        return [(call.method, call.args) for call in (parse_call(body) for _, body in self.bodies)]
+
+    def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[bytes | RpcError], None]) -> None:
+        assert uri not in self.under_way, "a node is called once at a time"
+        self.bodies.append((uri, body))
         self.under_way[uri] = done
 
     def notify(self, uris: list[str], topic: str) -> None:
@@ -83,5 +101,102 @@ def test_a_node_that_answers_again_has_a_full_share_again(monkeypatch: pytest.Mo
         await clock.advance(0.01)
         assert list(scene.under_way) == DEAD[:4]
         await scene.notifier.close()
+
+    run_manually(scene)
+
+
+NODE = "http://node:1/"
+
+
+def test_each_kind_of_notice_is_a_call_of_the_slave_api(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        scene.publishers, scene.values = ["http://a:1/"], {"/p/": 5}
+        for notice in (
+            PublisherUpdate("http://one:1/", "/t"),
+            ParameterUpdate("http://two:1/", "/p/"),
+            NodeShutdown("http://three:1/", "/n", "new node registered with same name"),
+        ):
+            scene.notifier.send(notice)
+        assert not scene.bodies, "who registers gets its answer first"
+        await clock.advance(0.01)
+        assert scene.calls == [
+            ("publisherUpdate", ["/master", "/t", ["http://a:1/"]]),
+            ("paramUpdate", ["/master", "/p/", 5]),
+            ("shutdown", ["/master", "[/n] Reason: new node registered with same name"]),
+        ]
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_a_node_gets_the_newest_list_of_a_topic_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        scene.notify([NODE], "/t")
+        await clock.advance(0.01)
+        for number in range(3):
+            # While the first call is under way.
+            scene.publishers = [f"http://publisher{number}:1/"]
+            scene.notify([NODE], "/t")
+            await clock.advance(0.01)
+        assert len(scene.bodies) == 1
+
+        await scene.answer(clock, [NODE], is_dead=False)
+        await clock.advance(0.01)
+        assert scene.calls[1:] == [("publisherUpdate", ["/master", "/t", ["http://publisher2:1/"]])]
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_notices_of_one_node_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        for topic in ("/c", "/a", "/b"):
+            scene.notify([NODE], topic)
+        for _ in range(3):
+            await scene.answer(clock, [NODE], is_dead=False)
+        assert [args[1] for _, args in scene.calls] == ["/c", "/a", "/b"]
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_many_parameters_become_one_notice_for_each_subscription(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notifier_module, "_MOST_PARAMETERS", 3)
+
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        for number in range(4):
+            scene.notifier.send(ParameterUpdate(NODE, f"/all/{number}/"))
+        await scene.answer(clock, [NODE], is_dead=False)
+        await clock.advance(1.0)
+        assert scene.calls == [("paramUpdate", ["/master", "/all/", {}])]
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_a_node_of_this_loop_is_not_called_by_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene, taken = Scene(monkeypatch), list[tuple[str, list[str]]]()
+        scene.publishers = ["http://a:1/"]
+        scene.notifier.here[NODE] = lambda topic, publishers: taken.append((topic, publishers))
+        scene.notify([NODE], "/rosout")
+        await clock.advance(0.01)
+        assert (taken, scene.bodies) == ([("/rosout", ["http://a:1/"])], [])
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_nothing_is_sent_after_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        scene.notify([NODE], "/t")
+        await scene.notifier.close()
+        await clock.advance(1.0)
+        assert not scene.bodies
 
     run_manually(scene)
