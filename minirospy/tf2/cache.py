@@ -10,10 +10,16 @@ from enum import Enum
 
 from minirospy.tf2.rotation import slerp
 
-__all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache"]
+__all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
 _COMPACT_ABOVE = 32
 """So many expired samples are kept before the lists are shortened, so that an insertion does not move them all."""
+
+
+def seconds(nanoseconds: int) -> float:
+    """Return a time in seconds, rounded as C++ does it: in texts of today's times that shows in the last digits."""
+    whole, rest = divmod(nanoseconds, 1_000_000_000)
+    return whole + 1e-9 * rest
 
 
 class Misfit(Enum):
@@ -125,17 +131,17 @@ class TimeCache:
             return ""
         if len(self) == 1:
             return (
-                f"Lookup would require extrapolation at time {time / 1e9:.9f}, "
-                f"but only time {self.newest / 1e9:.9f} is in the buffer"
+                f"Lookup would require extrapolation at time {seconds(time):.9f}, "
+                f"but only time {seconds(self.newest):.9f} is in the buffer"
             )
         if time > self.newest:
             return (
-                f"Lookup would require extrapolation {(time - self.newest) / 1e9:.9f}s into the future.  "
-                f"Requested time {time / 1e9:.9f} but the latest data is at time {self.newest / 1e9:.9f}"
+                f"Lookup would require extrapolation {seconds(time - self.newest):.9f}s into the future.  "
+                f"Requested time {seconds(time):.9f} but the latest data is at time {seconds(self.newest):.9f}"
             )
         return (
-            f"Lookup would require extrapolation {(self.oldest - time) / 1e9:.9f}s into the past.  "
-            f"Requested time {time / 1e9:.9f} but the earliest data is at time {self.oldest / 1e9:.9f}"
+            f"Lookup would require extrapolation {seconds(self.oldest - time):.9f}s into the past.  "
+            f"Requested time {seconds(time):.9f} but the earliest data is at time {seconds(self.oldest):.9f}"
         )
 
     def clear(self) -> None:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from minirospy.tf2.cache import Misfit
+from minirospy.tf2.cache import Misfit, seconds
 from minirospy.tf2.rotation import Quaternion, Vector
 
 __all__ = ["Refusal", "RefusalLog", "faults_of", "misfit_refusal"]
@@ -75,7 +75,7 @@ def faults_of(
 
 def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authority: str) -> Refusal:
     """Return the refusal of a transform that a frame's cache did not take."""
-    text = f"{misfit.value} for frame {child} (parent {parent}) at time {stamp / 1e9:.6f} according to authority {authority}"
+    text = f"{misfit.value} for frame {child} (parent {parent}) at time {seconds(stamp):.6f} according to authority {authority}"
     return Refusal(child, misfit.value.partition(" ")[0], text, False)
 
 

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/tf2/view_frames; the texts are those of tf2's Buffer
 from __future__ import annotations
 
 from minirospy.tf2.buffer import TransformBuffer
-from minirospy.tf2.cache import Frame, StaticCache, TimeCache
+from minirospy.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
 __all__ = ["frames_as_dot", "frames_as_yaml"]
 
@@ -29,8 +29,8 @@ def frames_as_yaml(buffer: TransformBuffer) -> str:
             f"  parent: '{sample[0].name}'\n"
             f"  broadcaster: '{frame.authority}'\n"
             f"  rate: {_rate(cache):.3f}\n"
-            f"  most_recent_transform: {cache.newest / 1e9:.3f}\n"
-            f"  oldest_transform: {cache.oldest / 1e9:.3f}\n"
+            f"  most_recent_transform: {seconds(cache.newest):.3f}\n"
+            f"  oldest_transform: {seconds(cache.oldest):.3f}\n"
             f"  buffer_length: {_span(cache):.3f}\n"
         )
     return "".join(texts)
@@ -51,10 +51,10 @@ def _edge(frame: Frame, now: int) -> str:
     sample = None if cache is None else cache.at(0)
     if cache is None or sample is None:
         return ""
-    age = f"( {(now - cache.newest) / 1e9:.3f} sec old)" if now else ""
+    age = f"( {seconds(now) - seconds(cache.newest):.3f} sec old)" if now else ""
     return (
         f'"{sample[0].name}" -> "{frame.name}"[label="Broadcaster: {frame.authority}\\n'
-        f"Average rate: {_rate(cache):.3f} Hz\\nMost recent transform: {cache.newest / 1e9:.3f} {age}\\n"
+        f"Average rate: {_rate(cache):.3f} Hz\\nMost recent transform: {seconds(cache.newest):.3f} {age}\\n"
         f'Buffer length: {_span(cache):.3f} sec\\n"];\n'
     )
 
@@ -64,7 +64,7 @@ def _root(frame: Frame, now: int) -> str:
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""
-    recorded = f'"Recorded at time: {now / 1e9:.3f}"[ shape=plaintext ] ;\n ' if now else ""
+    recorded = f'"Recorded at time: {seconds(now):.3f}"[ shape=plaintext ] ;\n ' if now else ""
     return (
         "edge [style=invis];\n"
         ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";\n'
@@ -73,7 +73,7 @@ def _root(frame: Frame, now: int) -> str:
 
 
 def _span(cache: TimeCache | StaticCache) -> float:
-    return cache.newest / 1e9 - cache.oldest / 1e9
+    return seconds(cache.newest) - seconds(cache.oldest)
 
 
 def _rate(cache: TimeCache | StaticCache) -> float:
