@@ -21,7 +21,7 @@ from minirospy.frames.messages import Moment, nanoseconds
 
 __all__ = ["BufferClient"]
 
-_PADDING = times.Duration(2)
+_PADDING = rospy.Duration(2)
 _ERRORS: dict[int, type[TransformException]] = {
     TF2Error.LOOKUP_ERROR: LookupException,
     TF2Error.CONNECTIVITY_ERROR: ConnectivityException,

@@ -13,6 +13,7 @@ from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
 
 from minirospy import times
+from minirospy.client.time import Duration
 from minirospy.frames.messages import Moment
 
 __all__ = [
@@ -26,7 +27,7 @@ __all__ = [
     "convert",
 ]
 
-NO_WAIT = times.Duration()
+NO_WAIT = Duration()
 _T = TypeVar("_T")
 
 

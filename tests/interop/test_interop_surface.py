@@ -1,4 +1,4 @@
-"""docs/rospy_compatibility.md and docs/modules_compatibility.md are up to date with real ROS and ours; nothing is missing."""
+"""docs/rospy_compatibility.md and its kin are up to date with real ROS and ours; nothing is missing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 SCRIPT = Path(__file__).parents[1] / "referee" / "compare_surface.py"
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "rospy_compatibility.md", DOCS / "modules_compatibility.md"]
+PAGES = [DOCS / f"{name}_compatibility.md" for name in ("rospy", "modules", "tf")]
 
 
 def test_the_pages_are_up_to_date() -> None:

@@ -1,6 +1,7 @@
-"""Every public name and signature of real rospy, and of the modules around it, beside ours: writes two pages of docs.
+"""Every public name and signature of real rospy, and of the modules around it, beside ours: writes three pages of docs.
 
-docs/rospy_compatibility.md compares rospy; docs/modules_compatibility.md rosgraph, rosnode, rostopic and their kin.
+docs/rospy_compatibility.md compares rospy; docs/modules_compatibility.md rosgraph, rosnode, rostopic and their kin;
+docs/tf_compatibility.md tf2_ros, tf and PyKDL.
 
     .venv/bin/python tests/referee/compare_surface.py            write the pages
     .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 where one would change
@@ -78,12 +79,37 @@ AROUND = [
     "angles",
 ]
 """The modules of the second page."""
+FRAMES = [
+    "tf2_py",
+    "tf2_ros",
+    "tf2_ros.buffer",
+    "tf2_ros.buffer_client",
+    "tf2_ros.buffer_interface",
+    "tf2_ros.static_transform_broadcaster",
+    "tf2_ros.transform_broadcaster",
+    "tf2_ros.transform_listener",
+    "tf2_geometry_msgs",
+    "tf2_geometry_msgs.tf2_geometry_msgs",
+    "tf2_sensor_msgs",
+    "tf2_sensor_msgs.tf2_sensor_msgs",
+    "tf2_kdl",
+    "tf2_kdl.tf2_kdl",
+    "tf",
+    "tf.broadcaster",
+    "tf.listener",
+    "tf.transformations",
+    "tf_conversions",
+    "tf_conversions.posemath",
+    "PyKDL",
+]
+"""The modules of the third page."""
 
 REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 OF_ROS = (
     "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters", "sensor_msgs", "angles",
+    "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions", "PyKDL",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
@@ -220,7 +246,7 @@ def describe() -> Description:
             for name in dir(importlib.import_module(module))
             if not name.startswith("_") and (value := describe_value(getattr(sys.modules[module], name)))
         }
-        for module in (*ROSPY, *AROUND)
+        for module in (*ROSPY, *AROUND, *FRAMES)
     }
 
 
@@ -236,7 +262,8 @@ def describe_value(value: Any) -> dict[str, Any] | None:
             if not name.startswith("_") and callable(member := getattr(value, name)) and not inspect.isclass(member)
             and not (getattr(member, "__module__", None) or "threading").startswith(("threading", "logging"))
         }  # fmt: skip
-        return {"home": home, "is": parameters(value), "members": members, "class": True}
+        refuses = {"refuses": True} if getattr(value, "_refuses", False) else {}
+        return {"home": home, "is": parameters(value), "members": members, "class": True, **refuses}
     if callable(value) and (home.startswith(OF_ROS) or home == "logging" or inspect.ismethod(value)):
         return {"home": home, "is": parameters(value)}
     return None
@@ -298,7 +325,7 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
     rows = []
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
         is_ours = ours.get(name)
-        told_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND)
+        told_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND, *FRAMES)
         if is_ours is None and told_at_home and name not in REASONS:
             continue
         if is_ours is None:
@@ -310,6 +337,9 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
                     REASONS.get(name, ""),
                 )
             )
+            continue
+        if is_ours.get("refuses"):
+            rows.append((name, shown(is_real["is"]), "left out", "refuses by name"))
             continue
         passed_on = (
             module != "rospy" and is_real["home"] not in {module, ""} and "impl" not in is_real["home"]
@@ -388,6 +418,9 @@ def main() -> int:
         DOCS / "rospy_compatibility.md": page("rospy beside minirospy, name by name", ROSPY, real, ours),
         DOCS / "modules_compatibility.md": page(
             "rosgraph, rosnode, rostopic and their kin beside minirospy, name by name", AROUND, real, ours
+        ),
+        DOCS / "tf_compatibility.md": page(
+            "tf2_ros, tf and PyKDL beside minirospy, name by name", FRAMES, real, ours
         ),
     }
     status = 0

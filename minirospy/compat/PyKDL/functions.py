@@ -80,7 +80,12 @@ def refusal(name: str) -> type:
     return type(
         name,
         (),
-        {"__new__": refuse, "__module__": "PyKDL", "__doc__": f"Refuse to be made: {name} needs KDL."},
+        {
+            "__new__": refuse,
+            "_refuses": True,
+            "__module__": "PyKDL",
+            "__doc__": f"Refuse to be made: {name} needs KDL.",
+        },
     )
 
 
