@@ -21,6 +21,9 @@ LZ4 = "lz4"
 COMPRESSIONS = (NONE, BZ2, LZ4)
 """The names of the compressions, in the order in which rosbag lists them."""
 
+_MOST_LZ4 = 256
+"""How many times as long as its LZ4 block data can be."""
+
 Buffer = bytes | bytearray | memoryview
 _T = TypeVar("_T")
 
@@ -113,6 +116,9 @@ def _decompress_bz2(data: bytes, size: int) -> bytes:
 
 
 def _decompress_lz4(data: bytes, size: int) -> bytes:
+    if size > len(data) * _MOST_LZ4:
+        # The library allocates what is expected before it looks at the data.
+        raise BagFormatError(f"a chunk's {size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
     try:
         found: bytes = stream.decompress(data, size + 1)

@@ -93,6 +93,7 @@ class ChunkedReader(BagReader):
                 connection = _read_connection(stream, limit)
                 connections[connection.id] = connection
             chunks = [_read_chunk_info(stream, limit) for _ in range(header.chunk_count)]
+            _check_index(stream, limit, connections, chunks)
         except BagFormatError as error:
             raise BagUnindexedError(str(error)) from error
         return cls(stream, connections, chunks, version, header.index_pos)
@@ -273,6 +274,26 @@ def _weight(data: bytes, found: list[Found]) -> int:
 
 def _start_time(chunk: ChunkInfo) -> int:
     return chunk.start_time
+
+
+def _check_index(
+    stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
+) -> None:
+    """Raise BagFormatError where messages would be missing without a word: the index has more, or other, than its header."""
+    for chunk in chunks:
+        if not chunk.counts.keys() <= connections.keys():
+            raise BagFormatError(
+                "a chunk has messages of a connection that is not in the index", chunk.position
+            )
+    position = stream.tell()
+    if position == limit:
+        return
+    try:
+        more = records.read_record(stream, limit)
+    except BagFormatError:
+        return  # what others have appended is not looked at
+    if more.op in (records.OP_CHUNK_INFO, records.OP_CONNECTION):
+        raise BagFormatError("the index has more records than the bag header counts", position)
 
 
 def _read_connection(stream: BinaryIO, limit: int) -> Connection:

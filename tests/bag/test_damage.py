@@ -1,0 +1,223 @@
+"""Damaged bags: an error in one line, or messages that were in the bag; never another message, a hang or a crash."""
+
+from __future__ import annotations
+
+import io
+import random
+from collections.abc import Callable
+from typing import TypeVar
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from minirospy.bag import info
+from minirospy.bag import reader as reading
+from minirospy.bag.chunks import StoredChunk
+from minirospy.bag.compression import COMPRESSIONS
+from minirospy.bag.reader import ChunkedReader, open_bag
+from minirospy.bag.records import parse_records
+from minirospy.bag.repair import Repair
+from minirospy.bag.writer import BagWriter, Continued
+from minirospy.errors import BagError, BagFormatError, BagUnindexedError
+from tests.bag.bags import Given, connection, make_bag
+
+Found = tuple[int, int, bytes]
+_T = TypeVar("_T")
+
+
+def chunks(count: int = 12) -> list[list[Given]]:
+    """Return chunks of messages whose bytes are all different."""
+    source = random.Random(7)
+    return [
+        [Given(number % 3, chunk * 100 + number, source.randbytes(30)) for number in range(20)]
+        for chunk in range(count)
+    ]
+
+
+def is_one_line(error: BagError) -> bool:
+    return bool(str(error)) and "\n" not in str(error)
+
+
+def read(data: bytes) -> list[Found]:
+    """Return the messages before the first error; raise the error if the bag cannot be opened."""
+    reader = open_bag(io.BytesIO(data))
+    found: list[Found] = []
+    try:
+        found.extend((each.connection.id, each.time, each.body) for each in reader.messages())
+    except BagError as error:
+        return found if is_one_line(error) else [(-1, -1, b"")]
+    finally:
+        reader.close()
+    return found
+
+
+def repaired(data: bytes) -> list[Found]:
+    """Return the messages of a bag after `rosbag reindex`."""
+    stream = io.BytesIO(data)
+    repair = Repair(stream)
+    positions = list(repair.run())
+    assert len(positions) == len(set(positions))
+    repair.apply()
+    BagWriter(stream, continued=Continued(repair.connections.values(), repair.chunks, repair.end)).close()
+    return read(stream.getvalue())
+
+
+def boundaries(data: bytes) -> list[int]:
+    """Return where the records of a bag end."""
+    return [13, *(record.end + 13 for record in parse_records(data[13:]))]
+
+
+def attempt(action: Callable[[bytes], _T], data: bytes) -> _T | None:
+    """Return what an action makes of a bag, None if it refuses it in one line."""
+    try:
+        return action(data)
+    except BagError as error:
+        if is_one_line(error):
+            return None
+        raise
+
+
+GIVEN = chunks()
+EVERY = {tuple(each) for chunk in GIVEN for each in chunk}
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize("shift", [-1, 0, 1])
+def test_bag_that_is_cut_off_anywhere_is_unindexed_and_repaired(compression: str, shift: int) -> None:
+    data = make_bag(GIVEN, compression=compression)
+    last = 0
+    for end in (each + shift for each in boundaries(data)):
+        if end >= len(data):
+            continue
+        cut = data[:end]
+        with pytest.raises(BagError) as refused:
+            read(cut)
+        assert isinstance(refused.value, BagUnindexedError) or end < 13
+        if end < 13:
+            continue
+
+        found = repaired(cut)
+        assert set(found) <= EVERY
+        assert last <= len(found) == len(set(found))
+        last = len(found)
+    assert last == len(EVERY)
+
+
+def test_uncompressed_bag_that_is_cut_off_keeps_every_whole_message() -> None:
+    data = make_bag(GIVEN)
+    for end in range(4117, 9000, 7):
+        whole = sum(data.find(each.body, 0, end) >= 0 for chunk in GIVEN for each in chunk)
+        assert len(repaired(data[:end])) == whole
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS[1:])
+@pytest.mark.parametrize("part", ["start", "end"])
+def test_flipped_byte_never_gives_another_message(
+    compression: str, part: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = make_bag(GIVEN[:5], compression=compression)
+    expected = {tuple(each) for chunk in GIVEN[:5] for each in chunk}
+    places = range(4096) if part == "start" else range(max(len(data) - 4096, 4096), len(data))
+
+    # Threads that decompress ahead would be started ten thousand times.
+    monkeypatch.setattr(reading, "THREADS", 0)
+    for at in places:
+        damaged = data[:at] + bytes((data[at] ^ 0xFF,)) + data[at + 1 :]
+        assert set(attempt(read, damaged) or ()) <= expected, at
+        if at % 16 == 0 or at < 100:
+            assert set(attempt(repaired, damaged) or ()) <= expected, at
+
+
+def test_flipped_byte_of_the_index_loses_no_message_without_an_error() -> None:
+    data = make_bag(GIVEN, compression="lz4")
+    reader = open_bag(io.BytesIO(data))
+    assert isinstance(reader, ChunkedReader)
+    silent = []
+    for at in range(reader.index_position, len(data)):
+        for flip in (0x01, 0xFF):
+            damaged = data[:at] + bytes((data[at] ^ flip,)) + data[at + 1 :]
+            try:
+                opened = open_bag(io.BytesIO(damaged))
+                if len(list(opened.messages())) != len(EVERY):
+                    silent.append(at)
+            except BagError:
+                continue
+    assert silent == []
+
+
+def test_damaged_chunk_costs_its_own_messages_alone() -> None:
+    data = make_bag(GIVEN, compression="lz4")
+    reader = open_bag(io.BytesIO(data))
+    position = reader.chunk_headers()[reader.chunks[3].position].data_position + 50
+    damaged = data[:position] + bytes((data[position] ^ 0xFF,)) + data[position + 1 :]
+
+    assert len(read(damaged)) == 60
+    found = repaired(damaged)
+    assert len(found) == len(EVERY) - 20
+    assert set(found) == EVERY - {tuple(each) for each in GIVEN[3]}
+
+
+@given(st.binary(max_size=300), st.sampled_from([b"", b"#ROSBAG V2.0\n", b"#ROSBAG V1.2\n"]))
+def test_any_bytes_are_refused_or_empty(noise: bytes, magic: bytes) -> None:
+    assert not attempt(read, magic + noise)
+
+
+@given(st.data())
+@settings(deadline=None, max_examples=100)
+def test_damage_of_any_kind_is_survived(data: st.DataObject) -> None:
+    bag = bytearray(make_bag(GIVEN[:4], compression=data.draw(st.sampled_from(COMPRESSIONS))))
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(bag) - 1))
+        bag[at : at + data.draw(st.integers(0, 20))] = data.draw(st.binary(max_size=20))
+
+    attempt(read, bytes(bag))
+    attempt(repaired, bytes(bag))
+    attempt(described, bytes(bag))
+
+
+def described(data: bytes) -> str:
+    """Return the info of a bag, and read its whole index."""
+    reader = open_bag(io.BytesIO(data))
+    summary = info.summarize(reader, "a.bag", frequencies=True)
+    return info.as_text(summary) + info.as_yaml(summary)
+
+
+def test_zeros_are_not_a_bag() -> None:
+    for size in (1, 13, 5000):
+        with pytest.raises(BagFormatError):
+            read(bytes(size))
+
+
+def test_chunk_of_a_killed_writer_is_repaired() -> None:
+    """Python's and C++'s writers complete a chunk's header when the chunk is full."""
+    data = make_bag(GIVEN[:3], closed=False)
+    reader = open_bag(io.BytesIO(make_bag(GIVEN[:3])))
+    stored: StoredChunk = reader.chunk_headers()[reader.chunks[2].position]
+    position = reader.chunks[2].position
+    head = data[position : stored.data_position].replace(stored.chunk.size.to_bytes(4, "little"), bytes(4))
+    killed = data[:position] + head + data[stored.data_position : stored.end - 10]
+
+    assert len(repaired(killed)) == 59
+
+
+def test_repair_without_writing_reads_the_last_chunk() -> None:
+    data = make_bag(GIVEN[:3], closed=False)[:-500]
+    stream = io.BytesIO(data)
+    repair = Repair(stream)
+    list(repair.run())
+    reader = ChunkedReader(
+        stream, repair.connections, repair.chunks, headers=dict([repair.tail] if repair.tail else [])
+    )
+
+    assert len(list(reader.messages())) == len(repaired(data)) > 40
+    assert stream.getvalue() == data
+
+
+def test_definitions_of_hostile_bags_are_not_executed() -> None:
+    from minirospy.introspect.bags import class_of
+
+    hostile = connection(0, type="a/B", message_definition='string x\n"""\nimport os; os.abort()\n"""\n')
+    lines: list[str] = []
+    assert class_of(hostile.type, "0", hostile.definition, lines.append).__slots__ == []
+    assert "has invalid message definition" in lines[0]
