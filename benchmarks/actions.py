@@ -31,12 +31,12 @@ rospy.init_node("client", argv=[], anonymous=True)
 client = actionlib.SimpleActionClient("bench", TestAction)
 client.wait_for_server()
 wait, times, failures = rospy.Duration(10), [], 0
-begun = time.perf_counter()
-while time.perf_counter() - begun < float(sys.argv[1]):
+start = time.perf_counter()
+while time.perf_counter() - start < float(sys.argv[1]):
     start = time.perf_counter()
     failures += client.send_goal_and_wait(TestGoal(5), wait) != 3
     times.append(time.perf_counter() - start)
-took = time.perf_counter() - begun
+took = time.perf_counter() - start
 times.sort()
 print(json.dumps([len(times) / took, 1e6 * times[len(times) // 2], 1e6 * times[len(times) * 99 // 100], failures]))
 rospy.signal_shutdown("")

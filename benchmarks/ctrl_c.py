@@ -123,14 +123,14 @@ def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float,
     # No event serves: the moment is to be a random one.
     time.sleep(random.random())
     process.send_signal(signal.SIGINT)
-    begun = time.monotonic()
+    start = time.monotonic()
     try:
         _, errors = process.communicate(timeout=HANG_SECONDS)
     except subprocess.TimeoutExpired:
         process.kill()
         return HANG_SECONDS, f"hangs: {process.communicate()[1][-1000:]}"
 
-    took = time.monotonic() - begun
+    took = time.monotonic() - start
     proxy = MasterProxy(uri, "/ctrl_c")
     publishers, subscribers, services = proxy.get_system_state()
     proxy.close()

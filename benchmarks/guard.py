@@ -53,10 +53,10 @@ class Meter:
     def measure(self, name: str, step: Callable[[], int]) -> None:
         """Call ``step`` for a while; it returns how often it did what is measured."""
         step()
-        begin, count, end = self._spent(), 0, time.monotonic() + SECONDS
+        start, count, end = self._spent(), 0, time.monotonic() + SECONDS
         while time.monotonic() < end:
             count += step()
-        self.costs[name] = 1e6 * (self._spent() - begin) / count
+        self.costs[name] = 1e6 * (self._spent() - start) / count
 
     def _spent(self) -> float:
         others = [process.cpu_times() for process in self.others]
@@ -240,7 +240,7 @@ def report(costs: dict[str, float]) -> list[str]:
 def main() -> int:
     """Measure, again where a ratio is over its limit, and return the exit status."""
     for _ in range(TRIES):
-        # A process of its own each time: a node cannot be started twice in one.
+        # A new process each time: a node cannot be started twice in one.
         result = subprocess.run([sys.executable, __file__, "once"], check=False)
         if result.returncode == 0:
             return 0

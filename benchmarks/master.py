@@ -126,7 +126,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
     time.sleep(1.0)
     first_rss, nodes = program.memory_info().rss, 0
     for size in sizes:
-        used, before, begin = cpu(), nodes, time.monotonic()
+        used, before, start = cpu(), nodes, time.monotonic()
         for nodes in range(before, size):
             me, uri, client = f"/node{nodes}", f"http://localhost:{dummy.port}/node{nodes}/", Client(port)
             for topic in ("/rosout", me + "/out", me + "/status"):
@@ -135,7 +135,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
                 client.call("registerSubscriber", me, topic, "std_msgs/String", uri)
             client.close()
         nodes = size
-        seconds, last = time.monotonic() - begin, -1
+        seconds, last = time.monotonic() - start, -1
         while dummy.calls != last:
             last = dummy.calls
             time.sleep(0.3)
@@ -168,19 +168,19 @@ def _dead_subscribers(port: int) -> dict[str, float]:
         for number in range(50):
             client.call("registerSubscriber", f"/dead{number}", "/busy", "a/B", f"{dead}{number}/")
         client.call("registerSubscriber", "/live", "/busy", "a/B", f"http://127.0.0.1:{live.port}/")
-        begin = time.monotonic()
+        start = time.monotonic()
         client.call("registerPublisher", "/pub", "/busy", "a/B", "http://127.0.0.1:1/")
-        while not live.calls and time.monotonic() - begin < 60:
+        while not live.calls and time.monotonic() - start < 60:
             notified.wait(0.0005)
-        delay = time.monotonic() - begin
+        delay = time.monotonic() - start
         client.close()
         return {"told_beside_50_dead_ms": delay * 1e3}
 
 
 def _timed(step: Callable[..., object], *args: object) -> float:
-    begin = time.perf_counter()
+    start = time.perf_counter()
     step(*args)
-    return time.perf_counter() - begin
+    return time.perf_counter() - start
 
 
 def main() -> None:

@@ -48,19 +48,19 @@ def seconds(step):
     """Return the time that one step takes: the best of five batches."""
     count = 1
     while True:
-        begun = time.perf_counter()
+        start = time.perf_counter()
         for _ in range(count):
             step()
-        took = time.perf_counter() - begun
+        took = time.perf_counter() - start
         if took > 0.05:
             break
         count *= 2
     best = took
     for _ in range(4):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         for _ in range(count):
             step()
-        best = min(best, time.perf_counter() - begun)
+        best = min(best, time.perf_counter() - start)
     return best / count
 
 
@@ -87,10 +87,10 @@ def compiler():
 
     from minirospy.idl.load import Catalogue, compile_package
 
-    begun = time.perf_counter()
+    start = time.perf_counter()
     catalogue = Catalogue.below(Path(__file__).parents[1] / "msgs")
     modules = sum(len(compile_package(catalogue, package)) for package in catalogue.packages)
-    took = time.perf_counter() - begun
+    took = time.perf_counter() - start
     print(f"compiling {modules} modules of msgs/: {1000 * took:.0f} ms")
     code = "import time; t = time.perf_counter(); import sensor_msgs.msg; print(1000 * (time.perf_counter() - t))"
     for python in (sys.executable, REAL):

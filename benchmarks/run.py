@@ -113,7 +113,7 @@ def cost(workers: list[Worker]) -> float:
 
 def measure_start(stack: str) -> Figures:
     with Peers(stack) as peers:
-        worker = peers.start("start", begin=time.monotonic())
+        worker = peers.start("start", start_time=time.monotonic())
         return {"process to working node, ms": worker.said()["ms"]}
 
 
@@ -202,12 +202,12 @@ CASES: dict[str, Callable[[str], Figures]] = {
 
 
 def is_rate(name: str) -> bool:
-    """Whether more is better."""
+    """Return whether more is better."""
     return name.endswith("per second")
 
 
 def ratio(name: str, ours: float, theirs: float) -> float:
-    """How many times better ours is."""
+    """Return how many times better ours is."""
     better, worse = (ours, theirs) if is_rate(name) else (theirs, ours)
     return better / worse if worse else float("nan")
 

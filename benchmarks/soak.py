@@ -141,9 +141,9 @@ def samples(
     program: psutil.Process, home: Path, churn: Churn, seconds: float, pause: float
 ) -> Iterator[Sample]:
     """Churn for so long, with a sample now and then."""
-    begin = time.monotonic()
-    following = begin
-    while (now := time.monotonic()) < begin + seconds:
+    start = time.monotonic()
+    following = start
+    while (now := time.monotonic()) < start + seconds:
         churn.step()
         if pause:
             time.sleep(pause)
@@ -152,7 +152,7 @@ def samples(
             journal = sum(path.stat().st_size for path in (home / "master").glob("journal-*"))
             with program.oneshot():
                 yield Sample(
-                    now - begin,
+                    now - start,
                     program.memory_info().rss / 2**20,
                     program.num_fds() if hasattr(program, "num_fds") else program.num_handles(),
                     program.num_threads(),

@@ -42,7 +42,7 @@ def start(options):
     import rospy
 
     rospy.init_node("bench_start")
-    say(ms=1000 * (time.monotonic() - float(options["begin"])))
+    say(ms=1000 * (time.monotonic() - float(options["start_time"])))
 
 
 def message_of(kind):
@@ -121,9 +121,9 @@ def listen(options):
     heard("go")
     cpu_start = time.process_time()
     wait_until(lambda: count[0])
-    begin, before = time.monotonic(), count[0]
+    start, before = time.monotonic(), count[0]
     time.sleep(seconds)
-    per_second = (count[0] - before) / (time.monotonic() - begin)
+    per_second = (count[0] - before) / (time.monotonic() - start)
     seen = -1
     while seen != count[0]:
         seen = count[0]
@@ -208,11 +208,11 @@ def call(options):
 
     def discover():
         got = threading.Event()
-        begin = time.perf_counter()
+        start = time.perf_counter()
         subscriber = rospy.Subscriber("bench_latched", UInt64, lambda message: got.set())
         if not got.wait(10):
             sys.exit("no latched message")
-        took = time.perf_counter() - begin
+        took = time.perf_counter() - start
         subscriber.unregister()
         time.sleep(0.02)
         return 1000 * took
@@ -231,14 +231,14 @@ def call(options):
 
 
 def rate(step, seconds):
-    """How often ``step`` can be done in a second."""
+    """Return how often ``step`` can be done in a second."""
     for _ in range(20):
         step()
-    count, begin = 0, time.perf_counter()
-    while time.perf_counter() - begin < seconds:
+    count, start = 0, time.perf_counter()
+    while time.perf_counter() - start < seconds:
         step()
         count += 1
-    return count / (time.perf_counter() - begin)
+    return count / (time.perf_counter() - start)
 
 
 if __name__ == "__main__":

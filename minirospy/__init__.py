@@ -1,7 +1,7 @@
 """ROS 1 for any computer with Python.
 
 ``import minirospy as rospy`` offers what ``import rospy`` does: the names below are loaded when they are
-first used, so that a command which needs none of them starts at once.
+first used, so that a command which needs none of them starts quickly.
 
 The way of a message, file by file::
 

@@ -53,5 +53,5 @@ def set_logger_level(logger: str, level: str) -> None:
     """Set a logger's level by name, in upper or lower case. Raises ValueError on another name."""
     levels = {name: ros for ros, name in LEVEL_NAMES.items()}
     if level.upper() not in levels:
-        raise ValueError(f"[{level}] is none of the levels {', '.join(levels).lower()}")
+        raise ValueError(f"[{level}] is not one of the levels {', '.join(levels).lower()}")
     logging.getLogger(logger).setLevel(PYTHON_LEVELS[levels[level.upper()]])

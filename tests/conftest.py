@@ -26,14 +26,14 @@ def pytest_configure() -> None:
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
-        # Nothing happens here; a new process begins with the system's default.
+        # Nothing happens here; a new process starts with the system's default.
         signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 def free_port() -> int:
     """Return a port without a listener, for a server that another process starts, or that comes back.
 
-    It is none of those that systems deal out by themselves (from 32768 or 49152 on): such a one may go to any
+    It is outside of the ephemeral range (from 32768 or 49152 on): such a port may be assigned to any
     connection of another test before it is used.
     """
     while True:
@@ -48,7 +48,7 @@ def free_port() -> int:
 
 @pytest.fixture(scope="session")
 def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where the virtual boards of all tests live; in the end none is left running."""
+    """Return where the virtual boards of all tests live; in the end none is left running."""
     folder = tmp_path_factory.mktemp("boards")
     yield folder
     if any(folder.iterdir()):
@@ -71,7 +71,7 @@ def _own_environment(
     monkeypatch.setenv("ROS_HOME", str(home))
     monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    # A port on which nothing listens: a test that forgets its own master fails at once.
+    # A port on which nothing listens: a test that forgets its own master fails immediately.
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))
@@ -104,13 +104,13 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 @pytest.fixture
 def interrupted_processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
     """Return the processes that are started from now on; as each starts, this one gets a Ctrl-C."""
-    begun: list[subprocess.Popen[bytes]] = []
+    children: list[subprocess.Popen[bytes]] = []
 
     class Interrupted(subprocess.Popen):  # type: ignore[type-arg]
         def __init__(self, *args: Any, **kwargs: Any) -> None:
             super().__init__(*args, **kwargs)
-            begun.append(self)
+            children.append(self)
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(subprocess, "Popen", Interrupted)
-    return begun
+    return children

@@ -105,7 +105,7 @@ class Target:
 
 
 def seeds() -> list[bytes]:
-    """Good and bad requests to begin with."""
+    """Good and bad requests to start with."""
     from minirospy.wire.xmlrpc import serialize_call
 
     uri = "http://127.0.0.1:1/"

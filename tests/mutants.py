@@ -360,7 +360,7 @@ class Mutants:
         for name in self._trees:
             importlib.import_module(f"minirospy.{name}")
             _clear_caches(name)
-        begin = time.perf_counter()
+        start_time = time.perf_counter()
         threading.settrace(on_call)
         sys.settrace(on_call)
         try:
@@ -368,7 +368,7 @@ class Mutants:
         finally:
             sys.settrace(None)
             threading.settrace(None)  # type: ignore[arg-type]
-        self._seconds[index] = time.perf_counter() - begin
+        self._seconds[index] = time.perf_counter() - start_time
 
     def _run_all(self, session: pytest.Session, mutants: Sequence[Mutant]) -> None:
         functions = self._functions()
@@ -504,7 +504,7 @@ def _span(node: ast.AST) -> tuple[int, int]:
 
 def run_room(name: str, options: argparse.Namespace) -> float:
     """Try the mutants of a room; return the percentage that was killed."""
-    room, begin = ROOMS[name], time.monotonic()
+    room, start_time = ROOMS[name], time.monotonic()
     plugin = Mutants(room, options)
     # importlib's rewriting of asserts is for people.
     arguments = [
@@ -526,7 +526,7 @@ def run_room(name: str, options: argparse.Namespace) -> float:
     share = 100 * killed / total if total else 100.0
     counts = ", ".join(f"{count} {result}" for result, count in sorted(plugin.results.items()))
     print(
-        f"{name}: {killed} of {total} mutants killed, {share:.1f} % ({counts}; {time.monotonic() - begin:.0f} s)"
+        f"{name}: {killed} of {total} mutants killed, {share:.1f} % ({counts}; {time.monotonic() - start_time:.0f} s)"
     )
     return share
 

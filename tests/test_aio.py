@@ -40,7 +40,7 @@ Main = Callable[[], Coroutine[Any, Any, None]]
 
 
 def run(main: Main) -> None:
-    """Run a test's coroutine in a loop of its own, which it leaves without a task."""
+    """Run a test's coroutine in a new loop, which it leaves without a task."""
 
     async def bounded() -> None:
         await asyncio.wait_for(main(), SECONDS)

@@ -94,9 +94,9 @@ def test_wall_clock_returns_the_time() -> None:
 
 
 def test_wall_clock_sleeps() -> None:
-    began = time.monotonic()
+    start_time = time.monotonic()
     assert WallClock().sleep(SECOND // 50, threading.Event())
-    assert time.monotonic() - began >= 0.019
+    assert time.monotonic() - start_time >= 0.019
     assert WallClock().sleep(-SECOND, threading.Event())
 
 

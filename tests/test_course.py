@@ -59,7 +59,7 @@ def test_the_page_shows_what_happens(course: Course, page: str) -> None:
 
 
 def test_the_recorded_session_is_that_of_the_pages() -> None:
-    """`python docs/workshop/record.py` makes it anew."""
+    """`python docs/workshop/record.py` records it again."""
     assert record is not None
     session = (FOLDER / "session.txt").read_text(encoding="utf-8")
     heads = [f"\n===== {page} =====\n" for page in PAGES]
@@ -67,10 +67,10 @@ def test_the_recorded_session_is_that_of_the_pages() -> None:
         left = session.partition(head)[2]
         left = left.partition(following)[0] if following else left
         steps = record.steps(FOLDER / page)
-        begins = [f"({step.path} is saved)\n" if step.path else f"{step.shown}\n" for step in steps]
-        for step, begin, after in zip(steps, begins, [*begins[1:], ""], strict=True):
-            assert left.startswith(begin), f"{step.place}: the session has {left[:80]!r} instead of {begin!r}"
-            left = left.removeprefix(begin)
+        starts = [f"({step.path} is saved)\n" if step.path else f"{step.shown}\n" for step in steps]
+        for step, start, after in zip(steps, starts, [*starts[1:], ""], strict=True):
+            assert left.startswith(start), f"{step.place}: the session has {left[:80]!r} instead of {start!r}"
+            left = left.removeprefix(start)
             end = f"\n{left}".find(f"\n{after}") if after else len(left)
             printed, left = left[:end], left[end:]
             shown = record.pattern(step.answer, skip=True) + "(?:.*\n)*" * step.goes_on

@@ -36,6 +36,8 @@ def test_level_is_set_by_name_in_upper_or_lower_case() -> None:
         set_logger_level(logger.name, given)
         assert logger_levels([logger.name]) == {logger.name: given.upper()}
 
-    with pytest.raises(ValueError, match=r"^\[loud\] is none of the levels debug, info, warn, error, fatal$"):
+    with pytest.raises(
+        ValueError, match=r"^\[loud\] is not one of the levels debug, info, warn, error, fatal$"
+    ):
         set_logger_level(logger.name, "loud")
     assert logger.level == logging.WARNING

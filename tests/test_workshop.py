@@ -199,10 +199,10 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 40.0) -> None:
 
 def interrupt(process: subprocess.Popen[str]) -> str:
     """Ctrl-C: the process ends by itself, soon, with status 0 and without a traceback."""
-    began = time.monotonic()
+    start_time = time.monotonic()
     process.send_signal(CTRL_C)
     output, _ = process.communicate(timeout=30)
-    assert time.monotonic() - began < SECONDS_TO_END
+    assert time.monotonic() - start_time < SECONDS_TO_END
     assert "Traceback" not in output, output
     assert process.returncode == 0, output
     return output

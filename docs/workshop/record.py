@@ -10,7 +10,7 @@ What is played of a page, in its order:
   says that the program still runs. `terminal 2:` shows what a running program prints next, `<Ctrl-C>` or `<q>` is a key.
 - any other block behind a line that ends with a file's name (Save this as `~/name`:) is saved as that file.
 
-Each page begins in new terminals; no program runs when it ends. Commands that only look (rosnode list) are typed again
+Each page starts in new terminals; no program runs when it ends. Commands that only look (rosnode list) are typed again
 until they show what the page shows: a node that was just started may not be there yet.
 """
 
@@ -127,7 +127,7 @@ def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
             shown, typed = line, KEYS.get(key[1], key[1])
         if typed is None:
             if not open_steps:
-                raise CourseError(f"{page}:{at}: a block begins with a command")
+                raise CourseError(f"{page}:{at}: a block starts with a command")
             last = open_steps[-1]
             open_steps[-1] = replace(last, answer=(*last.answer, line))
         else:
@@ -151,7 +151,7 @@ def pattern(answer: tuple[str, ...], *, skip: bool) -> str:
 
 
 class Terminal:
-    """A bash in a terminal of its own.
+    """A bash in its own terminal.
 
     It is asked not to repeat what is typed, and not to throw away with Ctrl-C what was printed and is not read yet.
     """

@@ -58,7 +58,7 @@ class SimpleActionClient:
     ) -> None:
         """Send a goal; the one before is not tracked any more.
 
-        ``active_cb()`` is called when the server begins with it, ``feedback_cb(feedback)`` with feedback,
+        ``active_cb()`` is called when the server starts with it, ``feedback_cb(feedback)`` with feedback,
         ``done_cb(state, result)`` at its end; all in threads of the library.
         """
         with self._lock:

@@ -31,7 +31,7 @@ _ACCEPTED = "This goal has been accepted by the simple action server"
 class SimpleActionServer:
     """A server that works on one goal at a time.
 
-    ``execute_cb(goal)`` is called with each goal in a thread of its own, and has to set a terminal state
+    ``execute_cb(goal)`` is called with each goal in a separate thread, and has to set a terminal state
     (``set_succeeded``, ``set_aborted``, ``set_preempted``). Without it, ``register_goal_callback`` notifies of
     goals, and ``accept_new_goal`` takes them. The program lives on while an ``execute_cb`` serves. Raises
     ActionException on a class that is not an action.

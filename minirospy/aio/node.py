@@ -204,7 +204,7 @@ class Node:
         """Subscribe to ``topic`` and return its messages, for ``async for``.
 
         While the program is busy, the newest ``queue_size`` messages wait; older ones are dropped and counted
-        (``dropped``). Listening begins at once, in the background; ``await node.subscribe(...)`` waits until
+        (``dropped``). Listening starts immediately, in the background; ``await node.subscribe(...)`` waits until
         the master knows. It ends by :meth:`Subscription.close`, or when the subscription is garbage-collected.
         Raises ValueError on a ``queue_size`` below 1.
         """
@@ -345,7 +345,7 @@ class Node:
         await self._node.master("setParam", self.resolve(name), value)
 
     async def has_param(self, name: str) -> bool:
-        """Whether a parameter, or a namespace of that name, is set."""
+        """Return whether a parameter, or a namespace of that name, is set."""
         return bool(await self._node.master("hasParam", self.resolve(name)))
 
     async def delete_param(self, name: str) -> None:

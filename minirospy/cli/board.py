@@ -242,7 +242,7 @@ class _Keys:
         key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
         if key != "\x1b":
             return key or "q"
-        # A key that sends several bytes sends them at once.
+        # A key that sends several bytes sends them together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
         return self._ARROWS.get(sequence[-1:], "")

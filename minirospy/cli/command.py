@@ -8,7 +8,7 @@ status when
 ====== =====================================================================
 0      done; a stream, a wait or a question ended by Ctrl-C or a closed pipe
 1      it could not be done: no master, an unknown name, a peer that fails
-2      typed wrong: unknown option, missing argument
+2      usage error: unknown option, missing argument
 130    work that Ctrl-C ended half done: INTERRUPTED
 ====== =====================================================================
 """

@@ -2,7 +2,7 @@
 
 Most of ROS's commands are built on optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own
 tests match these lines, so a :class:`Parser` that is given ROS's usage prints exactly them; what minirospy adds follows
-on lines of its own.
+on separate lines.
 """
 
 from __future__ import annotations

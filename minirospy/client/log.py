@@ -1,7 +1,7 @@
 """Log lines: to the terminal, to the node's log file, and to /rosout.
 
 Everything goes through Python's ``logging``, by the logger "rosout" and its children, so that a program
-may add handlers of its own. Source: http://wiki.ros.org/rospy/Overview/Logging.
+may add its own handlers. Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
 
 from __future__ import annotations
@@ -494,7 +494,7 @@ class _Places:
         return due
 
     def is_new(self, frame: FrameType, text: object) -> bool:
-        """Whether the call at ``frame`` logged another text before, or none."""
+        """Return whether the call at ``frame`` logged another text before, or none."""
         place = _place(frame)
         if place in self._texts and self._texts[place] == text:
             return False

@@ -147,7 +147,7 @@ def get_param_names() -> list[str]:
 class KeptParameters:
     """What get_param_cached keeps, for a program that reads it, or is to be notified of its changes.
 
-    Such a program may put a function of its own in the place of :meth:`update`.
+    Such a program may replace :meth:`update` by its own function.
     """
 
     def __init__(self) -> None:

@@ -176,7 +176,7 @@ class PublishedTopic(SharedTopic):
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Before the master knows: a subscriber may come at once, and a publish() before it answers counts.
+            # Before the registration: a subscriber may connect immediately, and a publish() before the answer counts.
             self._registered = True
             wait = self._session.begin(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)

@@ -56,7 +56,7 @@ class Service(Generic[_S_co]):
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
     values, or the value of its only field. What it raises goes to the client as the call's error;
     ``error_handler(error, type, error, traceback)`` is called too, in place of a log line. Each connection has
-    a thread of its own, so a handler may run several times at once. ``buff_size`` is accepted and not needed.
+    a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted and not needed.
     Raises ValueError on an empty name, ServiceException where this node offers the service already.
     """
 
@@ -343,8 +343,8 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
     seconds = timeout.to_sec() if isinstance(timeout, Duration) else timeout
     if seconds == 0:
         raise ValueError("timeout must be non-zero")
-    begin = time.monotonic()
-    end = None if seconds is None else begin + seconds
+    start = time.monotonic()
+    end = None if seconds is None else start + seconds
     reported: set[str] = set()
     while not session.is_shutdown():
         rest = _PROBE_SECONDS if end is None else end - time.monotonic()
@@ -356,7 +356,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
         if why is _NO_CONTACT and why not in reported:
             _log.warning("wait_for_service(%s): %s", name, why)
             reported.add(why)
-        elif not reported and time.monotonic() - begin > _SILENT_SECONDS:
+        elif not reported and time.monotonic() - start > _SILENT_SECONDS:
             # rospy never logs anything here, which hides a misspelled name.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
             reported.add(why)

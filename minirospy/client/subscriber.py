@@ -41,7 +41,7 @@ class Subscriber(Topic[_M_co]):
     busy, keep only so many messages, the newest (None: all, in order). ``buff_size`` is accepted and not
     needed: freshness does not depend on it. Subscribers of one topic in a process share the connections;
     they keep as many messages as the largest queue_size. One that comes later to a latched topic gets
-    its last message at once, before the constructor returns. Raises ValueError on a bad name or class,
+    its last message before the constructor returns. Raises ValueError on a bad name or class,
     ROSException on a bad size.
     """
 
@@ -169,7 +169,7 @@ class SubscribedTopic(SharedTopic):
         return len(self.links)
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Whether the node with this Slave API is connected."""
+        """Return whether the node with this Slave API is connected."""
         return any(link.uri == endpoint_id for link in self.links)
 
     def join(self, handle: Subscriber[Message], tcp_nodelay: bool) -> None:

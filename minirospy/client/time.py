@@ -104,7 +104,7 @@ def sleep(duration: float | times.Duration) -> None:
 class Rate:
     """Keeps a loop at ``hz`` turns a second: ``sleep()`` makes up for what the loop's own work took.
 
-    ``last_time`` is when this turn began, ``sleep_dur`` how long a turn is; a program may change either.
+    ``last_time`` is when this turn started, ``sleep_dur`` how long a turn is; a program may change either.
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
@@ -135,10 +135,10 @@ class Rate:
             self.last_time = get_rostime()
             return
         period = self.sleep_dur.to_nsec()
-        began = self.last_time.to_nsec() + period
+        started = self.last_time.to_nsec() + period
         # Far behind, as after a pause: do not rush through the turns that were missed.
         now = current_session().clock.now()
-        self.last_time = _time(now if now - began > 2 * period else began)
+        self.last_time = _time(now if now - started > 2 * period else started)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
         """Return what is left of this turn at a time; called by a program's subclass that sleeps in another way."""

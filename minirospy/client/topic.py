@@ -1,4 +1,4 @@
-"""What publishers and subscribers share: the topic, its message class, and telling the master.
+"""Common parts of publishers and subscribers: the topic, its message class, and the registration.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -78,7 +78,7 @@ class Topic(Generic[_M_co]):
         self.reg_type = reg_type
 
     def get_num_connections(self) -> int:
-        """How many nodes are connected: subscribers of a Publisher, publishers of a Subscriber."""
+        """Return how many nodes are connected: subscribers of a Publisher, publishers of a Subscriber."""
         return self.impl.get_num_connections() if self.impl else 0
 
     def unregister(self) -> None:
@@ -116,11 +116,11 @@ class SharedTopic:
         raise NotImplementedError
 
     def has_connections(self) -> bool:
-        """Whether there is a link."""
+        """Return whether there is a link."""
         return bool(self.get_num_connections())
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""
+        """Return whether there is a link to this end: a publisher's subscribers are known by name, publishers by URI."""
         raise NotImplementedError
 
 

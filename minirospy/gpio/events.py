@@ -1,6 +1,6 @@
 """Edge detection: edges and the clock in, callbacks out, one after another on one thread.
 
-Debouncing is RPi.GPIO's: the first edge is reported, then the pin is deaf for the bounce time.
+Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
 """
 
 from __future__ import annotations

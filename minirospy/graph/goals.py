@@ -223,7 +223,7 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 
 
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
-    """Whether a cancel means a goal: by its id, as one up to the cancel's stamp, or as one of all (neither given).
+    """Return whether a cancel means a goal: by its id, as one up to the cancel's stamp, or as one of all (neither given).
 
     Stamps are nanoseconds; zero is none.
     """

@@ -137,7 +137,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
-        """How this master is: minirospy's own, for `minirospy master --status`."""
+        """Return how this master is: minirospy's own, for `minirospy master --status`."""
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
         """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""
@@ -301,7 +301,7 @@ class MasterApi(ABC):
         return [SUCCESS, f"parameter {name} set", 0]
 
     def has_param(self, caller_id: str, name: str) -> Answer:
-        """Whether a parameter is set."""
+        """Return whether a parameter is set."""
         return [SUCCESS, name, self.parameters.has(name)]
 
     def delete_param(self, caller_id: str, name: str) -> Answer | Steps[Answer]:

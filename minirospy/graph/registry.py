@@ -219,7 +219,7 @@ class Registry:
         return {name: entry.uri for name, entry in self._nodes.items()}
 
     def service_uri(self, service: str) -> str | None:
-        """Where a service is called."""
+        """Return where a service is called."""
         entry = self._services.get(service)
         return entry.uri if entry else None
 

@@ -54,7 +54,7 @@ class SubscriptionPlan:
         return [*map(Disconnect, gone), *map(Connect, new)]
 
     def failures(self, uri: str) -> int:
-        """How often in a row the link to ``uri`` has failed."""
+        """Return how often in a row the link to ``uri`` has failed."""
         return self._failures.get(uri, 0)
 
     def worked(self, uri: str) -> None:

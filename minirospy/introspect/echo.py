@@ -149,7 +149,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A note is a text, whatever the field was: the printed form of a field depends on its declared type.
+    # A note is a text, for any type of field: the printed form of a field depends on its declared type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

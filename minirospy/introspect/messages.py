@@ -25,7 +25,7 @@ _M = TypeVar("_M", bound="Message")
 
 _HINTS = {
     # What YAML reads otherwise than it looks.
-    "an ascii string": ", a text that could be a number, a date or a list in quotes of its own: \"'5'\"",
+    "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
 

@@ -49,7 +49,7 @@ __all__ = [
 
 
 _SHUTDOWN_SECONDS = 10.0
-"""A node may end its own things before it answers."""
+"""A node may run its shutdown hooks before it answers."""
 
 
 class TypedName(NamedTuple):
@@ -165,9 +165,9 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 
 
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
-    """Ask a node to shut down. A node that is gone already is as good as stopped.
+    """Request a node to shut down; without effect if it has exited already.
 
-    Raise NodeUnreachableError where it is there and says nothing.
+    Raise NodeUnreachableError if it does not answer in time.
     """
     with contextlib.closing(_slave(graph, node, _SHUTDOWN_SECONDS)) as slave:
         try:
@@ -176,7 +176,7 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # one that ends at once may have had no time for a whole answer
+            pass  # one that exits immediately may not complete its answer
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:

@@ -262,7 +262,7 @@ def _arithmetic(text: str) -> float:
     import operator
 
     if len(text) > _LONGEST_ANGLE:
-        # Python's parser has limits of its own, and says so by errors of its own.
+        # Python's parser has its own limits, and its own errors for them.
         raise ValueError(f"more than {_LONGEST_ANGLE} characters")
     binary = {
         ast.Add: operator.add,

@@ -1,7 +1,7 @@
 """A process that outlives roslaunch by a moment: it ends the nodes that a killed roslaunch has left. A script.
 
 From its input it reads a line for each process group: ``+PID NAME`` has started, a node; ``*PID`` has started and is to end
-last (the master); ``-PID`` has ended. Where the input ends, roslaunch has, for whatever reason: the groups that are left get
+last (the master); ``-PID`` has ended. Where the input ends, roslaunch has exited, for any reason: the groups that are left get
 SIGINT, SIGTERM, SIGKILL, and what their nodes leave registered with a master that goes on is unregistered. Nothing but the
 standard library is imported, and little of that: it starts while the first nodes do.
 """

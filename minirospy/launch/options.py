@@ -13,7 +13,7 @@ __all__ = ["RunOptions"]
 class RunOptions:
     """How a spec is run.
 
-    ``screen``, ``log``: where all output goes, whatever the file says; ``log_errors``: what nodes write to standard
+    ``screen``, ``log``: where all output goes, in place of the file's settings; ``log_errors``: what nodes write to standard
     error goes to their log file, too. ``required``: every node is. ``local``: nodes of other machines are not run.
     ``strict``: a node that cannot be started ends it all. ``watch``: a node whose file changes is started again.
     ``name`` is shown in the terminal's title.

@@ -1,6 +1,6 @@
 """A LaunchSpec -> running nodes: starts them, watches them, ends them.
 
-The parts are in files of their own: the master (``master.py``), the process of a node (``node_start.py``), the run
+The parts are in separate files: the master (``master.py``), the process of a node (``node_start.py``), the run
 (``supervisor.py``), other machines (``remote.py``), the end (``process.py``, ``registrations.py``).
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/roslaunch/Architecture.
 """

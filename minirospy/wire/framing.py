@@ -5,7 +5,7 @@ The reader owns the buffer that a socket receives into, so that bytes are moved 
 
 To a subscriber whose header says ``split_frames=1`` a large message that ends with a byte array is sent as a
 split frame: the length with its highest bit set, 4 bytes with the array's size, then the message as ever. So the
-subscriber reads the array into an object of its own, which becomes the field without another copy.
+subscriber reads the array into a separate object, which becomes the field without another copy.
 Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
 
@@ -149,7 +149,7 @@ Frame = memoryview | bytes
 
 
 def begins_split(head: bytes, tail: int) -> bool:
-    """Whether ``head`` ends with the length of a byte array of ``tail`` bytes: there a message may be split."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes: there a message may be split."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
@@ -164,7 +164,7 @@ class FrameReader:
     """Bytes in, frames out.
 
     A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
-    than CHUNK comes in a buffer of its own, which nobody writes again. With ``gathers`` false such a frame is
+    than CHUNK comes in a separate buffer, which is not written again. With ``gathers`` false such a frame is
     left to the caller instead: :attr:`begun` says what has come of it.
     """
 
@@ -187,7 +187,7 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Where the next bytes go; never empty."""
+        """Return where the next bytes go; never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # A length is only a claim until the bytes come: memory grows with what has come.

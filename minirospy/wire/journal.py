@@ -113,7 +113,7 @@ def unpack(data: bytes) -> object:
 def parse_journal(data: bytes) -> Recovered:
     """Return the records in ``data``, up to the first that is not whole."""
     if not data.startswith(HEAD):
-        return Recovered([], 0, "it does not begin as a journal" if data else "it is empty")
+        return Recovered([], 0, "it does not start as a journal" if data else "it is empty")
     records: list[list[object]] = []
     at = len(HEAD)
     while at < len(data):

@@ -445,7 +445,7 @@ class _Condition:
             return self._value(left) in _items(self._known.get(self._word().text, ""))
 
         if _TRUE.match(left.text) or _FALSE.match(left.text):
-            # These words mean themselves, whatever a variable of that name holds.
+            # These words mean themselves, even if a variable has that name.
             return bool(_TRUE.match(left.text))
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 

@@ -96,7 +96,7 @@ def _package_xml(package: NewPackage) -> str:
         *(_person("author", person, package.user) for person in package.authors),
         "  <!-- Which packages this one needs. <depend> means all three of build_depend,",
         "       build_export_depend and exec_depend.",
-        "       A package with messages, services or actions of its own needs also:",
+        "       A package that defines messages, services or actions needs also:",
         "         <build_depend>message_generation</build_depend>",
         "         <exec_depend>message_runtime</exec_depend>",
         "       Needed by the tests only: <test_depend>rostest</test_depend> -->",

@@ -53,7 +53,7 @@ class Packages:
     """The packages that an environment sees. A package's name is that in its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages are found whatever ROS_MASTER_URI says, and no look-up of this machine's name is needed.
+        # Packages do not depend on ROS_MASTER_URI, and no look-up of this machine's name is needed.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
@@ -104,7 +104,7 @@ class Packages:
     def find_executable(self, package: str, name: str) -> list[str]:
         """Return the command that runs a package's program; of several programs of a name, the first.
 
-        Python runs in this interpreter, whatever ``env`` finds. Raises NotFoundError with the nearest names,
+        Python programs run in this interpreter, not in the one that ``env`` finds. Raises NotFoundError with the nearest names,
         NotExecutableError.
         """
         return self.find_executables(package, name)[0]

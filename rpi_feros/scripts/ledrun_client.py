@@ -10,7 +10,7 @@ NEAR = 0.2  # m
 
 
 def show(feedback: runningLedFeedback) -> None:
-    rospy.loginfo("Run %d begins.", feedback.currentRun)
+    rospy.loginfo("Run %d starts.", feedback.currentRun)
 
 
 def main() -> None:

@@ -168,7 +168,7 @@ def test_a_newer_goal_takes_the_place_of_the_one_that_runs() -> None:
 
 
 def test_concurrent_goals_each_end() -> None:
-    """One that makes way before its work has begun, too."""
+    """One that makes way before its work has started, too."""
 
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()

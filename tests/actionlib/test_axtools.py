@@ -27,7 +27,7 @@ def execute(goal):
                 rospy.sleep(0.01)
             server.set_preempted(TestResult(number), "stopped")
             return
-    # Feedback and result travel by connections of their own: the test says when the feedback has arrived.
+    # Feedback and result have separate connections: the test signals when the feedback has arrived.
     sys.stdin.readline()
     server.set_succeeded(TestResult(goal.goal))
 server = actionlib.SimpleActionServer("count", TestAction, execute, False)

@@ -143,7 +143,7 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
 
 @pytest.fixture
 def program() -> Iterator[Callable[[Sequence[str]], subprocess.Popen[str]]]:
-    """Start a command's console script as a process of its own; it is ended when the test ends."""
+    """Start a command's console script as a process; it is terminated when the test ends."""
     started: list[subprocess.Popen[str]] = []
 
     def start(words: Sequence[str]) -> subprocess.Popen[str]:

@@ -475,7 +475,7 @@ def test_a_thousand_topics(master: str) -> None:
     assert tab("rostopic pub /many/topic_0999 ") == ["std_msgs/Bool"]
 
 
-# --- whatever happens
+# --- any state of the system
 
 
 @pytest.mark.parametrize("verb", ["rostopic echo ", "rosnode info ", "rosservice call ", "rosparam get "])

@@ -1,4 +1,4 @@
-"""A publisher, by raw sockets, that sends whatever it likes in its connection header and messages."""
+"""A publisher, by raw sockets, that sends hostile text in its connection header and messages."""
 
 from __future__ import annotations
 

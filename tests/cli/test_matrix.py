@@ -121,17 +121,17 @@ ROWS = {
 }
 
 ELSEWHERE = re.compile(r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to")
-"""Commands with matrices or tests of their own."""
+"""Commands with their own matrices or tests."""
 
-TYPED_WRONG = 2
+USAGE_ERROR = 2
 EX_USAGE = 64
 """Of an unknown verb, as ROS has it."""
 
 ROS_STATUS = {
-    "minirospy": TYPED_WRONG,
+    "minirospy": USAGE_ERROR,
     "rosservice args": 2,
     "rosservice call": 2,
-    "rosparam set": TYPED_WRONG,
+    "rosparam set": USAGE_ERROR,
     "rosrun": 3,
     "rosmsg package": EX_USAGE,
     "rossrv package": EX_USAGE,
@@ -169,7 +169,7 @@ class Told(io.StringIO):
 
 
 def run(line: str, **streams: Any) -> Result:
-    """Run a command in this process; ``stdin``, ``stdout`` and ``stderr`` in the place of its own."""
+    """Run a command in this process; ``stdin``, ``stdout`` and ``stderr`` replace its own."""
     words = line.split()
     module, function = scripts()[words[0]]
     main = getattr(importlib.import_module(module), function)
@@ -254,7 +254,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(master_proxy, "RpcClient", lambda uri, *_, **__: RpcClient(uri, 0.05))
 
 
-# --- typed wrong
+# --- usage errors
 
 
 def test_every_verb_has_a_row(lines: list[str]) -> None:
@@ -265,7 +265,7 @@ def test_a_typo_in_the_verb(lines: list[str]) -> None:
     for name in {line.split()[0] for line in lines if " " in line}:
         for verb in verbs(name):
             result = run(f"{name} {verb[:-1]}x")
-            assert result.status in (TYPED_WRONG, EX_USAGE)
+            assert result.status in (USAGE_ERROR, EX_USAGE)
             assert result.out == (run(f"{name} -h").out if result.status == EX_USAGE else "")
             assert re.search(rf"did you mean .*\b{verb}\b", one_line(result, name)) or len(verb) < 4
 
@@ -275,7 +275,7 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
         options = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", run(f"{line} -h").out)) - {"--help"}
         for option in ("--nonsense", *sorted(options)):
             result = run(f"{line} {option}x")
-            assert (result.status, result.out) == (USAGE_STATUS.get(line, TYPED_WRONG), usage_out(line)), line
+            assert (result.status, result.out) == (USAGE_STATUS.get(line, USAGE_ERROR), usage_out(line)), line
             said = one_line(result, line)
             assert f"{option}x" in said
             assert (
@@ -284,11 +284,11 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
 
 
 def test_an_option_that_no_command_has() -> None:
-    """Of every command that is installed, whoever tests the rest of it."""
+    """Every installed command refuses it."""
     # What xacro says of its options are the package's own words.
     for name in scripts().keys() - {"xacro"}:
         result = run(f"{name} --nonsense")
-        usage = USAGE_STATUS.get(name, 1 if name in ("rospack", "rosstack") else TYPED_WRONG)
+        usage = USAGE_STATUS.get(name, 1 if name in ("rospack", "rosstack") else USAGE_ERROR)
         assert result.status in (usage, EX_USAGE), name
         assert result.status == EX_USAGE or result.out == usage_out(name)
         own = without_ros_words(result.err)
@@ -314,7 +314,7 @@ def test_a_missing_argument(lines: list[str]) -> None:
         ):
             result = run(line)
             out = run("rosrun -h").out.partition("\n\n")[0] + "\n" if line == "rosrun" else ""
-            assert (result.status, result.out) == (TYPED_WRONG, out), line
+            assert (result.status, result.out) == (USAGE_ERROR, out), line
             one_line(result, line)
 
 
@@ -334,7 +334,7 @@ def test_the_other_name_of_each_command() -> None:
         if name and not ELSEWHERE.match(name):
             ours, theirs = run(f"minirospy {noun} --nonsense"), run(f"{name} --nonsense")
             assert ours.status == theirs.status
-            assert theirs.status in (USAGE_STATUS.get(name, TYPED_WRONG), EX_USAGE)
+            assert theirs.status in (USAGE_STATUS.get(name, USAGE_ERROR), EX_USAGE)
             assert name == "roscore" or ours == theirs
 
 
@@ -506,7 +506,7 @@ def test_an_output_that_cannot_encode(graph: Robot) -> None:
 def test_words_that_are_no_text(line: str, graph: Robot) -> None:
     """A byte that is not UTF-8, as Python passes it on."""
     result = run(f"{line} \udcff")
-    assert (result.status, result.out) == (TYPED_WRONG, RULE if line == "rosnode info" else "")
+    assert (result.status, result.out) == (USAGE_ERROR, RULE if line == "rosnode info" else "")
     assert "not UTF-8 text" in one_line(result, line)
 
 

@@ -30,7 +30,7 @@ while not rospy.is_shutdown():
 
 @pytest.fixture
 def talker(master: str) -> Iterator[subprocess.Popen[str]]:
-    """Return the node /talker, which logs what it reads: an error where it begins with an exclamation mark."""
+    """Return the node /talker, which logs what it reads: an error if it starts with an exclamation mark."""
     process = subprocess.Popen(
         [sys.executable, "-c", _NODE],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=dict(os.environ),
@@ -88,7 +88,7 @@ def test_echo_that_waits_in_vain_says_so(
     assert [echo.stderr.readline() for _ in range(2)] == [
         "WARNING: topic [/!!] does not appear to be published yet; that is not a legal name: letters, digits, "
         "_ and /\n",
-        "WARNING: no node's name begins as [nobody] yet\n",
+        "WARNING: no node's name starts with [nobody] yet\n",
     ]
 
 

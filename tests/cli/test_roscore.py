@@ -195,7 +195,7 @@ def test_log_folder(start: Start) -> None:
     master.call("unsubscribeParam", "http://127.0.0.1:1/", "/p")
     master.close()
     core.end()
-    # There from the start, for `tail -f`; first comes what real rosout begins with.
+    # There from the start, for `tail -f`; with the first lines of real rosout.
     assert re.fullmatch(r"\n\n[0-9]+\.[0-9]{9}  Node Startup\n", (folder / "rosout.log").read_text())
     log = (folder / "master.log").read_text()
     assert "[minirospy.master][INFO] " in log
@@ -329,7 +329,7 @@ def test_rosout_node_lists_and_sets_the_loggers_of_the_master(
     rosservice(["call", "/rosout/get_loggers"])
     assert 'name: "ros.runtime.notifier"\n    level: "debug"' in capsys.readouterr().out
     assert rosservice(["call", "/rosout/set_logger_level", "ros", "loud"]) != 0
-    assert "[loud] is none of the levels debug, info, warn, error, fatal" in capsys.readouterr().err
+    assert "[loud] is not one of the levels debug, info, warn, error, fatal" in capsys.readouterr().err
 
 
 def test_closed_standard_output_does_not_stop_the_master(start: Start) -> None:

@@ -212,7 +212,7 @@ def test_pub_from_standard_input_and_file(
         (["/t", "std_msgs/Bool", "data:", "True"], 1, "quotes belong around the whole of a message"),
         (["/t", "/Bool", "True"], 1, "did you mean std_msgs/Bool?"),
         (["-5", "/t", "std_msgs/Bool", "True"], 1, "message type [/t] not found"),
-        (["/t", "std_msgs/String", "5"], 1, "in quotes of its own: \"'5'\""),
+        (["/t", "std_msgs/String", "5"], 1, "needs its own quotes: \"'5'\""),
         (["/t", "std_msgs/Float64", "1e-3"], 1, "numbers like 1.0e-3"),
         (["/b-ad", "std_msgs/Bool", "True"], 2, "topic [/b-ad]: that is not a legal name"),
         (["/t"], 2, "arguments are required"),
@@ -370,7 +370,7 @@ def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
         _until(lambda expected=heard: robot.heard == expected)  # type: ignore[misc]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there at once")
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there immediately")
 def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, command: Any) -> None:
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "True"])
     _until(lambda: robot.heard == [b"\x01"])

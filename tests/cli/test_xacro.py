@@ -1,4 +1,4 @@
-"""xacro: as a command, of its package, in launch files and in Python programs, whatever the path of programs is."""
+"""xacro: as a command, of its package, in launch files and in Python programs, for any path of programs."""
 
 from __future__ import annotations
 

@@ -61,10 +61,10 @@ def signalled(script: str, number: int) -> tuple[int, str, str, float]:
     open_input, process.stdin = process.stdin, None
     assert open_input
     with open_input:
-        begun = time.monotonic()
+        start_time = time.monotonic()
         process.send_signal(number)
         output, errors = process.communicate(timeout=GUARD)
-        return process.returncode, output, errors, time.monotonic() - begun
+        return process.returncode, output, errors, time.monotonic() - start_time
 
 
 SECONDS = 3.0
@@ -288,10 +288,10 @@ def test_hooks_run_in_time_while_the_main_thread_is_in_c_code(master: str) -> No
 
     def program() -> float:
         process = start(IN_C_CODE)
-        begun = time.monotonic()
+        start_time = time.monotonic()
         process.send_signal(signal.SIGTERM)
         assert read_line(process) == "motors stopped\n"
-        took = time.monotonic() - begun
+        took = time.monotonic() - start_time
         process.communicate("\n", timeout=GUARD)
         return took
 
@@ -383,12 +383,12 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
             "shutdown: still waiting for the master to unregister this node. "
             "Press Ctrl-C again to interrupt it, and a third time to end the process\n"
         )
-        begun = time.monotonic()
+        start_time = time.monotonic()
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=GUARD)
         assert (process.returncode, output.splitlines()[-1], errors) == (0, "finally", "")
         # Ten seconds is the limit for a master that is silent.
-        assert time.monotonic() - begun < 7.0
+        assert time.monotonic() - start_time < 7.0
 
 
 @POSIX_ONLY
@@ -472,12 +472,12 @@ time.sleep(60)
         )
         assert process.stdout
         assert process.stdout.readline() == "1\n"
-        begun = time.monotonic()
+        start_time = time.monotonic()
         for child in psutil.Process(process.pid).children():
             child.terminate()
         assert process.communicate(timeout=GUARD) == ("hook\n", "")
         assert process.returncode == 0
-        return time.monotonic() - begun
+        return time.monotonic() - start_time
 
     in_time(program)
 
@@ -489,10 +489,10 @@ import time, rospy
 rospy.init_node("caller")
 took = 9
 while took > 1:  # a turn in which the machine stalled shows nothing
-    begun = time.monotonic()
+    start_time = time.monotonic()
     rospy.is_shutdown()
     time.sleep(0.9)
-    took = time.monotonic() - begun
+    took = time.monotonic() - start_time
 print("ready", flush=True)
 while not rospy.is_shutdown():
     time.sleep(0.9)
@@ -557,11 +557,11 @@ rospy.spin()
         process.send_signal(signal.SIGINT)
         assert process.stdout
         assert process.stdout.readline() == "in the hook\n"
-        begun = time.monotonic()
+        start_time = time.monotonic()
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=GUARD)
         assert not is_known(master, "/slow")
-        return time.monotonic() - begun
+        return time.monotonic() - start_time
 
     in_time(program)
 
@@ -591,7 +591,7 @@ assert worker.exitcode == -15
 with multiprocessing.get_context("fork").Pool(2) as pool:
     assert pool.map(abs, [-1, -2]) == [1, 2]
 """,
-    "a node of its own": """
+    "a separate node": """
 def own_node():
     child()
     for inherited in (pub, sub):

@@ -115,7 +115,7 @@ def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
 
 
 def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
-    """It begins to connect to where the service was last; who answers is whom the master names."""
+    """It connects to the last known address first; the answer comes from the node that the master names."""
     client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))
     servers = []
     for name in ("one", "two"):
@@ -124,7 +124,7 @@ def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
         for _ in range(2):
             say(client)
             assert hear(client) == name
-    # The first lives on, and serves whoever comes to it.
+    # The first still runs, and serves its clients.
     assert servers[0].poll() is None
     servers[1].kill()
     servers[1].wait()

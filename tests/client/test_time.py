@@ -88,7 +88,7 @@ rospy.set_param("/use_sim_time", True)
 rospy.init_node("case")
 rospy.rostime._set_rostime(rospy.Time(5))
 timer = rospy.Timer(rospy.Duration(1), print)
-while timer.is_alive():  # it may not have begun
+while timer.is_alive():  # it may not have started
     for second in (5, 4):
         rospy.rostime._set_rostime(rospy.Time(second))
         timer.join(0.05)

@@ -1,6 +1,6 @@
 """client/topics beyond rospy: what it warns of, waiting for subscribers, freshness, and what it survives.
 
-What is as with rospy is in tests/referee/cases/topics*.py. Each test is a program of its own, since a process has one node.
+What is as with rospy is in tests/referee/cases/topics*.py. Each test is a separate program, since a process has one node.
 """
 
 from __future__ import annotations
@@ -270,19 +270,19 @@ rospy.init_node("n")
 arrived = threading.Event()
 ends = []
 
-def begin():
-    ends.append(rospy.{begin})
+def create():
+    ends.append(rospy.{create})
 
 def let_another_begin(wait):
     module.unregister_from_master = unregister_from_master
-    other = threading.Thread(target=begin)
+    other = threading.Thread(target=create)
     other.start()
     other.join(20)
     unregister_from_master(wait)
 
 unregister_from_master = module.unregister_from_master
 module.unregister_from_master = let_another_begin
-begin()
+create()
 ends[0].unregister()
 peer = rospy.{peer}
 eventually(ends[1].get_num_connections)
@@ -293,8 +293,8 @@ print(ends[1].get_num_connections())
 @pytest.mark.parametrize("kind", ["Publisher", "Subscriber"])
 def test_a_topic_that_one_thread_leaves_another_may_join_at_that_moment(start: Start, kind: str) -> None:
     calls = ['Subscriber("/t", Bool)', 'Publisher("/t", Bool, queue_size=1)']
-    begin, peer = calls if kind == "Subscriber" else calls[::-1]
-    assert finished(start(AT_ONCE.format(module=kind.lower(), begin=begin, peer=peer))) == ("1\n", "")
+    create, peer = calls if kind == "Subscriber" else calls[::-1]
+    assert finished(start(AT_ONCE.format(module=kind.lower(), create=create, peer=peer))) == ("1\n", "")
 
 
 FIRST_AT_ONCE = """
@@ -303,12 +303,12 @@ sys.setswitchinterval(1e-6)
 for number in range(40):
     gate = threading.Barrier(4)
 
-    def begin():
+    def create():
         gate.wait()
-        ends.append(rospy.{begin})
+        ends.append(rospy.{create})
 
     ends = []
-    threads = [threading.Thread(target=begin) for _ in range(4)]
+    threads = [threading.Thread(target=create) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -320,9 +320,9 @@ print("done")
 """
 
 
-@pytest.mark.parametrize("begin", ['Subscriber(f"/t{number}", Bool)', 'Publisher("/t", Bool, queue_size=1)'])
-def test_several_threads_may_be_the_first_of_a_topic(start: Start, begin: str) -> None:
-    assert finished(start(FIRST_AT_ONCE.format(begin=begin))) == ("done\n", "")
+@pytest.mark.parametrize("create", ['Subscriber(f"/t{number}", Bool)', 'Publisher("/t", Bool, queue_size=1)'])
+def test_several_threads_may_be_the_first_of_a_topic(start: Start, create: str) -> None:
+    assert finished(start(FIRST_AT_ONCE.format(create=create))) == ("done\n", "")
 
 
 LATCHED_MEANWHILE = """

@@ -84,7 +84,7 @@ def test_watch_prints_the_chosen_pins_until_the_timeout(board: Board) -> None:
     assert not list(board.watch([12], timeout=0.05))
 
 
-# It listens before it says so: an edge that comes before wait_for_edge() begins would be lost, as on hardware.
+# It listens before it prints: an edge before wait_for_edge() starts would be lost, as on hardware.
 CHILD = """
 import threading
 from RPi import GPIO

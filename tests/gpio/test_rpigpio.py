@@ -397,7 +397,7 @@ def test_wait_for_edge(bcm: Gpio, board: Board) -> None:
     felt = threading.Event()
 
     def press_until_felt() -> None:
-        # A press that comes before the wait has begun is not felt.
+        # A press before the wait has started is not detected.
         while not felt.wait(0.05):
             board.release(11)
             board.press(11)

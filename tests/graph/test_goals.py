@@ -55,15 +55,15 @@ def test_a_client_that_heard_nothing_takes_every_status() -> None:
 
 @pytest.mark.parametrize("event", GoalEvent)
 @pytest.mark.parametrize(
-    "begin", [GoalState.PENDING, GoalState.ACTIVE, GoalState.RECALLING, GoalState.PREEMPTING]
+    "before", [GoalState.PENDING, GoalState.ACTIVE, GoalState.RECALLING, GoalState.PREEMPTING]
 )
-def test_a_client_follows_each_step_of_a_server(begin: GoalState, event: GoalEvent) -> None:
+def test_a_client_follows_each_step_of_a_server(before: GoalState, event: GoalEvent) -> None:
     """Whatever a server may do, a client that heard the status before takes the next one."""
-    after = SERVER_STEPS[event].get(begin)
+    after = SERVER_STEPS[event].get(before)
     if after is None:
         return
     state = ClientState.WAITING_FOR_GOAL_ACK
-    for status in (begin, after):
+    for status in (before, after):
         steps = client_steps(state, status)
         assert steps is not None
         state = steps[-1] if steps else state

@@ -1,4 +1,4 @@
-"""No text of a definition, whoever wrote it, is executed: names are refused, all other text stays text."""
+"""No text of a foreign definition is executed: names are refused, all other text stays text."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """One end of an action, for the interop tests: runs on actionlib and on ours alike. action_peer.cpp is its twin.
 
 `serve` prints "ready" and serves /interop_action until its input ends; `ask` sends goals and prints how they ended.
-Goal 1 succeeds with feedback, 2 aborts, 3 runs until it is preempted. None ends at once: a client of actionlib in
+Goal 1 succeeds with feedback, 2 aborts, 3 runs until it is preempted. None ends immediately: a client of actionlib in
 Python does not take an answer that comes before its send_goal() has returned.
 """
 

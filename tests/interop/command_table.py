@@ -1,8 +1,8 @@
 """Every command and option of rostopic, rosnode, rosservice, rosparam, rosmsg and rossrv, typed in real ROS and in ours.
 
 `WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes what both print to docs/command_compatibility.md.
-Compared are standard output and the exit status. Errors on stderr begin with ROS's words where ROS has its own, then ours
-follow: OTHER_WORDS are the lines where they do not.
+Compared are standard output and the exit status. Errors on stderr start with ROS's text where ROS has one, then ours
+follows: OTHER_WORDS are the lines where they do not.
 
 A line below is what is typed, then perhaps ` <<< text` for standard input and ` ## why` ours differs on purpose.
 """

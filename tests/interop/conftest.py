@@ -1,4 +1,4 @@
-"""Real ROS 1 beside ours: masters, peers and tools of both, on ports of their own.
+"""Real ROS 1 next to ours: masters, peers and tools of both, on separate ports.
 
 `make interop` installs Debian's ROS 1 and runs this folder; where it is not installed, all of it is skipped.
 """
@@ -28,7 +28,7 @@ STACKS = ("ours", "rospy", "roscpp")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # What takes minutes begins first: the others fill the time beside it.
+    # The test that takes minutes starts first: the others run in parallel.
     items.sort(key=lambda item: item.name.partition("[")[0] != "test_the_table")
     for item in items:
         if HERE not in item.path.parents:
@@ -72,7 +72,7 @@ def stop(program: subprocess.Popen[str]) -> None:
 
 
 def answers(uri: str) -> bool:
-    """Whether a master answers at ``uri``."""
+    """Return whether a master answers at ``uri``."""
     host, port = uri.removeprefix("http://").rstrip("/").rsplit(":", 1)
     try:
         socket.create_connection((host, int(port)), 5).close()

@@ -42,7 +42,7 @@ def digest(message):
 
 
 def say(*words):
-    """One write a line: callbacks of several topics speak at once."""
+    """One write a line: callbacks of several topics run concurrently."""
     sys.stdout.write(" ".join(map(str, words)) + "\n")
     sys.stdout.flush()
 

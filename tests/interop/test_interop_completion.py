@@ -101,7 +101,7 @@ def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
 
 
 def covers(ours: str, real: str) -> bool:
-    """Whether a candidate of ours is the real one, or the way to it: ours quotes, puts := there, goes to types in two steps."""
+    """Return whether a candidate of ours is the real one, or a prefix of it: ours quotes, adds :=, types take two steps."""
     ours = ours.replace("\\ ", " ")
     return ours == real or (ours.endswith("/") and real.startswith(ours)) or ours == f"{real}:="
 

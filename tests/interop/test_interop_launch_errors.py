@@ -52,7 +52,7 @@ PROGRAM = """
 import json, sys
 import roslaunch
 said, loader = {}, roslaunch.XmlLoader()
-# Of a loader of one's own, ROS wants to know that.
+# ROS requires it of a user's loader.
 loader.ignore_unset_args = False
 for body in json.load(sys.stdin):
     with open("fault.launch", "w") as file:

@@ -21,7 +21,7 @@ def load_test_master() -> Any:
 
 
 def test_the_golden_answers_are_those_of_real_rosmaster(real_master: str) -> None:
-    """With RECORD=1 in the environment they are written anew."""
+    """With RECORD=1 in the environment they are recorded again."""
     referee, file = load_test_master(), RUNTIME / "master_answers.json"
     recording = "RECORD" in os.environ
     golden = {} if recording else json.loads(file.read_text())

@@ -328,7 +328,7 @@ def test_values(real: Callable[[str], Peer], root: str, package: str) -> None:
 
 
 def test_strings_as_text(real: Callable[[str], Peer]) -> None:
-    """Each string that YAML writes in a way of its own: alone, and first, middle and last of a list."""
+    """Each string that YAML quotes or folds in a special way: alone, and first, middle and last of a list."""
     ours = ours_of("ours", "sensor_msgs")
     for one in ODD_STRINGS:
         for names in ([one], [one, "plain"], ["plain", one, "x"], ["a", one]):
@@ -421,7 +421,7 @@ ODD = {
     "header second": text_of("int8 x\nHeader header\n", std_msgs__Header=HEADER),
     "Header of another name": text_of("Header head\n", std_msgs__Header=HEADER),
     "header of another type": "string header\n",
-    "header of a type of its own": text_of("odd_msgs/Header header\n", odd_msgs__Header="int8 x\n"),
+    "header of its package": text_of("odd_msgs/Header header\n", odd_msgs__Header="int8 x\n"),
     "headers": text_of("std_msgs/Header[] headers\nstd_msgs/Header[2] two\n", std_msgs__Header=HEADER),
     "nested header": text_of("A header\nA[] a\n", odd_msgs__A="Header header\n", std_msgs__Header=HEADER),
     "many numbers": "".join(f"int8 x{i}\n" for i in range(300)),
@@ -676,7 +676,7 @@ def test_wrong_values(real: Callable[[str], Peer], name: str, value: Plain) -> N
 def test_wrong_values_that_only_ours_names(
     real: Callable[[str], Peer], name: str, value: Plain, kind: str, text: str
 ) -> None:
-    """Ours is a SerializationError that says what is wrong, whatever real genpy raises."""
+    """Ours is a SerializationError that names the fault; real genpy raises various errors."""
     with pytest.raises(RealError) as theirs:
         real("ours").ask("serialize", (name, value))
     assert theirs.value.kind == kind

@@ -1,4 +1,4 @@
-"""Two machines: network namespaces with addresses of their own and a router between them, which drops packets on demand.
+"""Two machines: network namespaces with their own addresses and a router between them, which drops packets on demand.
 
 ::
 
@@ -69,7 +69,7 @@ class Network:
             folder = Path("/etc/netns") / self.names[machine]
             folder.mkdir(parents=True)
             (folder / "hosts").write_text(HOSTS)
-            # A name server that says no at once: the one of outside would be waited for.
+            # A name server that refuses immediately: an outside one would time out.
             (folder / "resolv.conf").write_text("nameserver 127.0.0.1\n")
         for switch in ("ipv4/ip_forward", "ipv6/conf/all/forwarding"):
             subprocess.run(

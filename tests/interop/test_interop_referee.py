@@ -1,6 +1,6 @@
 """The cases of tests/referee under real rospy: what is recorded there is what it prints.
 
-`RECORD=1 pytest tests/interop/test_interop_referee.py` writes the records anew.
+`RECORD=1 pytest tests/interop/test_interop_referee.py` records them again.
 """
 
 from __future__ import annotations

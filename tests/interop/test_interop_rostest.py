@@ -20,7 +20,7 @@ Case = tuple[str, str, tuple[str, ...]]
 
 
 class Ran:
-    """A command of real ROS or of ours, in a ROS_HOME of its own; both run at the same time."""
+    """A command of real ROS or of ours, in a separate ROS_HOME; both run at the same time."""
 
     def __init__(self, stack: str, home: Path, *command: str) -> None:
         self.home = home

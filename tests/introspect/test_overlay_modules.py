@@ -145,7 +145,7 @@ def test_rosparam(master: str, tmp_path: Path) -> None:
 
 
 def test_without_a_master() -> None:
-    """Each has an error of its own for it."""
+    """Each has its own error for it."""
     asked: list[tuple[Any, Any]] = [
         (rostopic.get_topic_list, rostopic.ROSTopicIOException),
         (rosnode.get_node_names, rosnode.ROSNodeIOException),
@@ -183,7 +183,7 @@ def test_the_commands_as_functions(master: str, capsys: pytest.CaptureFixture[st
 
 
 def test_names_that_ros_leaks_exist_here(master: str) -> None:
-    """ROS raises whatever its YAML or XML-RPC library raises."""
+    """ROS raises the errors of its YAML and XML-RPC libraries."""
     for name, value in (("/a", "{a: "), ("/a", "")):
         with pytest.raises(rosparam.RosParamException):
             rosparam.set_param(name, value)

@@ -18,7 +18,7 @@ from tests.conftest import free_port
 
 
 def eventually(condition: Callable[[], object]) -> bool:
-    """Whether a condition holds within half a minute."""
+    """Return whether a condition holds within half a minute."""
     end = time.monotonic() + 30
     while not condition() and time.monotonic() < end:
         time.sleep(0.01)

@@ -42,14 +42,14 @@ def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: 
 
 
 def test_a_node_that_ignores_signals_is_killed(start: Start, master: str) -> None:
-    deaf = start(
+    ignoring = start(
         f'{NODE}"a" args="SIGINT SIGTERM" output="screen"/>', "--sigint-timeout=0.2", "--sigterm-timeout=0.2"
     )
     slow = start(f'{NODE}"b" args="SIGINT" output="screen"/>', "--sigint-timeout=0.2", "--sigterm-timeout=30")
-    for launch in (deaf, slow):
+    for launch in (ignoring, slow):
         launch.read_until("waiting SIGINT")
         launch.process.send_signal(signal.SIGINT)
-    said, _ = deaf.process.communicate(timeout=30)
+    said, _ = ignoring.process.communicate(timeout=30)
     assert "[a-1] escalating to SIGTERM\n" in said
     assert "[a-1] escalating to SIGKILL\nShutdown errors:\n * process[a-1, pid " in said
     said, _ = slow.process.communicate(timeout=30)
@@ -76,7 +76,7 @@ def test_where_a_node_prints_and_runs(start: Start, master: str, package: Path) 
         '<node pkg="pkg" type="stop.py" name="b" args="0" output="screen"/>'
     )
     said, _ = launch.process.communicate(timeout=30)
-    # Standard error is seen, whatever `output` says.
+    # Standard error is shown, for any value of `output`.
     assert said.count("err\n") == 2
     assert f"out {home} 1 2\n" in said
     folder = home / "log" / str(run_id.get_param("/run_id"))

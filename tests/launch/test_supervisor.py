@@ -44,7 +44,7 @@ class Clock:
 
 
 class Events(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue whose time limits pass at once, on the test's clock, where it is empty; without a limit it waits."""
+    """A queue whose timeouts pass immediately on the test's clock if it is empty; without a timeout it waits."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock

@@ -45,7 +45,7 @@ def outcome(label: str, call: Callable[[], Any]) -> None:
     """Show what a call gives: its value, or the type and text of what it raises."""
     try:
         value = call()
-    except Exception as error:  # noqa: BLE001 - whatever it is
+    except Exception as error:  # noqa: BLE001 - any error is printed
         show(label, "raises", type(error).__name__, "|", str(error))
     else:
         show(label, "gives", repr(value))
@@ -62,7 +62,7 @@ def printed(label: str, call: Callable[[], Any], *masks: tuple[str, str], texts:
             value = repr(call())
         except SystemExit as error:
             value = f"SystemExit {error.code}"
-        except Exception as error:  # noqa: BLE001 - whatever it is
+        except Exception as error:  # noqa: BLE001 - any error is printed
             value = f"{type(error).__name__}: {error}" if texts else type(error).__name__
     text = out.getvalue()
     for pattern, word in masks:
@@ -118,7 +118,7 @@ def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
 
 
 def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> bool:
-    """Whether a condition holds within some time."""
+    """Return whether a condition holds within some time."""
     waiting = threading.Event()
     for _ in range(int(seconds / 0.02)):
         if condition():

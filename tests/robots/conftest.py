@@ -48,7 +48,7 @@ def end(process: subprocess.Popen[str]) -> tuple[str, str]:
 
 
 def python(code: str) -> str:
-    """Return what a program prints that is a node of its own."""
+    """Return what a program prints that is a separate node."""
     return subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=SECONDS
     ).stdout

@@ -151,11 +151,11 @@ def test_ctrl_c_ends_all_tests(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal")
 def test_ctrl_c_is_no_success_of_rosunit(tmp_path: Path) -> None:
-    begun, file = tmp_path / "begun", tmp_path / "slow.py"
-    file.write_text(f"import time\nopen({str(begun)!r}, 'w')\ntime.sleep(60)\n")
+    started, file = tmp_path / "started", tmp_path / "slow.py"
+    file.write_text(f"import time\nopen({str(started)!r}, 'w')\ntime.sleep(60)\n")
     popen = start("rosunit", "--package=p", file)
     end = time.monotonic() + 30
-    while not begun.exists() and popen.poll() is None and time.monotonic() < end:
+    while not started.exists() and popen.poll() is None and time.monotonic() < end:
         time.sleep(0.02)
     os.kill(popen.pid, signal.SIGINT)
     _, err = popen.communicate(timeout=30)

@@ -107,7 +107,7 @@ def test_what_no_journal_holds(value: object) -> None:
     ("data", "damage"),
     [
         (b"", "it is empty"),
-        (b"minirospy", "it does not begin as a journal"),
+        (b"minirospy", "it does not start as a journal"),
         (HEAD + b"\1", "its last record is torn"),
         (HEAD + serialize_record([1])[:7], "its last record is torn"),
         (HEAD + serialize_record([1])[:-1], "its last record is torn"),

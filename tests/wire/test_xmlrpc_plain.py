@@ -35,7 +35,7 @@ PIECES = [
 
 
 def check(body: bytes) -> bool:
-    """Whether ``body`` was read; as the parser reads it."""
+    """Return whether ``body`` was read; as the parser reads it."""
     found = read_plain(body)
     if found is None:
         return False
@@ -132,6 +132,6 @@ def test_a_long_document_takes_a_time_that_grows_with_its_length() -> None:
         b"x" * 100,
     ):
         body = b"<methodResponse><params>" + piece * 20_000 + b"</params></methodResponse>"
-        begin = time.process_time()
+        start_time = time.process_time()
         assert read_plain(body) is None or piece == b" "
-        assert time.process_time() - begin < 1.0
+        assert time.process_time() - start_time < 1.0

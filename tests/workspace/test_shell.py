@@ -34,7 +34,7 @@ class Result(NamedTuple):
 
 @cache
 def dotfiles() -> Path:
-    """Where zsh keeps what its completion system has found: for all tests, as that takes it a second."""
+    """Return where zsh keeps what its completion system has found: for all tests, as that takes it a second."""
     folder = tempfile.TemporaryDirectory()
     atexit.register(folder.cleanup)
     return Path(folder.name)

@@ -217,7 +217,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
-            # Feedback travels by a connection of its own: what has come by now is to be read first.
+            # Feedback has a separate connection: what has arrived by now is read first.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

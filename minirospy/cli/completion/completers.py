@@ -41,7 +41,7 @@ _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Place(NamedTuple):
-    """Where the cursor is: in an argument of ``verb``, after the arguments ``given``, ``word`` begun."""
+    """Where the cursor is: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
 
     verb: str
     given: tuple[str, ...]
@@ -140,17 +140,17 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
     """Return what is in the folder that ``word`` is in; ``shown`` represents ``root`` at its start."""
-    head, _, begun = word.rpartition("/")
+    head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
-    return [f"{head}/{name}" for name in _entries(folder, hidden=begun.startswith("."))]
+    return [f"{head}/{name}" for name in _entries(folder, hidden=prefix.startswith("."))]
 
 
 def files(place: Place) -> Iterable[str]:
     """Return files and folders of this computer, as shells complete them."""
-    head, slash, begun = place.word.rpartition("/")
+    head, slash, prefix = place.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
-    return [head + slash + name for name in _entries(folder, hidden=begun.startswith("."))]
+    return [head + slash + name for name in _entries(folder, hidden=prefix.startswith("."))]
 
 
 def bag_files(place: Place) -> Iterable[str]:

@@ -189,7 +189,7 @@ class _Progress:
             self._tell("Active")
 
     def _on_feedback(self, feedback: Message) -> None:
-        # It travels by a connection of its own, and may come before the status.
+        # It has a separate connection, and may arrive before the status.
         self._on_active()
         line = "Feedback: " + ", ".join(f"{field.path}: {flow(field.value)}" for field in fields(feedback))
         share = progress(self._goal, feedback)

@@ -52,7 +52,7 @@ def ask_for(
         answer = ask(_question(field)).strip()
         while answer:
             try:
-                # Tried on a message of its own: a value that does not fit must not stay.
+                # Tried on a separate message: a value that does not fit must not stay.
                 values = _nested(field.path, _value(field, answer))
                 check(fill(type(message)(), [values]))
             except (MessageException, ValueTextError) as error:

@@ -82,7 +82,7 @@ def _echo_parser() -> Parser:
         metavar="FILTER",
         nargs="?",
         default=".*",
-        help="a regular expression: only nodes whose name begins so (default: .*)",
+        help="a regular expression: only nodes whose name starts with it (default: .*)",
         completer="nothing",
     )
     parser.add_argument(
@@ -125,7 +125,7 @@ def _echo(
         if not field or field.path:
             warn_unpublished(graph, name)
         if not any(map(wanted.match, list_nodes(graph))):
-            warn(f"no node's name begins as [{wanted.pattern}] yet")
+            warn(f"no node's name starts with [{wanted.pattern}] yet")
 
     with tool_node("rosconsole", arguments) as node:
         for received in node.inbox(name):

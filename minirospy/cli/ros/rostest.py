@@ -37,7 +37,7 @@ def _rostest_parser() -> Parser:
     parser = AssignmentParser(
         prog="rostest",
         usage="rostest [options] PACKAGE FILE [arg:=value ...]\n       rostest [options] FILE [arg:=value ...]",
-        description="Runs each <test> of a launch file, with the file's nodes and a master of its own on a free port.",
+        description="Run each <test> of a launch file, with the file's nodes and a new master on a free port.",
         epilog="Exit status: 0 all passed, 1 a test could not be run or wrote no results, 2 a test failed.",
     )
 

@@ -35,7 +35,7 @@ def _xacro(words: Sequence[str]) -> int:
         raise MinirospyError(f"the package xacro cannot be imported ({error}): pip install xacro") from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # A robot description is UTF-8, whatever the system's code page is; roslaunch reads it as such.
+        # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as such.
         sys.stdout.reconfigure(encoding="utf-8")
     sys.argv = ["xacro", *(word for word in words if word not in _ALWAYS)]
     try:

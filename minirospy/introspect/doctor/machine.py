@@ -43,7 +43,7 @@ def check_python() -> Iterator[Finding]:
         yield problem(
             "python",
             f"{what}; `import rospy` finds nothing",
-            "run without -I and -S, or install minirospy again: a .pth file of its own puts rospy on the path",
+            "run without -I and -S, or install minirospy again: its .pth file puts rospy on the path",
         )
     elif _OURS in Path(origin).parents:
         yield ok("python", f"{what}; `import rospy` is minirospy's")

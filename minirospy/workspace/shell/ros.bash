@@ -232,7 +232,7 @@ _ros_candidates() {
     local into=-a vertical_tab=$'\v' line_feed=$'\n' return=$'\r'
     [ -z "${ZSH_VERSION:-}" ] || into=-A
     _ros_found=()
-    # Thousands of candidates at once: a loop over them would take longer than to find them.
+    # Thousands of candidates in one step: a loop over them would take longer than to find them.
     IFS=$'\n' read -r -d '' "$into" _ros_found < <(command minirospy complete "$@" 2>/dev/null) || :
     [ ${#_ros_found[@]} -gt 0 ] || return 0
     _ros_found=("${_ros_found[@]%"$return"}")

@@ -192,7 +192,7 @@ def test_bad_requests_get_an_answer_and_do_no_harm(master: str, what: str) -> No
     request, expected = BAD[what]
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/kept", 1)
-        begin = time.process_time()
+        start_time = time.process_time()
         status, _, text = exchange(master, request).partition(b"\r\n")
         shown = status.split(b" ", 2)[1].decode() + " " + text.partition(b"\r\n\r\n")[2].decode()
         if expected == "fault":
@@ -203,7 +203,7 @@ def test_bad_requests_get_an_answer_and_do_no_harm(master: str, what: str) -> No
         else:
             assert shown.startswith("200")
             assert expected in shown
-        assert time.process_time() - begin < 10
+        assert time.process_time() - start_time < 10
         assert proxy.getParam("/test", "/kept") == [1, "Parameter [/kept]", 1]
         assert proxy.getParam("/test", "/")[0] == 1  # type: ignore[index]
 

@@ -715,14 +715,14 @@ class Killed:
         return process
 
     def wait(self) -> float:
-        begin = time.monotonic()
+        start_time = time.monotonic()
         while True:
             try:
                 with ServerProxy(self.uri) as proxy:
                     proxy.getPid("/test")
-                return time.monotonic() - begin
+                return time.monotonic() - start_time
             except OSError:
-                assert time.monotonic() - begin < 60
+                assert time.monotonic() - start_time < 60
                 time.sleep(0.01)
 
     def kill(self) -> float:
@@ -952,8 +952,8 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
 
 def first_to_end(processes: list[subprocess.Popen[bytes]]) -> list[subprocess.Popen[bytes]]:
     """Return the processes, the one first that has exited."""
-    begin = time.monotonic()
+    start_time = time.monotonic()
     while all(each.poll() is None for each in processes):
-        assert time.monotonic() - begin < 60
+        assert time.monotonic() - start_time < 60
         time.sleep(0.01)
     return sorted(processes, key=lambda each: each.poll() is None)

@@ -1,4 +1,4 @@
-"""A node of a process of its own, as users write it, under attack: it answers, its memory and its log stay small.
+"""A node in a separate process, as users write it, under attack: it answers, its memory and its log stay small.
 
 The attacks are those of benchmarks/bad_peers.py, which measures them.
 """
@@ -54,11 +54,11 @@ def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, maste
         (bad_peers.huge_request, tcpros),
         (short, 0),
     ]
-    begun = time.monotonic()
+    start_time = time.monotonic()
     for attack, port in attacks:
         row = bad_peers.measure(attack.__name__, node, attack, port, PEERS, ask)
         assert row.answered, row
         assert row.height - row.before < 40, row
     # Ten lines of each kind in ten seconds at most; each attack opens two hundred connections.
-    most = 30 * (1 + (time.monotonic() - begun) // 10)
+    most = 30 * (1 + (time.monotonic() - start_time) // 10)
     assert len(node.lines) < most, node.lines  # type: ignore[attr-defined]

@@ -27,7 +27,7 @@ NO_MASTER = {"ROS_MASTER_URI": "http://127.0.0.1:1", "ROS_IP": "127.0.0.1"}
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a scene on a loop of its own."""
+    """Run a scene on a new loop."""
     loop = new_event_loop()
     try:
         loop.run_until_complete(asyncio.wait_for(scene(), 30))

@@ -40,7 +40,7 @@ def transport(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a scene on a loop of its own."""
+    """Run a scene on a new loop."""
     loop = new_event_loop()
     try:
         loop.run_until_complete(asyncio.wait_for(scene(), 30))
@@ -277,12 +277,12 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
 
 @pytest.mark.usefixtures("transport")
 def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
-    begun, go_on = threading.Event(), threading.Event()
+    started, go_on = threading.Event(), threading.Event()
     bodies: list[bytes] = []
 
     def slow(frame: memoryview, _header: Header) -> None:
         bodies.append(bytes(frame[:4]))
-        begun.set()
+        started.set()
         go_on.wait(30)
 
     async def scene() -> None:
@@ -292,7 +292,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
             await b.subscribe(subscription)
             await eventually(lambda: publication.links)
             publication.publish(serialize_frame(b"0000" + bytes(1_000_000)))
-            await asyncio.get_running_loop().run_in_executor(None, begun.wait, 10)
+            await asyncio.get_running_loop().run_in_executor(None, started.wait, 10)
             for number in range(1, 101):
                 publication.publish(serialize_frame(b"%04d" % number + bytes(1_000_000)))
             # 100 MB were published; what waits is bounded by the queue.
@@ -432,7 +432,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
 
 
 def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The publisher ended the topic and began again; the list that says so came during the handshake."""
+    """The publisher unregistered and registered again; that update came during the handshake."""
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -527,7 +527,7 @@ async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]
 
 
 def known(master: Master) -> dict[str, list[str]]:
-    """Who is registered for /x, by kind."""
+    """Return who is registered for /x, by kind."""
     registry = master.registry
     tables = {
         "publisher": registry.publishers(),

@@ -363,11 +363,11 @@ def test_a_peer_that_ends_in_the_middle_of_a_large_message(
     assert link.waiting == 0
 
 
-@pytest.mark.parametrize("begin", [b"\x50\xc3\0\x80", b"\x50\xc3\x01\x80\x40\xc3\x01\0headABCD"])
+@pytest.mark.parametrize("start", [b"\x50\xc3\0\x80", b"\x50\xc3\x01\x80\x40\xc3\x01\0headABCD"])
 def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
-    pair: tuple[socket.socket, socket.socket], begin: bytes
+    pair: tuple[socket.socket, socket.socket], start: bytes
 ) -> None:
-    pair[1].sendall(serialize_frame(b"whole") + begin)
+    pair[1].sendall(serialize_frame(b"whole") + start)
     pair[1].close()
     frames: list[Frame] = []
     links.read_frames(pair[0], lambda frame: frames.append(bytes(frame)), QueueSize(0), links.ReaderSet())

@@ -13,17 +13,17 @@ from minirospy.runtime.transport.loop import LoopClosedError, LoopThread
 
 def test_a_call_while_the_loop_closes_gets_an_error() -> None:
     thread = LoopThread("test-loop")
-    stopping, begun = threading.Event(), threading.Event()
+    stopping, started = threading.Event(), threading.Event()
 
     def stop() -> None:
         thread.loop.stop()
         stopping.set()
-        begun.wait(30)
+        started.wait(30)
 
     thread.post(stop)
     assert stopping.wait(30)
     waits = [thread.begin(asyncio.sleep(0)), thread.begin(asyncio.sleep(60))]
-    begun.set()
+    started.set()
     # This one may just come to its end.
     with contextlib.suppress(LoopClosedError):
         waits[0](10)

@@ -18,7 +18,7 @@ from minirospy.runtime.transport.loop import new_event_loop
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Run a scene on a loop of its own."""
+    """Run a scene on a new loop."""
     loop = new_event_loop()
     try:
         loop.run_until_complete(asyncio.wait_for(scene(), 30))
