@@ -304,7 +304,11 @@ def _ros_options(title: str, actions: Iterable[argparse.Action]) -> str:
     for action in actions:
         if action.help == argparse.SUPPRESS:
             continue
-        value = "" if action.nargs == 0 else str(action.metavar or action.dest.upper())
+        value = (
+            ""
+            if action.nargs == 0
+            else str(action.dest.upper() if action.metavar is None else action.metavar)
+        )
         names = sorted(action.option_strings, key=lambda name: name.startswith("--"))
         shown = [
             (f"{name}={value}" if name.startswith("--") else f"{name} {value}") if value else name

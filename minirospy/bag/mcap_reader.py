@@ -1,0 +1,127 @@
+"""An MCAP file with messages of ROS 1 in, connections and messages in the order of time out.
+
+Opening reads the summary at the file's end. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, BinaryIO
+
+from minirospy.bag.base import BagReader, Block, Position, StoredMessage
+from minirospy.bag.index import ConnectionIndex
+from minirospy.bag.mcap_writer import check_mcap
+from minirospy.bag.records import ChunkInfo, Connection, Fields
+from minirospy.errors import BagFormatError, BagUnindexedError
+
+if TYPE_CHECKING:
+    from mcap.reader import SeekingReader
+    from mcap.records import Channel, Schema
+    from mcap.summary import Summary
+
+__all__ = ["MAGIC", "McapReader"]
+
+MAGIC = b"\x89MCAP0\r\n"
+"""The first and the last bytes of a file."""
+
+
+class McapReader(BagReader):
+    """An MCAP file of profile ``ros1``; its channels are the connections.
+
+    Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError where the file is damaged,
+    BagUnindexedError where it has no summary, BagError if the extra is missing.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        check_mcap()
+        from mcap.reader import SeekingReader
+
+        self.version = 0
+        self.stream = stream
+        self.foreign: list[str] = []
+        self.connections = {}
+        with _faults():
+            self._reader: SeekingReader = SeekingReader(stream)
+            summary = self._reader.get_summary()
+        if summary is None or summary.statistics is None:
+            raise BagUnindexedError("the MCAP file has no summary")
+        for channel in summary.channels.values():
+            schema = summary.schemas.get(channel.schema_id)
+            if channel.message_encoding == "ros1" and schema is not None:
+                self.connections[channel.id] = _connection(channel, schema)
+            else:
+                self.foreign.append(channel.topic)
+        self.statistics = summary.statistics
+        self.chunks = _chunk_infos(summary)
+
+    def messages(
+        self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
+    ) -> Iterator[StoredMessage]:
+        """See :meth:`BagReader.messages`."""
+        wanted = {number: self.connections[number] for number in connections or self.connections}
+        topics = {connection.topic for connection in wanted.values()}
+        with _faults():
+            for _, channel, message in self._reader.iter_messages(
+                topics, start_time=start, end_time=None if end is None else end + 1
+            ):
+                if connection := wanted.get(channel.id):
+                    yield StoredMessage(connection, message.log_time, message.data, 0)
+
+    def blocks(
+        self, connections: Sequence[int], start: int | None = None, end: int | None = None
+    ) -> Iterator[Block]:
+        """See :meth:`BagReader.blocks`."""
+        ranks = {number: rank for rank, number in enumerate(connections)}
+        for message in self.messages(connections, start, end):
+            rank = ranks[message.connection.id]
+            yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
+
+    def message_at(self, position: Position) -> StoredMessage:
+        """Raise BagFormatError: messages are read in order only."""
+        raise BagFormatError("messages of MCAP files are read in order only")
+
+    def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
+        """See :meth:`BagReader.index`; the file is read whole."""
+        indexes = {number: ConnectionIndex() for number in connections}
+        for message in self.messages(list(indexes)):
+            indexes[message.connection.id].extend([message.time], [0], 0)
+        return list(indexes.values())
+
+
+@contextlib.contextmanager
+def _faults() -> Iterator[None]:
+    """Turn what the library raises on damaged files into BagFormatError."""
+    import struct
+
+    from mcap.exceptions import McapError
+
+    try:
+        yield
+    except (McapError, struct.error, KeyError, StopIteration, UnicodeDecodeError) as error:
+        raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
+    except (EOFError, OSError, ValueError, RuntimeError) as error:
+        # Of the decompressors, and of seeking before the start of a short file.
+        raise BagFormatError(f"not a whole MCAP file: {error}") from error
+
+
+def _connection(channel: Channel, schema: Schema) -> Connection:
+    header: Fields = {name: value.encode() for name, value in channel.metadata.items()}
+    header.setdefault("topic", channel.topic.encode())
+    header["type"] = schema.name.encode()
+    header.setdefault("md5sum", b"*")
+    header["message_definition"] = schema.data
+    return Connection(channel.id, channel.topic, header)
+
+
+def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
+    """Return the chunks; the first one has the counts of all, which the summary does not have for each."""
+    assert summary.statistics is not None
+    counts = dict(summary.statistics.channel_message_counts)
+    infos = []
+    for chunk in summary.chunk_indexes:
+        infos.append(
+            ChunkInfo(chunk.chunk_start_offset, chunk.message_start_time, chunk.message_end_time, counts)
+        )
+        counts = {}
+    return infos

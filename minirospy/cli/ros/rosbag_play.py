@@ -1,0 +1,165 @@
+"""`rosbag play` and `rosrun rosbag play`: publish what bags hold, in its own time.
+
+Source: http://wiki.ros.org/rosbag/Commandline#play. Options and texts are those of ROS's command and of its C++ program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command, Verb
+from minirospy.errors import ROSInterruptException, UsageError
+
+if TYPE_CHECKING:
+    from minirospy.recording.schedule import PlayOptions
+
+__all__ = ["COMMAND", "VERB", "main"]
+
+_SECOND = 1e9
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `rosrun rosbag play`; return its exit status."""
+    return COMMAND.main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        "rosbag play",
+        "",
+        "rosbag play BAGFILE1 [BAGFILE2 BAGFILE3 ...]",
+        about="Play back the contents of one or more bag files in a time-synchronized fashion.",
+    )
+    add = parser.add_argument
+    add("bagfiles", nargs="*", help="bags, or MCAP files", completer="files")
+    add("-p", "--prefix", default="", metavar="PREFIX", help="prefix all output topics")
+    add("-q", "--quiet", action="store_true", help="suppress console output")
+    add("-i", "--immediate", action="store_true", help="play back all messages without waiting")
+    add("--pause", action="store_true", help="start in paused mode")
+    add("--queue", type=int, default=100, metavar="SIZE",
+        help="use an outgoing queue of size SIZE (defaults to 100)")  # fmt: skip
+    add("--clock", action="store_true", help="publish the clock time")
+    add("--hz", type=float, default=100.0, metavar="HZ",
+        help="use a frequency of HZ when publishing clock time (default: 100)")  # fmt: skip
+    add("-d", "--delay", type=float, default=0.2, metavar="SEC",
+        help="sleep SEC seconds after every advertise call (to allow subscribers to connect)")  # fmt: skip
+    add("-r", "--rate", type=float, default=1.0, metavar="FACTOR", help="multiply the publish rate by FACTOR")
+    add("-s", "--start", type=float, default=0.0, metavar="SEC", help="start SEC seconds into the bag files")
+    add("-u", "--duration", type=float, default=0.0, metavar="SEC",
+        help="play only SEC seconds from the bag files")  # fmt: skip
+    add("--skip-empty", type=float, default=None, metavar="SEC",
+        help="skip regions in the bag with no messages for more than SEC seconds")  # fmt: skip
+    add("-l", "--loop", action="store_true", help="loop playback")
+    add("-k", "--keep-alive", action="store_true",
+        help="keep alive past end of bag (useful for publishing latched topics)")  # fmt: skip
+    add("--try-future-version", action="store_true",
+        help="still try to open a bag file, even if the version number is not known to the player")  # fmt: skip
+    # Their values are no part of ROS's help.
+    lists = (
+        ("--topics", "topics to play back"),
+        ("--pause-topics", "topics to pause on during playback"),
+        ("--bags", "bags files to play back from"),
+    )
+    for name, text in lists:
+        metavar = "BAGS" if name == "--bags" else ""
+        add(name, nargs="*", default=[], action="extend", help=text, metavar=metavar)
+    add("--wait-for-subscribers", action="store_true",
+        help="wait for at least one subscriber on each topic before publishing")  # fmt: skip
+    add("--rate-control-topic", default="", metavar="RATE_CONTROL_TOPIC",
+        help="watch the given topic, and if the last publish was more than <rate-control-max-delay> ago, wait until the "
+        "topic publishes again to continue playback")  # fmt: skip
+    add("--rate-control-max-delay", type=float, default=1.0, metavar="RATE_CONTROL_MAX_DELAY",
+        help="maximum time difference from <rate-control-topic> before pausing")  # fmt: skip
+    return parser
+
+
+def _play(
+    bagfiles: list[str],
+    prefix: str,
+    quiet: bool,
+    immediate: bool,
+    pause: bool,
+    queue: int,
+    clock: bool,
+    hz: float,
+    delay: float,
+    rate: float,
+    start: float,
+    duration: float,
+    skip_empty: float | None,
+    loop: bool,
+    keep_alive: bool,
+    try_future_version: bool,
+    topics: list[str],
+    pause_topics: list[str],
+    bags: list[str],
+    wait_for_subscribers: bool,
+    rate_control_topic: str,
+    rate_control_max_delay: float,
+) -> int:
+    from minirospy.names import parse_arguments
+    from minirospy.recording.schedule import PlayOptions
+
+    paths = parse_arguments([*bagfiles, *bags]).plain
+    if not paths:
+        text = "You must specify at least 1 bag file to play back."
+        raise Misuse(text, text)
+    for name, value in (("--rate", rate), ("--hz", hz)):
+        if not value > 0:
+            raise UsageError(f"{name} must be above 0")
+    for name, value in (("--delay", delay), ("--start", start), ("--duration", duration)):
+        if not value >= 0:
+            raise UsageError(f"{name} must be 0 or positive")
+
+    options = PlayOptions(
+        prefix=prefix,
+        immediate=immediate,
+        paused=pause,
+        queue_size=max(0, queue),
+        clock=clock,
+        clock_hz=hz,
+        delay=round(delay * _SECOND),
+        rate=rate,
+        start=round(start * _SECOND),
+        duration=round(duration * _SECOND),
+        skip_empty=None if skip_empty is None else round(skip_empty * _SECOND),
+        loop=loop,
+        keep_alive=keep_alive,
+        topics=frozenset(parse_arguments(topics).plain),
+        pause_topics=frozenset(parse_arguments(pause_topics).plain),
+        wait_for_subscribers=wait_for_subscribers,
+        rate_control_topic=rate_control_topic,
+        rate_control_max_delay=round(rate_control_max_delay * _SECOND),
+        quiet=quiet,
+    )
+    return _run(paths, options)
+
+
+def _run(paths: list[str], options: PlayOptions) -> int:
+    # Imported here: the help needs none of it.
+    from minirospy import client
+    from minirospy.recording.player import Player
+    from minirospy.recording.sources import Bags
+
+    with Bags(paths) as bags:
+        try:
+            # Without the ROS time: that is what it may publish.
+            client.init_node("play", anonymous=True, disable_rostime=True)
+            for path in paths:
+                client.loginfo("Opening %s", path)
+            return Player(bags, options).run()
+        except ROSInterruptException:
+            return 0  # while it registered
+        finally:
+            client.signal_shutdown("the end")
+
+
+VERB = Verb(
+    "rosbag play",
+    "Play back the contents of one or more bag files in a time-synchronized fashion.",
+    _parser,
+    _play,
+)
+COMMAND = Command("play", _parser, _play)

@@ -1,0 +1,98 @@
+"""Single keys of the terminal, or characters of a pipe, while a program runs on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+
+__all__ = ["read_keys"]
+
+_POLL_SECONDS = 0.05
+
+
+@contextlib.contextmanager
+def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
+    """Call ``on_key`` with each key that is typed while the block runs, in a thread. Ctrl-C remains a signal.
+
+    Without a standard input nothing is read; in the background a terminal is left alone.
+    """
+    stop = threading.Event()
+    reader: Callable[[Callable[[str], object], threading.Event], None] | None = None
+    if sys.stdin is not None and not sys.stdin.closed:
+        reader = _read_windows if sys.platform == "win32" else _read_posix
+    thread = (
+        threading.Thread(target=reader, args=(on_key, stop), name="keys", daemon=True) if reader else None
+    )
+    if thread:
+        thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        if thread:
+            # It gives the terminal back as it was.
+            thread.join(1.0)
+
+
+def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
+    import select
+
+    with contextlib.suppress(OSError, ValueError):
+        number = sys.stdin.fileno()
+        terminal = _Terminal(number) if os.isatty(number) else None
+        try:
+            while not stop.is_set():
+                if terminal and not terminal.take():
+                    stop.wait(0.2)
+                    continue
+                if not select.select([number], [], [], _POLL_SECONDS)[0]:
+                    continue
+                data = os.read(number, 64)
+                if not data:
+                    return
+                for key in data.decode("utf-8", "replace"):
+                    on_key(key)
+        finally:
+            if terminal:
+                terminal.give_back()
+
+
+class _Terminal:
+    """A terminal whose keys come without Enter and without an echo, while this process is in its foreground."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._before: list[object] | None = None
+
+    def take(self) -> bool:
+        """Set the terminal up; return False in the background, where a read would stop the process."""
+        if os.tcgetpgrp(self._number) != os.getpgrp():
+            self._before = None
+            return False
+        if self._before is None:
+            import termios
+
+            self._before = termios.tcgetattr(self._number)
+            mode = termios.tcgetattr(self._number)
+            mode[3] &= ~(termios.ICANON | termios.ECHO)
+            termios.tcsetattr(self._number, termios.TCSANOW, mode)
+        return True
+
+    def give_back(self) -> None:
+        """Set the terminal as it was."""
+        if self._before is not None and os.tcgetpgrp(self._number) == os.getpgrp():
+            import termios
+
+            termios.tcsetattr(self._number, termios.TCSANOW, self._before)  # type: ignore[arg-type]
+
+
+def _read_windows(on_key: Callable[[str], object], stop: threading.Event) -> None:
+    if sys.platform == "win32":
+        import msvcrt
+
+        while not stop.wait(_POLL_SECONDS):
+            while msvcrt.kbhit():
+                on_key(msvcrt.getwch())

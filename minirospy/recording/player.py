@@ -1,0 +1,319 @@
+"""The node that plays bags: `rosbag play`. Messages are published as they were stored, never deserialized.
+
+Source: http://wiki.ros.org/rosbag/Commandline#play.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from minirospy import client
+from minirospy.bag.base import StoredMessage
+from minirospy.bag.records import Connection
+from minirospy.recording.frames import ReceivedFrame, frame_class
+from minirospy.recording.keys import read_keys
+from minirospy.recording.precise import PreciseWait
+from minirospy.recording.schedule import PlayOptions, Schedule, State
+from minirospy.recording.sources import Bags, Selection, read_ahead
+
+if TYPE_CHECKING:
+    from std_srvs.srv import SetBoolRequest, SetBoolResponse
+
+__all__ = ["Player"]
+
+_SECOND = 10**9
+_TICK = _SECOND // 10
+"""The status line is printed so often, and a shutdown noticed."""
+
+_SWITCH_SECONDS = 0.0005
+"""How long the thread that reads ahead may keep the GIL when a message is due."""
+
+_STAMP = struct.Struct("<4xII")
+"""A message that starts with a Header: its sequence number, then the stamp."""
+
+_CLOCK = struct.Struct("<II")
+
+
+class _Outlet:
+    """What one publisher of the bag published on a topic: it goes out by the publisher of that topic."""
+
+    def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
+        self.publisher = publisher
+        self.message = publisher.data_class()
+        self.is_latched = is_latched
+        self.last: bytes | None = None
+        """The last message, if latched."""
+
+    def publish(self, body: bytes) -> None:
+        self.message._buff = body
+        if self.is_latched:
+            self.last = body
+        self.publisher.publish(self.message)
+
+
+class _LateSubscribers(client.SubscribeListener):
+    """Gives a late subscriber the last message of each latched publisher of the bag: a topic itself keeps one only."""
+
+    def __init__(self) -> None:
+        self.outlets: list[_Outlet] = []
+
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
+    ) -> None:
+        latched = [outlet for outlet in self.outlets if outlet.last is not None]
+        if len(latched) < 2:
+            return
+        for outlet in latched:
+            message = outlet.publisher.data_class()
+            message._buff = outlet.last
+            peer_publish(message)
+
+
+class Player:
+    """Plays bags, as this process's node, which init_node has made."""
+
+    def __init__(self, bags: Bags, options: PlayOptions) -> None:
+        self._bags = bags
+        self._options = options
+        self._publishers: dict[str, tuple[client.Publisher[client.AnyMsg], _LateSubscribers]] = {}
+        self._outlets: dict[tuple[int, int], _Outlet | None] = {}
+        self._wait = PreciseWait()
+        self._lock = threading.Lock()
+        self._schedule: Schedule | None = None
+        self._clock: client.Publisher[client.AnyMsg] | None = None
+        self._is_header_first: bool | None = None
+        self._next_line = 0
+        self._ended = False
+
+    def run(self) -> int:
+        """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError."""
+        client.on_shutdown(self._end)
+        options = self._options
+        times = self._bags.times()
+        start = times[0] + options.start if times else 0
+        end = start + options.duration if options.duration else None
+        selection = Selection(options.topics, start if options.start else None, end)
+        first = next(self._bags.messages(selection), None)
+        if times is None or first is None:
+            print("No messages to play on specified topics.  Exiting.", file=sys.stderr)
+            return 0
+
+        self._clock = client.Publisher("clock", frame_class(*_clock_type()), queue_size=1)
+        for number, connection in self._bags.connections(selection):
+            self._advertise(number, connection)
+        self._offer_services()
+        self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
+        self._sleep(options.delay)
+        self._say(" done.")
+        self._say("\nHit space to toggle paused, or 's' to step.")
+
+        if options.start:
+            for number, message in self._bags.last_latched(selection):
+                self._publish(number, message)
+        if options.wait_for_subscribers:
+            self._wait_for_subscribers()
+
+        last = min(times[1], end or times[1])
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_SECONDS)
+        try:
+            # Before the keys are read: the first ones count.
+            self._schedule = Schedule(options, first[1].time, last, time.monotonic_ns())
+            with read_keys(self._on_key):
+                self._play_all(selection, first[1].time, last)
+        finally:
+            sys.setswitchinterval(interval)
+        return 0
+
+    # --- what it offers
+
+    def _advertise(self, number: int, connection: Connection) -> None:
+        topic = self._options.prefix + connection.topic
+        known = self._publishers.get(topic)
+        if known is None:
+            late = _LateSubscribers()
+            publisher = client.Publisher(
+                topic,
+                frame_class(connection.type, connection.md5sum, connection.definition),
+                subscriber_listener=late,
+                latch=connection.latching,
+                queue_size=self._options.queue_size,
+            )
+            known = self._publishers[topic] = publisher, late
+        publisher, late = known
+        if publisher.md5sum != connection.md5sum:
+            client.logerr(
+                "Tried to advertise on topic [%s] with md5sum [%s] and datatype [%s], but the topic is already "
+                "advertised as md5sum [%s] and datatype [%s]. These messages are left out",
+                topic,
+                connection.md5sum,
+                connection.type,
+                publisher.md5sum,
+                publisher.type,
+            )
+            self._outlets[number, connection.id] = None
+            return
+        if connection.latching and publisher.impl:
+            publisher.impl.enable_latch()
+        outlet = self._outlets[number, connection.id] = _Outlet(publisher, connection.latching)
+        late.outlets.append(outlet)
+
+    def _offer_services(self) -> None:
+        from std_srvs.srv import SetBool, SetBoolResponse
+
+        def pause(request: SetBoolRequest) -> SetBoolResponse:
+            with self._lock:
+                changed = bool(
+                    self._schedule and self._schedule.set_paused(request.data, time.monotonic_ns())
+                )
+            self._wait.wake()
+            if changed:
+                return SetBoolResponse(True, "Playback is now " + ("paused" if request.data else "resumed"))
+            return SetBoolResponse(False, "Bag is already " + ("paused." if request.data else "running."))
+
+        client.Service("~pause_playback", SetBool, pause)
+        if self._options.rate_control_topic:
+            self._say("Creating rate control topic subscriber...", end="")
+            client.Subscriber(self._options.rate_control_topic, ReceivedFrame, self._on_rate_control)
+            self._say(" done.")
+
+    def _wait_for_subscribers(self) -> None:
+        self._say("Waiting for subscribers.")
+        while not self._ended and any(
+            not publisher.get_num_connections() for publisher, _ in self._publishers.values()
+        ):
+            self._sleep(_TICK // 10)
+        self._say("Finished waiting for subscribers.")
+
+    # --- playing
+
+    def _play_all(self, selection: Selection, first: int, last: int) -> None:
+        while not self._ended:
+            messages = read_ahead(self._bags.messages(selection))
+            try:
+                for number, message in messages:
+                    if not self._play(message):
+                        break
+                    self._publish(number, message)
+            finally:
+                messages.close()
+            if self._options.keep_alive:
+                self._keep_alive()
+            if self._ended:
+                self._say("")
+            elif not self._options.loop:
+                self._say("\nDone.")
+                return
+            with self._lock:
+                self._schedule = Schedule(self._options, first, last, time.monotonic_ns())
+
+    def _play(self, message: StoredMessage) -> bool:
+        """Wait until a message is due; return False at a shutdown."""
+        schedule = self._schedule
+        assert schedule
+        now = time.monotonic_ns()
+        with self._lock:
+            schedule.offer(message.time, message.connection.topic, now)
+        while not self._ended:
+            self._tick(schedule, now)
+            with self._lock:
+                wait = schedule.poll(now)
+            if wait is None:
+                return True
+            now = self._wait.until(min(wait, self._next_line) if not self._options.quiet else wait)
+        return False
+
+    def _keep_alive(self) -> None:
+        schedule = self._schedule
+        assert schedule
+        while not self._ended:
+            now = time.monotonic_ns()
+            with self._lock:
+                wait = schedule.run_on(now)
+            self._tick(schedule, now)
+            self._wait.until(min(wait, now + _TICK))
+
+    def _publish(self, number: int, message: StoredMessage) -> None:
+        outlet = self._outlets[number, message.connection.id]
+        if outlet:
+            outlet.publish(message.body)
+
+    def _tick(self, schedule: Schedule, now: int) -> None:
+        """Publish the clock and print the status line, where it is time for that."""
+        if self._options.clock:
+            with self._lock:
+                shown = schedule.tick(now)
+            if shown is not None and self._clock:
+                message = self._clock.data_class()
+                message._buff = _CLOCK.pack(*divmod(shown, _SECOND))
+                self._clock.publish(message)
+        if now >= self._next_line and not self._options.quiet:
+            self._next_line = now + _TICK
+            with self._lock:
+                status = schedule.status(now)
+            delay = f"Delay: {status.delay / 1e9:.2f} " if status.state is State.DELAYED else " " * 12
+            self._say(
+                f"\r [{status.state.value:7}]  Bag Time: {status.time / 1e9:13.6f}   "
+                f"Duration: {status.played / 1e9:.6f} / {status.length / 1e9:.6f}   {delay}\r",
+                end="",
+            )
+
+    # --- what comes from outside
+
+    def _on_key(self, key: str) -> None:
+        now = time.monotonic_ns()
+        with self._lock:
+            if not (schedule := self._schedule):
+                return
+            if key == " ":
+                schedule.set_paused(not schedule.is_paused, now)
+            elif key == "s":
+                schedule.step(now)
+            elif key == "t":
+                schedule.toggle_pause_topics()
+        self._wait.wake()
+
+    def _on_rate_control(self, message: ReceivedFrame) -> None:
+        if self._is_header_first is None:
+            definition = message._connection_header.get("message_definition", "")
+            self._is_header_first = _starts_with_header(definition)
+        frame = message.frame
+        if not self._is_header_first or len(frame) < _STAMP.size:
+            print("\nWARNING: Rate control topic is bad, header is not first. MSG may be malformed.")
+            return
+        secs, nsecs = _STAMP.unpack_from(frame)
+        with self._lock:
+            if self._schedule:
+                self._schedule.control_rate(secs * _SECOND + nsecs)
+        self._wait.wake()
+
+    def _end(self) -> None:
+        self._ended = True
+        self._wait.wake()
+
+    def _sleep(self, nanoseconds: int) -> None:
+        end = time.monotonic_ns() + nanoseconds
+        while not self._ended and (now := time.monotonic_ns()) < end:
+            self._wait.until(min(end, now + _TICK))
+
+    def _say(self, text: str, end: str = "\n") -> None:
+        with contextlib.suppress(OSError, ValueError):
+            print(text, end=end, flush=True)
+
+
+def _clock_type() -> tuple[str, str, str]:
+    from rosgraph_msgs.msg import Clock
+
+    return Clock._type, Clock._md5sum, Clock._full_text
+
+
+def _starts_with_header(definition: str) -> bool:
+    lines: Iterable[str] = (line.strip() for line in definition.splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
+    return first.startswith(("Header ", "std_msgs/Header "))

@@ -1,0 +1,214 @@
+"""When `rosbag play` publishes which message, and what its clock shows. Pure: the times of the wall are given.
+
+All times are integers of nanoseconds: of the bag, or of the wall, which may be any clock that runs on steadily.
+Source: http://wiki.ros.org/rosbag/Commandline#play.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Collection
+from typing import NamedTuple
+
+__all__ = ["PlayOptions", "Schedule", "State", "Status"]
+
+_SECOND = 10**9
+
+
+class PlayOptions(NamedTuple):
+    """How to play. Times in nanoseconds, of the bag where it matters."""
+
+    prefix: str = ""
+    immediate: bool = False
+    paused: bool = False
+    queue_size: int = 100
+    clock: bool = False
+    clock_hz: float = 100.0
+    delay: int = _SECOND // 5
+    rate: float = 1.0
+    start: int = 0
+    duration: int = 0
+    """0: all."""
+    skip_empty: int | None = None
+    loop: bool = False
+    keep_alive: bool = False
+    topics: frozenset[str] = frozenset()
+    """Empty: all."""
+    pause_topics: frozenset[str] = frozenset()
+    wait_for_subscribers: bool = False
+    rate_control_topic: str = ""
+    rate_control_max_delay: int = _SECOND
+    quiet: bool = False
+
+
+class State(enum.Enum):
+    """What a player does."""
+
+    RUNNING = "RUNNING"
+    PAUSED = "PAUSED"
+    DELAYED = "DELAYED"
+    """Waiting for the topic that controls the rate."""
+
+
+class Status(NamedTuple):
+    """What the status line shows: the bag's clock, and how far that is of the whole length."""
+
+    state: State
+    time: int
+    played: int
+    length: int
+    delay: int
+    """How far the rate control topic is behind, while DELAYED."""
+
+
+class Schedule:
+    """Decides for one message after the other. ``offer`` the next one, and ``poll`` until that returns None: publish it."""
+
+    def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
+        """``first`` and ``last``: the bag's times of its messages; ``wall``: when the first one is due."""
+        self._options = options
+        self._first = first
+        self._last = last
+        self._origin = wall
+        """The wall's time of ``first``; each pause shifts it."""
+        self._message = first
+        self._is_due = False
+        self._clock = first
+        self._since = wall
+        """Since when it has been paused or delayed."""
+        self._paused = options.paused
+        self._delayed = False
+        self._pauses_at: Collection[str] = options.pause_topics
+        self._controlled = first
+        self._next_tick = wall
+        self._period = max(1, int(_SECOND / options.clock_hz)) if options.clock else 0
+
+    @property
+    def is_paused(self) -> bool:
+        """Return whether it is paused."""
+        return self._paused
+
+    def offer(self, time: int, topic: str, wall: int) -> None:
+        """Take the next message: its time, its topic, and the time now."""
+        self._advance(wall)
+        self._message = time
+        options = self._options
+        self._is_due = options.immediate
+        if options.immediate:
+            self._tick_now(wall)
+        elif options.skip_empty is not None and time - self._clock > options.skip_empty:
+            self._origin += wall - self._due()
+            self._is_due = True
+            self._tick_now(wall)
+        else:
+            if topic in self._pauses_at:
+                self._stop(wall)
+                self._paused = True
+            if self._is_behind():
+                self._stop(wall)
+                self._delayed = True
+
+    def poll(self, wall: int) -> int | None:
+        """Return None if the message is to be published now, else until when to wait before the next poll, at most.
+
+        A call of another method may change that earlier.
+        """
+        if self._is_due:
+            self._clock = self._message
+            return None
+        if self._delayed and not self._paused and not self._is_behind():
+            self._resume(wall)
+            self._delayed = False
+
+        self._advance(wall)
+        if self._paused or self._delayed:
+            wait = wall + _SECOND // 10
+        elif (wait := self._due()) <= wall:
+            self._clock = self._message
+            return None
+        return min(wait, self._next_tick) if self._period else wait
+
+    def set_paused(self, paused: bool, wall: int) -> bool:
+        """Pause, or go on; return whether that changed anything."""
+        if paused == self._paused:
+            return False
+        self._advance(wall)
+        if paused:
+            self._stop(wall)
+        elif not self._delayed:
+            self._resume(wall)
+        self._paused = paused
+        return True
+
+    def step(self, wall: int) -> None:
+        """Have the message published now, if paused."""
+        if self._paused:
+            self._origin += wall - self._due()
+            self._since = wall
+            self._is_due = True
+            self._tick_now(wall)
+
+    def toggle_pause_topics(self) -> None:
+        """Ignore the topics to pause at, or heed them again."""
+        self._pauses_at = () if self._pauses_at else self._options.pause_topics
+
+    def control_rate(self, stamp: int) -> None:
+        """Note the stamp of the last message of the topic that controls the rate."""
+        self._controlled = stamp
+
+    def tick(self, wall: int) -> int | None:
+        """Return the time to publish on /clock, if it is time for that."""
+        if not self._period or wall < self._next_tick:
+            return None
+        self._advance(wall)
+        # No burst after a pause of the whole process.
+        self._next_tick = max(self._next_tick + self._period, wall)
+        return self._clock
+
+    def status(self, wall: int) -> Status:
+        """Return what the status line shows."""
+        self._advance(wall)
+        state = State.PAUSED if self._paused else State.DELAYED if self._delayed else State.RUNNING
+        behind = max(0, self._clock - self._controlled)
+        return Status(state, self._clock, self._clock - self._first, self._last - self._first, behind)
+
+    def run_on(self, wall: int) -> int:
+        """Let the clock run past the last message, for ``--keep-alive``; return until when to wait at most."""
+        if not (self._paused or self._delayed):
+            self._clock = max(self._clock, self._bag_time(wall))
+        wait = wall + _SECOND // 10
+        return min(wait, self._next_tick) if self._period else wait
+
+    def _due(self) -> int:
+        """Return the wall's time of the message."""
+        return self._origin + self._scaled(self._message - self._first, 1 / self._options.rate)
+
+    def _bag_time(self, wall: int) -> int:
+        return self._first + self._scaled(wall - self._origin, self._options.rate)
+
+    def _scaled(self, span: int, factor: float) -> int:
+        return span if self._options.rate == 1.0 else round(span * factor)
+
+    def _advance(self, wall: int) -> None:
+        """Move the clock on, at most to the message that is next."""
+        if not (self._paused or self._delayed):
+            self._clock = max(self._clock, min(self._message, self._bag_time(wall)))
+
+    def _stop(self, wall: int) -> None:
+        if not (self._paused or self._delayed):
+            self._since = wall
+
+    def _resume(self, wall: int) -> None:
+        self._origin += wall - self._since
+        self._since = wall
+
+    def _tick_now(self, wall: int) -> None:
+        """Show the message's time on the clock at the next tick, which is now."""
+        self._clock = self._message
+        self._next_tick = wall
+
+    def _is_behind(self) -> bool:
+        options = self._options
+        return bool(options.rate_control_topic) and (
+            self._clock - self._controlled > options.rate_control_max_delay
+        )

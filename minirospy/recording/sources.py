@@ -1,0 +1,176 @@
+"""The messages of several bags in the order of time, read ahead by a thread.
+
+So neither reading nor decompressing delays a message that is due.
+"""
+
+from __future__ import annotations
+
+import heapq
+import queue
+import threading
+from collections import deque
+from collections.abc import Collection, Generator, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.bag.base import BagReader, StoredMessage
+from minirospy.bag.mcap_reader import MAGIC, McapReader
+from minirospy.bag.reader import open_bag
+from minirospy.bag.records import Connection
+from minirospy.errors import BagError, NotFoundError
+
+__all__ = ["Bags", "Selection", "open_reader", "read_ahead"]
+
+_BATCH = 500
+_BATCH_BYTES = 4 * 1024 * 1024
+_BATCHES = 8
+
+
+class Selection(NamedTuple):
+    """Which messages: of these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
+
+    topics: Collection[str] = ()
+    start: int | None = None
+    end: int | None = None
+
+
+class Bags:
+    """Several bags, opened for reading; a context manager.
+
+    Raise NotFoundError for a file that does not exist, BagError with its name for one that cannot be read.
+    """
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        self._files = ExitStack()
+        self.readers: list[BagReader] = []
+        with ExitStack() as opened:
+            for path in paths:
+                try:
+                    self.readers.append(open_reader(Path(path), opened))
+                except FileNotFoundError as error:
+                    raise NotFoundError("bag", path) from error
+                except BagError as error:
+                    raise BagError(f"{path}: {error}") from error
+            self._files = opened.pop_all()
+
+    def __enter__(self) -> Bags:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._files.close()
+
+    def connections(self, selection: Selection) -> list[tuple[int, Connection]]:
+        """Return the connections with messages to play, each with the number of its bag."""
+        return [
+            (number, connection)
+            for number, reader in enumerate(self.readers)
+            for connection in reader.connections.values()
+            if not selection.topics or connection.topic in selection.topics
+        ]
+
+    def times(self) -> tuple[int, int] | None:
+        """Return the times of the first and the last message of all bags; None without messages."""
+        spans = [span for reader in self.readers if (span := _span(reader))]
+        return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
+
+    def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
+        """Yield the messages in the order of time, each with the number of its bag. Raise BagFormatError."""
+        return heapq.merge(
+            *(_numbered(number, reader, selection) for number, reader in enumerate(self.readers)),
+            key=_time,
+        )
+
+    def last_latched(self, selection: Selection) -> list[tuple[int, StoredMessage]]:
+        """Return the last message of each latched connection before the selection's start."""
+        found: list[tuple[int, StoredMessage]] = []
+        for number, connection in self.connections(selection):
+            if not connection.latching or not selection.start:
+                continue
+            reader = self.readers[number]
+            newest = deque(reader.messages([connection.id], None, selection.start - 1), maxlen=1)
+            found += [(number, message) for message in newest]
+        return sorted(found, key=_time)
+
+
+def open_reader(path: Path, opened: ExitStack) -> BagReader:
+    """Return a reader of a bag or an MCAP file, which ``opened`` closes. Raise OSError, BagError."""
+    stream = opened.enter_context(path.open("rb"))
+    if stream.read(len(MAGIC)) == MAGIC:
+        reader: BagReader = McapReader(stream)
+    else:
+        stream.seek(0)
+        reader = open_bag(stream)
+    opened.callback(reader.close)
+    reader.prepare()
+    return reader
+
+
+def read_ahead(
+    messages: Iterator[tuple[int, StoredMessage]],
+) -> Generator[tuple[int, StoredMessage], None, None]:
+    """Yield what an iterator yields, which a thread runs ahead by some thousand messages. Raise what it raises."""
+    ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
+    stop = threading.Event()
+
+    def put(item: list[tuple[int, StoredMessage]] | Exception | None) -> None:
+        while not stop.is_set():
+            try:
+                ready.put(item, timeout=0.1)
+            except queue.Full:
+                continue
+            return
+
+    def read() -> None:
+        try:
+            batch: list[tuple[int, StoredMessage]] = []
+            size = 0
+            for item in messages:
+                batch.append(item)
+                size += len(item[1].body)
+                if len(batch) >= _BATCH or size >= _BATCH_BYTES:
+                    put(batch)
+                    batch, size = [], 0
+                    if stop.is_set():
+                        return
+            put(batch)
+            put(None)
+        except Exception as error:  # noqa: BLE001 - raised again in the reading thread
+            put(batch)
+            put(error)
+
+    threading.Thread(target=read, name="rosbag-reader", daemon=True).start()
+    try:
+        while (item := ready.get()) is not None:
+            if isinstance(item, Exception):
+                raise item
+            yield from item
+    finally:
+        stop.set()
+
+
+def _span(reader: BagReader) -> tuple[int, int] | None:
+    if reader.chunks:
+        return min(chunk.start_time for chunk in reader.chunks), max(
+            chunk.end_time for chunk in reader.chunks
+        )
+    indexes = [index for index in reader.index(reader.connections) if len(index)]
+    if not indexes:
+        return None
+    return min(index.times[0] for index in indexes), max(index.times[-1] for index in indexes)
+
+
+def _numbered(number: int, reader: BagReader, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
+    wanted = [
+        connection.id
+        for connection in reader.connections.values()
+        if not selection.topics or connection.topic in selection.topics
+    ]
+    if not wanted:
+        return
+    for message in reader.messages(wanted, selection.start, selection.end):
+        yield number, message
+
+
+def _time(item: tuple[int, StoredMessage]) -> int:
+    return item[1].time

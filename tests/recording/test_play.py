@@ -1,0 +1,299 @@
+"""`rosbag play` as a process: what subscribers get, what it prints, and the keys."""
+
+from __future__ import annotations
+
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from minirospy.bag.writer import BagWriter
+from minirospy.environment import Environment
+from minirospy.introspect.streams import ToolNode
+from minirospy.wire.tcpros import InterfaceType
+from tests.recording.conftest import GUARD, STRING, Start, Talker, connected, read_until, said, wait_until
+
+SECOND = 10**9
+START = 1000 * SECOND
+
+
+class Heard(NamedTuple):
+    """A message that was received."""
+
+    topic: str
+    body: bytes
+    latching: str
+    at: float
+
+    @property
+    def text(self) -> str:
+        """Return its text."""
+        return said(self.body)
+
+
+class Ear:
+    """A node that subscribes to anything."""
+
+    def __init__(self) -> None:
+        self.node = ToolNode(Environment.read(), "ear")
+        self.heard: list[Heard] = []
+
+    def listen(self, topic: str) -> None:
+        """Keep the messages of a topic."""
+        self.node.measure(
+            topic,
+            lambda one: self.heard.append(Heard(topic, one.body, one.header.get("latching", ""), one.time)),
+        )
+
+    @property
+    def texts(self) -> list[str]:
+        """Return what was said."""
+        return [one.text for one in self.heard]
+
+
+@pytest.fixture
+def ear(master: str) -> Iterator[Ear]:
+    """Return a node that listens."""
+    ear = Ear()
+    try:
+        yield ear
+    finally:
+        ear.node.close()
+
+
+def make_bag(
+    path: Path,
+    messages: list[tuple[str, float, str]],
+    *,
+    callerid: str = "/talker",
+    latched: tuple[str, ...] = (),
+    **changes: str,
+) -> str:
+    """Write a bag of texts (topic, seconds, text); return its name."""
+    with path.open("wb") as stream:
+        writer = BagWriter(stream)
+        numbers: dict[str, int] = {}
+        for topic, seconds, text in messages:
+            if topic not in numbers:
+                header = {
+                    "topic": topic,
+                    "type": STRING.name,
+                    "md5sum": STRING.md5sum,
+                    "message_definition": STRING.definition,
+                    "callerid": callerid,
+                    "latching": "1" if topic in latched else "0",
+                    **changes,
+                }
+                numbers[topic] = writer.add_connection(topic, header)
+            data = text.encode()
+            writer.write(
+                numbers[topic], START + round(seconds * SECOND), len(data).to_bytes(4, "little") + data
+            )
+        writer.close()
+    return path.name
+
+
+def play(start: Start, *words: str, **kwargs: int) -> subprocess.Popen[str]:
+    # Subscribers connect meanwhile.
+    return start("play", *words, "--wait-for-subscribers", **kwargs)
+
+
+def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_path: Path) -> None:
+    one = make_bag(tmp_path / "one.bag", [("/a", 0, "1"), ("/a", 0.2, "3")])
+    two = make_bag(tmp_path / "two.bag", [("/a", 0.1, "2"), ("/a", 0.3, "4")])
+    ear.listen("/a")
+    output, errors = play(start, one, "--bags", two).communicate(timeout=GUARD)
+
+    assert errors == ""
+    assert ear.texts == ["1", "2", "3", "4"]
+    assert ear.heard[-1].at - ear.heard[0].at > 0.25
+    lines = output.replace("\r", "\n").splitlines()
+    assert lines[:2] == ["Opening one.bag", "Opening two.bag"]
+    assert "Waiting 0.2 seconds after advertising topics... done." in lines
+    assert "Hit space to toggle paused, or 's' to step." in lines
+    assert any(line.startswith(" [RUNNING]  Bag Time:   1000.") for line in lines), lines
+    assert lines[-1] == "Done."
+
+
+def test_topics_prefix_start_and_duration(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(
+        tmp_path / "b.bag", [(topic, i / 10, f"{topic}{i}") for i in range(10) for topic in ("/a", "/b")]
+    )
+    ear.listen("/robot/a")
+    words = ["-p", "/robot", "-s", "0.3", "-u", "0.3", "-q", "--topics", "/a", "--bags", name]
+    play(start, *words).communicate(timeout=GUARD)
+
+    assert ear.texts == ["/a3", "/a4", "/a5", "/a6"]
+
+
+def test_latched_messages_from_before_the_start_come_first(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(
+        tmp_path / "b.bag",
+        [("/map", 0, "old"), ("/map", 0.1, "map"), ("/a", 0.2, "no"), ("/a", 1.0, "yes")],
+        latched=("/map",),
+    )
+    for topic in ("/map", "/a"):
+        ear.listen(topic)
+    play(start, name, "-s", "0.5").communicate(timeout=GUARD)
+
+    assert sorted(ear.texts) == ["map", "yes"]
+    assert {one.topic: one.latching for one in ear.heard} == {"/map": "1", "/a": "0"}
+
+
+def test_late_subscribers_get_the_last_message_of_each_latched_publisher(
+    ear: Ear, start: Start, tmp_path: Path
+) -> None:
+    names = [
+        make_bag(
+            tmp_path / f"{i}.bag",
+            [("/tf_static", i / 10, str(i))],
+            callerid=f"/n{i}",
+            latched=("/tf_static",),
+        )
+        for i in range(2)
+    ]
+    process = start("play", *names, "-k", "-d", "0")
+    read_until(process, "Hit space")
+    ear.node.wait(0.5)
+    ear.listen("/tf_static")
+    wait_until(lambda: {"0", "1"} <= set(ear.texts))
+    process.send_signal(signal.SIGINT)
+    assert process.wait(GUARD) == 0
+
+
+def test_the_clock_is_published(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.5, "2")])
+    ear.listen("/clock")
+    ear.listen("/a")
+    play(start, name, "--clock", "--hz", "50").communicate(timeout=GUARD)
+
+    times = [struct.unpack("<II", one.body) for one in ear.heard if one.topic == "/clock"]
+    assert len(times) > 5
+    assert times == sorted(times)
+    assert times[0][0] == 1000
+    assert times[-1] <= (1000, 500_000_000)
+
+
+def test_keys_pause_and_step(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", i, str(i)) for i in range(5)])
+    ear.listen("/a")
+    process = play(start, name, "--pause", stdin=subprocess.PIPE)
+    assert process.stdin
+    read_until(process, "Finished waiting")
+    for i in range(1, 4):
+        process.stdin.write("s")
+        process.stdin.flush()
+        wait_until(lambda count=i: len(ear.heard) == count)  # type: ignore[misc]
+    process.stdin.write(" ")
+    process.stdin.flush()
+    output, _ = process.communicate(timeout=GUARD)
+
+    assert ear.texts == ["0", "1", "2", "3", "4"]
+    assert "[PAUSED ]  Bag Time:" in output
+
+
+def test_a_service_pauses(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.2, "2")])
+    ear.listen("/a")
+    process = play(start, name, "--pause", "__name:=player")
+    read_until(process, "Finished waiting")
+
+    answers = [call("/player/pause_playback", value) for value in ("true", "false")]
+    process.communicate(timeout=GUARD)
+
+    assert answers == [
+        'success: False\nmessage: "Bag is already paused."\n',
+        'success: True\nmessage: "Playback is now resumed"\n',
+    ]
+    assert ear.texts == ["1", "2"]
+
+
+def call(service: str, value: str) -> str:
+    code = "import sys; from minirospy.cli.ros.rosservice import main; sys.exit(main())"
+    words = [sys.executable, "-c", code, "call", service, value]
+    return subprocess.run(words, capture_output=True, text=True, check=True, timeout=GUARD).stdout
+
+
+def test_a_topic_controls_the_rate(ear: Ear, start: Start, talker: Talker, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", i, str(i)) for i in range(4)])
+    stamped = InterfaceType("std_msgs/Header", "2176decaecbce78abc3b96ef049fabed", "Header header\n")
+    done = talker.advertise("/done", type_=stamped)
+    ear.listen("/a")
+    process = play(
+        start, name, "-r", "20", "--rate-control-topic", "/done", "--rate-control-max-delay", "0.5"
+    )
+    connected(done)
+    read_until(process, "Finished waiting")
+    wait_until(lambda: len(ear.heard) == 2)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(0.5)
+    for seconds in (1, 2, 3):
+        done.publish(struct.pack("<IIIIxxxx", 16, 0, 1000 + seconds, 0))
+    process.communicate(timeout=GUARD)
+
+    assert ear.texts == ["0", "1", "2", "3"]
+
+
+def test_two_types_on_a_topic_are_reported(ear: Ear, start: Start, tmp_path: Path) -> None:
+    one = make_bag(tmp_path / "one.bag", [("/a", 0, "1"), ("/a", 0.2, "3")])
+    two = make_bag(tmp_path / "two.bag", [("/a", 0.1, "2")], md5sum="0" * 32, type="my_msgs/Other")
+    ear.listen("/a")
+    _, errors = play(start, one, two).communicate(timeout=GUARD)
+
+    assert ear.texts == ["1", "3"]
+    assert "Tried to advertise on topic [/a] with md5sum [" + "0" * 32 in errors
+
+
+def test_it_loops_until_it_is_interrupted(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.05, "2")])
+    ear.listen("/a")
+    process = play(start, name, "-l", "-q")
+    wait_until(lambda: len(ear.heard) > 6)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert (process.returncode, errors) == (0, "")
+    assert ear.texts[:6] == ["1", "2"] * 3
+
+
+def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", i * 100, str(i)) for i in range(50)])
+    ear.listen("/a")
+    play(start, name, "-i").communicate(timeout=GUARD)
+
+    assert ear.texts == [str(i) for i in range(50)]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [
+        ([], 2, "You must specify at least 1 bag file to play back."),
+        (["missing.bag"], 1, "bag [missing.bag] not found"),
+        (["-r", "0", "b.bag"], 2, "--rate must be above 0"),
+        (["-d", "-1", "b.bag"], 2, "--delay must be 0 or positive"),
+        (["empty"], 1, "empty: "),
+        (["."], 1, ".: "),
+    ],
+)
+def test_wrong_words(words: list[str], status: int, text: str, start: Start, tmp_path: Path) -> None:
+    (tmp_path / "empty").touch()
+    process = start("play", *words)
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert process.returncode == status
+    assert text in errors
+    assert "Traceback" not in errors
+
+
+def test_no_messages(master: str, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", 0, "1")])
+    process = start("play", name, "--topics", "/b")
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert process.returncode == 0
+    assert errors == "No messages to play on specified topics.  Exiting.\n"
