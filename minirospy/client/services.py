@@ -75,8 +75,8 @@ class Service(Generic[_S_co]):
         self._session = current_session()
         self.resolved_name = self._session.resolve(name)
         self.service_class = service_class
-        self.request_class: type[Any] = service_class._request_class
-        self.response_class: type[Any] = service_class._response_class
+        self.request_class: type[Message] = service_class._request_class
+        self.response_class: type[Message] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum
         self.buff_size = buff_size
@@ -181,8 +181,8 @@ class ServiceProxy(Generic[_S_co]):
         # A name that was never set (None) is an error only when it is called.
         self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
-        self.request_class: type[Any] = service_class._request_class
-        self.response_class: type[Any] = service_class._response_class
+        self.request_class: type[Message] = service_class._request_class
+        self.response_class: type[Message] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum
         self.buff_size = 65536

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.client.session import current_session
 from minirospy.client.time import Duration, Time
+from minirospy.idl.protocols import Message, is_stamped
 from minirospy.wire.header import Header
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ class TopicStatisticsCounter:
         self._limits = limits
         self._windows: dict[str, _Window] = {}
 
-    def count(self, message: Any, header: Header, size: int, now: int) -> Report | None:
+    def count(self, message: Message, header: Header, size: int, now: int) -> Report | None:
         """Count one message of ``size`` bytes that came at ``now`` (ns); the report, where it ends a window."""
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
@@ -111,7 +112,7 @@ class TopicStatisticsCounter:
             window.periods.append((now - window.last_arrival) / 1e9)
         window.last_arrival = now
 
-        if message._has_header:
+        if is_stamped(message):
             sequence, stamp = message.header.seq, message.header.stamp.to_nsec()
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import traceback
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
@@ -52,7 +52,7 @@ class Subscriber(Topic[_M_co]):
         name: str,
         data_class: type[_M_co],
         callback: Callable[..., object] | None = None,
-        callback_args: Any = None,
+        callback_args: object = None,
         queue_size: int | None = None,
         buff_size: int = 65536,
         tcp_nodelay: bool = False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 __all__ = [
     "BUILTIN_TYPES",
@@ -48,7 +48,7 @@ class Constant(NamedTuple):
 
     type: str
     name: str
-    val: Any
+    val: object
     val_text: str
 
     def __repr__(self) -> str:

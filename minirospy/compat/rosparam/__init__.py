@@ -124,7 +124,9 @@ def list_params(ns: str) -> list[str]:
         return parameters.list_parameters(graph, graph.resolve(ns))
 
 
-def load_file(filename: str, default_namespace: str | None = None, verbose: bool = False) -> list[Any]:
+def load_file(
+    filename: str, default_namespace: str | None = None, verbose: bool = False
+) -> list[tuple[object, str]]:
     """Return [(values, namespace)] of each document of a YAML file, which may contain more than a parameter can.
 
     Raises RosParamException where it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
@@ -144,7 +146,7 @@ def load_file(filename: str, default_namespace: str | None = None, verbose: bool
 
 def load_str(
     str: str, filename: str, default_namespace: str | None = None, verbose: bool = False
-) -> list[Any]:
+) -> list[tuple[object, str]]:
     """Return [(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
     try:
         documents = list(parse_documents(str, filename))

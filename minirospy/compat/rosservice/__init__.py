@@ -19,7 +19,7 @@ from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import ServiceClass
+    from minirospy.idl.protocols import Message, ServiceClass
 
 __all__ = [
     "NAME",
@@ -107,7 +107,7 @@ def rosservice_find(service_type: str) -> list[str]:
 
 def call_service(
     service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
-) -> tuple[Any, Any]:
+) -> tuple[Message, Any]:
     """Call a service and return (request, response), with the request's values. Raises ROSServiceException."""
     with _graph() as graph:
         name = graph.resolve(service_name)

@@ -18,6 +18,7 @@ from minirospy.introspect.fields import field_value, parse_path
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
+    from minirospy.client.publisher import Publisher
     from minirospy.idl.protocols import Message
 
 __all__ = [
@@ -40,6 +41,9 @@ NAME = "rostopic"
 _LATCH_SECONDS = 3.0
 _Topic = tuple[str, str, list[str]]
 
+_TopicRow = tuple[str, str, list[str]]
+"""A topic's name, its type and the nodes at one of its ends."""
+
 
 class ROSTopicException(Exception):
     """A request about a topic failed."""
@@ -55,7 +59,7 @@ class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
 
 def get_topic_type(
     topic: str, blocking: bool = False
-) -> tuple[str | None, str | None, Callable[[Any], Any] | None]:
+) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
     """Return (type, topic, function that returns the field of a message); three times None without such a topic.
 
     ``topic`` may be a field of a topic's messages. ``blocking`` waits until it is there, or the node shuts down.
@@ -77,7 +81,7 @@ def get_topic_type(
 
 def get_topic_class(
     topic: str, blocking: bool = False
-) -> tuple[type[Message] | None, str | None, Callable[[Any], Any] | None]:
+) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
     """Return the same as :func:`get_topic_type`, with the message's class. Raises ROSTopicException where it is not installed."""
     from minirospy.idl.load import get_message_class
 
@@ -90,7 +94,7 @@ def get_topic_class(
     return cls, real_topic, function
 
 
-def get_topic_list(master: masterapi.Master | None = None) -> tuple[list[Any], list[Any]]:
+def get_topic_list(master: masterapi.Master | None = None) -> tuple[list[_TopicRow], list[_TopicRow]]:
     """Return (published, subscribed), each a list of (topic, type, nodes)."""
     with _graph(_NoMaster) as graph:
         found = topics.list_topics(graph)
@@ -104,7 +108,7 @@ def find_by_type(topic_type: str) -> list[str]:
         return topics.find_topics_of_type(graph, topic_type)
 
 
-def msgevalgen(pattern: str) -> Callable[[Any], Any] | None:
+def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
     """Return a function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
 
     None, too, where the path does not parse, which is then said on stderr.
@@ -162,7 +166,7 @@ def create_publisher(
 
 
 def publish_message(
-    pub: Any,
+    pub: Publisher[Message],
     msg_class: type[Message],
     pub_args: Sequence[object],
     rate: float | None = None,

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.idl.message import strify_message
+from minirospy.idl.protocols import Message, is_stamped
 from minirospy.introspect.echo import elided
 from minirospy.introspect.plot import plot_header, plot_row
 
 if TYPE_CHECKING:
-    from minirospy.idl.protocols import Message
     from minirospy.times import Time
 
 __all__ = ["CallbackEcho", "create_field_filter", "create_value_transform"]
 
 _CLEAR_SCREEN = "\033[2J\033[;H"
-FieldFilter = Callable[[Any], Sequence[str]]
-ValueTransform = Callable[[Any, Any], Any]
+FieldFilter = Callable[[Message], Sequence[str]]
+ValueTransform = Callable[[object, object], object]
 
 
 class CallbackEcho:
@@ -30,9 +30,9 @@ class CallbackEcho:
     def __init__(
         self,
         topic: str,
-        msg_eval: Callable[[Any], Any] | None,
+        msg_eval: Callable[[Message], object] | None,
         plot: bool = False,
-        filter_fn: Callable[[Any], bool] | None = None,
+        filter_fn: Callable[[Message], bool] | None = None,
         echo_clear: bool = False,
         echo_all_topics: bool = False,
         offset_time: bool = False,
@@ -60,7 +60,9 @@ class CallbackEcho:
         self.done = False
         self.first = True
 
-    def callback(self, data: Any, callback_args: Mapping[str, Any], current_time: Time | None = None) -> None:
+    def callback(
+        self, data: Message, callback_args: Mapping[str, object], current_time: Time | None = None
+    ) -> None:
         """Print a message. ``callback_args``: its ``topic`` and, where known, ``type_information``."""
         if self.done or not self._wanted(data, str(callback_args["topic"])):
             return
@@ -74,11 +76,11 @@ class CallbackEcho:
         if self.max_count is not None and self.count >= self.max_count:
             self.done = True
 
-    def _wanted(self, message: object, topic: str) -> bool:
+    def _wanted(self, message: Message, topic: str) -> bool:
         mine = self.echo_all_topics or topic == self.topic or self.topic.startswith(topic + "/")
         return mine and (self.filter_fn is None or bool(self.filter_fn(message)))
 
-    def _text(self, value: Any, type_: object, current_time: Time | None) -> str:
+    def _text(self, value: object, type_: object, current_time: Time | None) -> str:
         from minirospy.client import Time
 
         if self.plot:
@@ -97,10 +99,10 @@ class CallbackEcho:
         )
         return f"{text}\n---"
 
-    def _row(self, value: Any, now: Time) -> str:
+    def _row(self, value: object, now: Time) -> str:
         header = plot_header(value) + "\n" if self.first else ""
         self.first = False
-        stamp = value.header.stamp if getattr(value, "_has_header", False) else now
+        stamp = value.header.stamp if is_stamped(value) else now
         origin = now.to_nsec() if self.offset_time else 0
         return header + plot_row(value, stamp.to_nsec() - origin, origin=origin)
 
