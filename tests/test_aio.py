@@ -424,12 +424,10 @@ def test_a_topic_that_is_left_and_joined_at_once(graph: MasterProxy) -> None:
     run(main)
 
 
-def test_who_is_cancelled_while_it_leaves_has_left(
-    graph: MasterProxy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         async with Node("n") as node:
-            ask = node._node.master
+            ask = node._node._registrations.call
             slowly = asyncio.Event()
 
             async def answer_late(method: str, *args: Any) -> Any:
@@ -437,7 +435,7 @@ def test_who_is_cancelled_while_it_leaves_has_left(
                 await slowly.wait()
                 return answer
 
-            monkeypatch.setattr(node._node, "master", answer_late)
+            monkeypatch.setattr(node._node._registrations, "call", answer_late)
             for handle in (node.subscribe("t", String), node.advertise("u", String)):
                 await until(lambda: bool(graph.get_system_state().subscribers.get("/t")))
                 with pytest.raises(asyncio.TimeoutError):
@@ -833,11 +831,11 @@ def test_with_a_node_of_the_rospy_api(master: str) -> None:
     run(main)
 
 
-def test_a_master_that_is_gone_is_named(master: str) -> None:
+def test_unreachable_master_is_an_error(master: str) -> None:
     async def main() -> None:
         async with Node("n", master_uri=master) as node:
             node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node.environment = node._environment
+            node._node._registrations._environment = node._environment
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 
