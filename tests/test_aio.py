@@ -64,14 +64,14 @@ async def until(condition: Callable[[], bool]) -> None:
         await asyncio.sleep(0.005)
 
 
-def test_it_is_found_at_the_root() -> None:
+def test_aio_is_an_attribute_of_the_package() -> None:
     from minirospy import aio
 
     assert minirospy.Node is aio.Node
     assert "Node" in dir(minirospy)
 
 
-def test_importing_rospy_does_not_import_it() -> None:
+def test_importing_rospy_does_not_import_aio() -> None:
     code = "import rospy, sys; sys.exit('minirospy.aio' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
@@ -79,7 +79,7 @@ def test_importing_rospy_does_not_import_it() -> None:
 # --- life
 
 
-def test_a_node_is_known_inside_its_block_only(graph: MasterProxy) -> None:
+def test_node_is_registered_only_inside_its_block(graph: MasterProxy) -> None:
     async def main() -> None:
         node = Node("n", namespace="robot")
         assert node.name == "/robot/n"
@@ -105,7 +105,7 @@ def test_bad_names_are_refused(name: str) -> None:
         Node(name)
 
 
-def test_a_command_line_may_be_given(graph: MasterProxy) -> None:
+def test_node_takes_remappings_of_a_command_line(graph: MasterProxy) -> None:
     async def main() -> None:
         argv = ["x.py", "__name:=renamed", "__ns:=/ns", "a:=b", "~p:=/q", "_speed:=1.5", "plain"]
         async with Node("n", argv=argv) as node:
@@ -121,7 +121,7 @@ def test_a_command_line_may_be_given(graph: MasterProxy) -> None:
     run(main)
 
 
-def test_it_waits_for_a_master(caplog: pytest.LogCaptureFixture) -> None:
+def test_node_waits_for_a_master(caplog: pytest.LogCaptureFixture) -> None:
     async def main() -> None:
         starting = asyncio.ensure_future(Node("n").start())
         await until(lambda: "no ROS master answers" in caplog.text)
@@ -133,7 +133,7 @@ def test_it_waits_for_a_master(caplog: pytest.LogCaptureFixture) -> None:
     run(main)
 
 
-def test_an_outside_shutdown_ends_what_waits(graph: MasterProxy) -> None:
+def test_external_shutdown_ends_waiting_calls(graph: MasterProxy) -> None:
     async def main() -> None:
         async with Node("n") as node:
             subscription = await node.subscribe("/t", String)
@@ -165,7 +165,7 @@ def test_an_outside_shutdown_ends_what_waits(graph: MasterProxy) -> None:
     run(main)
 
 
-def test_a_second_node_of_the_name_ends_the_first(graph: MasterProxy) -> None:
+def test_second_node_of_a_name_shuts_down_the_first(graph: MasterProxy) -> None:
     async def main() -> None:
         async with Node("n") as first:
             await first.advertise("/t", String)
@@ -193,7 +193,7 @@ asyncio.run(main())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
-def test_ctrl_c_takes_the_node_out_of_the_graph(graph: MasterProxy) -> None:
+def test_ctrl_c_unregisters_the_node(graph: MasterProxy) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -247,7 +247,7 @@ def test_connection_header_and_sequence_numbers(master: str) -> None:
     run(main)
 
 
-def test_a_slow_reader_gets_the_newest(master: str) -> None:
+def test_slow_reader_gets_the_newest_messages(master: str) -> None:
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
             publisher = a.advertise("/t", String, queue_size=0)
@@ -261,7 +261,7 @@ def test_a_slow_reader_gets_the_newest(master: str) -> None:
     run(main)
 
 
-def test_a_queue_of_nothing_is_refused(master: str) -> None:
+def test_queue_size_zero_is_refused(master: str) -> None:
     async def main() -> None:
         async with Node("a") as a:
             with pytest.raises(ValueError, match="queue_size is 0"):
@@ -314,7 +314,7 @@ def test_two_subscriptions_of_a_topic_share_a_connection(master: str) -> None:
     run(main)
 
 
-def test_leaving_a_loop_ends_the_subscription(graph: MasterProxy) -> None:
+def test_leaving_the_loop_unsubscribes(graph: MasterProxy) -> None:
     async def main() -> None:
         async with Node("a") as a:
             publisher = await a.advertise("/t", String, latch=True)
@@ -328,7 +328,7 @@ def test_leaving_a_loop_ends_the_subscription(graph: MasterProxy) -> None:
     run(main)
 
 
-def test_publishers_of_a_topic_share_it(graph: MasterProxy) -> None:
+def test_publishers_of_a_topic_share_its_registration(graph: MasterProxy) -> None:
     async def main() -> None:
         async with Node("a") as a:
             one = await a.advertise("/t", String)
@@ -350,7 +350,7 @@ def test_publishers_of_a_topic_share_it(graph: MasterProxy) -> None:
     run(main)
 
 
-def test_node_publish_reaches_who_listens(master: str) -> None:
+def test_node_publish_reaches_subscribers(master: str) -> None:
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
             subscription = await b.subscribe("/t", String)
@@ -361,7 +361,7 @@ def test_node_publish_reaches_who_listens(master: str) -> None:
     run(main)
 
 
-def test_wrong_values_are_refused_at_once(master: str) -> None:
+def test_wrong_values_are_refused_immediately(master: str) -> None:
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
             publisher = a.advertise("/t", String)
@@ -377,7 +377,7 @@ def test_wrong_values_are_refused_at_once(master: str) -> None:
     run(main)
 
 
-def test_a_message_that_does_not_fit_is_told_of(master: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFixture) -> None:
     class Wrong(String):
         """The bytes of a String, read as too long a number of them."""
 
@@ -395,7 +395,7 @@ def test_a_message_that_does_not_fit_is_told_of(master: str, caplog: pytest.LogC
     run(main)
 
 
-def test_a_topic_that_is_left_and_joined_at_once(graph: MasterProxy) -> None:
+def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterProxy) -> None:
     """By several tasks, before the registration has reached the master, or during the unregistration."""
 
     async def main() -> None:
@@ -449,7 +449,7 @@ def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pyte
     run(main)
 
 
-def test_the_end_of_the_node_ends_waiting_for_peers(master: str) -> None:
+def test_node_shutdown_ends_waiting_for_peers(master: str) -> None:
     async def main() -> None:
         async with Node("n") as node:
             publisher, subscription = node.advertise("t", String), node.subscribe("u", String)
@@ -467,7 +467,7 @@ def test_the_end_of_the_node_ends_waiting_for_peers(master: str) -> None:
     run(main)
 
 
-def test_messages_that_are_published_first_at_once_all_arrive(master: str) -> None:
+def test_first_messages_all_arrive(master: str) -> None:
     async def main() -> None:
         async with Node("a") as talker, Node("b") as listener:
             subscription = await listener.subscribe("t", String)
@@ -527,7 +527,7 @@ def test_services_of_both_kinds(master: str) -> None:
     run(main)
 
 
-def test_what_goes_wrong_in_a_call(master: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture) -> None:
     async def fails(request: SetBoolRequest) -> None:
         if request.data:
             raise ValueError("bad thing")
@@ -563,7 +563,7 @@ def test_what_goes_wrong_in_a_call(master: str, caplog: pytest.LogCaptureFixture
     assert "Error processing request: bad thing" in caplog.text
 
 
-def test_a_service_is_offered_once_and_ends_when_it_is_told_to(graph: MasterProxy) -> None:
+def test_service_is_registered_once_and_can_be_closed(graph: MasterProxy) -> None:
     """Before the master has heard of it, too."""
 
     async def main() -> None:
@@ -805,7 +805,7 @@ for line in sys.stdin:
 """
 
 
-def test_with_a_node_of_the_rospy_api(master: str) -> None:
+def test_aio_node_and_rospy_node_exchange_messages(master: str) -> None:
     async def main() -> None:
         peer = await asyncio.create_subprocess_exec(
             sys.executable, "-c", PEER, stdin=subprocess.PIPE, stdout=subprocess.PIPE

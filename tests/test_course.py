@@ -54,11 +54,11 @@ def course(tmp_path_factory: pytest.TempPathFactory, _board_folder: Path) -> Cou
 # The pages before it may have to be played first, on a machine that has other things to do.
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("page", PAGES)
-def test_the_page_shows_what_happens(course: Course, page: str) -> None:
+def test_page_shows_the_output_of_its_commands(course: Course, page: str) -> None:
     course.play_up_to(page)
 
 
-def test_the_recorded_session_is_that_of_the_pages() -> None:
+def test_recorded_session_is_that_of_the_pages() -> None:
     """`python docs/workshop/record.py` records it again."""
     assert record is not None
     session = (FOLDER / "session.txt").read_text(encoding="utf-8")
@@ -82,7 +82,7 @@ def test_the_index_names_each_page() -> None:
     assert tuple(re.findall(r"^\| \[.*\]\((\w+\.md)\)", index, re.MULTILINE)) == PAGES
 
 
-def test_links_lead_somewhere() -> None:
+def test_links_resolve() -> None:
     for page in FOLDER.glob("*.md"):
         for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
             assert (FOLDER / link).exists(), f"{page.name}: {link}"
@@ -101,7 +101,7 @@ def test_links_lead_somewhere() -> None:
         ("$ echo 1234567890.5\n1111111111.1\n", None),
     ],
 )
-def test_the_player(page: str, printed: str | None, tmp_path: Path) -> None:
+def test_player_types_commands_and_compares_output(page: str, printed: str | None, tmp_path: Path) -> None:
     assert record is not None
     file = tmp_path / "page.md"
     file.write_text(f"```console\n{page}```\n")

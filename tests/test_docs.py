@@ -23,7 +23,7 @@ PROGRAMS = [
 ]
 
 
-def test_every_program_says_what_it_prints() -> None:
+def test_every_program_on_a_page_has_its_output() -> None:
     assert sum(page.count("```python") for page in PAGES.values()) == len(PROGRAMS) > 0
 
 

@@ -77,7 +77,7 @@ def test_terminal_gets_what_commands_send(text: str) -> None:
         ("\033P\033\\", "\\x1bP\\x1b\\"),
     ],
 )
-def test_terminal_obeys_nobody_else(text: str, shown: str) -> None:
+def test_terminal_ignores_foreign_escape_codes(text: str, shown: str) -> None:
     assert written(lambda terminal: terminal.write(text)) == shown
 
 

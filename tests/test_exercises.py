@@ -20,7 +20,7 @@ EXERCISES = sorted({path.stem for path in (ROOT / "launch").glob("*.launch")} - 
 
 
 @pytest.mark.parametrize("file", TESTS)
-def test_on_the_virtual_board(file: str) -> None:
+def test_solution_works_on_the_virtual_board(file: str) -> None:
     command = [sys.executable, "-m", "minirospy.cli.ros.rostest", "rpi_feros", file]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -38,7 +38,7 @@ def test_each_exercise_has_its_test() -> None:
 
 
 @pytest.mark.parametrize("exercise", EXERCISES)
-def test_one_launch_file_for_all(exercise: str) -> None:
+def test_one_launch_file_starts_all_robots(exercise: str) -> None:
     """workshop.launch runs what the exercise's own file runs, and every node in it has a program."""
     packages = Packages()
 
@@ -55,12 +55,12 @@ def test_one_launch_file_for_all(exercise: str) -> None:
         assert packages.find_executable(package, program)
 
 
-def test_an_argument_that_lacks_its_colon() -> None:
+def test_argument_without_its_colon_is_refused() -> None:
     with pytest.raises(MinirospyError, match=r"an argument is written exercise:=sick_zone$"):
         find_files(["rpi_feros_bringup", "workshop.launch", "exercise=sick_zone"], Packages())
 
 
-def test_copied_into_a_workspace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_solutions_run_in_a_copied_workspace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """catkin_make accepts their CMakeLists.txt."""
     source = tmp_path / "src"
     source.mkdir()

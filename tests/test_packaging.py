@@ -58,7 +58,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.timeout(180)
-def test_the_wheel_is_pure_and_whole(wheel: Path) -> None:
+def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     assert wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
@@ -81,7 +81,7 @@ def test_the_wheel_is_pure_and_whole(wheel: Path) -> None:
 
 
 @pytest.mark.timeout(180)
-def test_it_works_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
+def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
     site = tmp_path / "site-packages"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(site)

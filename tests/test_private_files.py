@@ -121,7 +121,7 @@ def test_create_file_replaces_links(tmp_path: Path, mine: Path, link: Callable[[
 
 @pytest.mark.parametrize("name", ["journal-1", "journal-1.lock", "journal-1.new", "journal-1.damaged"])
 @pytest.mark.parametrize("link", LINKS, ids=["symbolic", "hard"])
-def test_no_name_of_the_journal_is_followed(
+def test_journal_follows_no_link(
     tmp_path: Path, mine: Path, name: str, link: Callable[[Path, Path], None]
 ) -> None:
     folder = tmp_path / "master"
@@ -141,7 +141,7 @@ def test_no_name_of_the_journal_is_followed(
     assert not left.recovered.records
 
 
-def test_the_journal_is_for_its_user_alone(tmp_path: Path) -> None:
+def test_journal_is_readable_only_by_its_user(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
         path = tmp_path / "journal-1"
@@ -176,7 +176,7 @@ def test_log_files_follow_no_link(tmp_path: Path, mine: Path, link: Callable[[Pa
     assert mine.read_text() == "precious"
 
 
-def test_a_log_file_that_becomes_a_link_later_is_not_followed(tmp_path: Path, mine: Path) -> None:
+def test_log_file_that_becomes_a_link_is_not_followed(tmp_path: Path, mine: Path) -> None:
     handler = LogFileHandler(tmp_path / "log", 100, 1)
     for number in range(20):
         (tmp_path / "log.1").unlink(missing_ok=True)
@@ -194,7 +194,7 @@ def test_test_results_follow_no_link(tmp_path: Path, mine: Path) -> None:
     assert not (tmp_path / "result.xml").is_symlink()
 
 
-def test_a_board_in_a_folder_that_somebody_else_made_is_refused(tmp_path: Path) -> None:
+def test_board_in_a_foreign_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "boards").symlink_to(tmp_path / "real")
     (tmp_path / "real").chmod(0o777)
@@ -202,7 +202,7 @@ def test_a_board_in_a_folder_that_somebody_else_made_is_refused(tmp_path: Path) 
         Place.find(environ={"MINIROSPY_RUNTIME_DIR": str(tmp_path / "boards")}).prepare()
 
 
-def test_roscore_in_a_folder_of_links_touches_nothing_else(
+def test_roscore_follows_no_links_in_its_folder(
     tmp_path: Path, mine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     port, home = free_port(), tmp_path / "shared"

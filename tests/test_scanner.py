@@ -14,11 +14,11 @@ AHEAD = round(-ANGLE_MIN / ANGLE_INCREMENT)
 SQUARE = (Wall(2, -2, 2, 2), Wall(2, 2, -2, 2), Wall(-2, 2, -2, -2), Wall(-2, -2, 2, -2))
 
 
-def test_the_angles_are_those_of_the_scanner() -> None:
+def test_angles_are_those_of_the_scanner() -> None:
     assert pytest.approx(2.39983, abs=1e-4) == ANGLE_MIN + (BEAMS - 1) * ANGLE_INCREMENT
 
 
-def test_walls_are_where_they_stand() -> None:
+def test_walls_are_measured_at_their_distance() -> None:
     scan = Room(SQUARE).scan(noise=0)
     assert len(scan.ranges) == len(scan.intensities) == BEAMS
     assert scan.ranges[AHEAD] == pytest.approx(2.0, abs=1e-3)
@@ -26,7 +26,7 @@ def test_walls_are_where_they_stand() -> None:
     assert scan.ranges[beam] == pytest.approx(2 * math.sqrt(2), abs=0.02)
 
 
-def test_where_no_wall_is_there_is_nothing() -> None:
+def test_no_echo_without_a_wall() -> None:
     scan = Room((Wall(2, -1, 2, 1),)).scan(noise=0)
     assert math.isinf(scan.ranges[0])
     assert scan.intensities[0] == 0
@@ -34,13 +34,13 @@ def test_where_no_wall_is_there_is_nothing() -> None:
 
 
 @given(st.floats(0.3, 1.8), st.floats(-2.3, 2.3))
-def test_the_person_is_the_nearest_thing(away: float, angle: float) -> None:
+def test_person_is_measured_before_the_walls(away: float, angle: float) -> None:
     room = Room(SQUARE)
     room.person = Circle(away * math.cos(angle), away * math.sin(angle))
     assert room.scan(noise=0).nearest == pytest.approx(room.person.distance, abs=0.01)
 
 
-def test_a_person_behind_the_scanner_is_not_seen() -> None:
+def test_person_behind_the_scanner_is_not_seen() -> None:
     room = Room(SQUARE)
     before = room.scan(noise=0)
     room.person = Circle(-1.0, 0.0)

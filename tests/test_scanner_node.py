@@ -55,7 +55,7 @@ async def until_paths_are(node: Node, wanted: list[bool]) -> None:
             return
 
 
-def test_whoever_moves_the_person_everybody_sees_them(scanner: subprocess.Popen[str]) -> None:
+def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
     async def main() -> None:
         with Board() as board:
             async with Node("test", namespace="sick_safetyscanners", rosout=False) as node:
@@ -84,7 +84,7 @@ def test_whoever_moves_the_person_everybody_sees_them(scanner: subprocess.Popen[
     asyncio.run(asyncio.wait_for(main(), SECONDS))
 
 
-def test_the_raw_data_tell_what_the_scan_tells(scanner: subprocess.Popen[str]) -> None:
+def test_raw_data_match_the_scan(scanner: subprocess.Popen[str]) -> None:
     async def main() -> None:
         with Board() as board:
             # Beside the reflector on the wall ahead.

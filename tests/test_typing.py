@@ -22,7 +22,7 @@ rospy.init_nod("x")
 """
 
 
-def test_a_file_of_a_user(tmp_path: Path) -> None:
+def test_types_of_a_user_program(tmp_path: Path) -> None:
     (tmp_path / "node.py").write_text(PROGRAM)
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "node.py"],

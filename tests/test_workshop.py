@@ -136,7 +136,7 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
     assert "Exit now" not in output
 
 
-def test_the_leds_run_and_the_client_tells_how_far_they_came(start: Start, board: Board) -> None:
+def test_action_client_prints_the_progress_of_the_leds(start: Start, board: Board) -> None:
     server = start(LISTINGS / "ledrun_server.py")
     wait_line(server, "Server pripravljen")
     edges = board.watch(LEDS, timeout=40)
@@ -167,7 +167,7 @@ def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Boa
     assert "'NoneType' object has no attribute 'finalRun'" in output
 
 
-def test_the_readmes_own_node(start: Start, board: Board, tmp_path: Path) -> None:
+def test_node_of_the_readme_runs(start: Start, board: Board, tmp_path: Path) -> None:
     text = (TESTS.parent / "README.md").read_text(encoding="utf-8")
     node = tmp_path / "my_node.py"
     node.write_text(re.findall(r"```python\n(import rospy.*?)```", text, re.DOTALL)[0])

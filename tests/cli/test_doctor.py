@@ -57,7 +57,7 @@ def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
         "ok      own address",
         "ok      master",
         "ok      nodes",
-        "ok      way back",
+        "ok      return path",
         "warning topics",
         "ok      connections",
         "ok      services",
@@ -154,7 +154,7 @@ def test_another_machine(robot: Any, command: Any) -> None:
         "PROBLEM other machine: this machine does not know the name 'robot.invalid' -> give the address of that machine, "
         "or add 'robot.invalid' to the hosts file of this one",
     ]
-    assert lines(out, "both ways") == []
+    assert lines(out, "both directions") == []
     status, _, err = command("doctor", "--offline", "robot")
     assert (status, "to try another machine needs the network" in err) == (2, True)
 
@@ -191,8 +191,8 @@ def test_a_doctor_that_listens(robot: Any, command: Any, program: Start) -> None
     assert said[-1] == "listening: type `minirospy doctor` on the other machine; Ctrl-C ends this\n"
     status, out, _ = command("doctor")
     assert status == 0
-    one, _ = [line for line in out.splitlines() if " both ways: " in line or "clock: that of " in line]
-    assert one.startswith("ok      both ways: this machine reaches ")
+    one, _ = [line for line in out.splitlines() if " both directions: " in line or "clock: that of " in line]
+    assert one.startswith("ok      both directions: this machine reaches ")
     assert "it reaches this machine, and this one reaches it" in listener.stdout.readline()
     listener.send_signal(signal.SIGTERM)
     assert listener.wait(30) == 0

@@ -75,7 +75,7 @@ def test_a_second_signal_ends_the_wait_for_the_master_alone(machine: ShutdownMac
     assert machine.signal(3.0) == [Action.EXIT]
 
 
-def test_a_second_signal_also_interrupts_a_main_thread_that_does_not_unregister(
+def test_second_signal_interrupts_a_main_thread_that_ignores_shutdown(
     machine: ShutdownMachine,
 ) -> None:
     machine.signal(0.0)

@@ -69,7 +69,7 @@ def test_a_client_follows_each_step_of_a_server(before: GoalState, event: GoalEv
         state = steps[-1] if steps else state
 
 
-def test_a_client_that_waits_for_the_answer_to_its_cancel_takes_every_status() -> None:
+def test_client_waiting_for_a_cancel_accepts_every_status() -> None:
     assert all(client_steps(ClientState.WAITING_FOR_CANCEL_ACK, status) is not None for status in TOLD)
 
 

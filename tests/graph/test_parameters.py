@@ -149,7 +149,7 @@ def test_unsubscribe() -> None:
     assert tree.subscribed_keys("u") == []
 
 
-def test_an_update_of_many_subscribers_survives_those_that_come_and_go_meanwhile() -> None:
+def test_update_survives_subscribers_that_change_meanwhile() -> None:
     tree = tree_of(a={"x": 1})
     for number in range(5):
         tree.subscribe(f"/a/k{number}", "/n", f"u{number}")

@@ -52,7 +52,7 @@ def test_what_happens_to_a_publisher_that_left_changes_nothing() -> None:
     assert plan.publishers_changed(["http://a"]) == [Connect("http://a")]
 
 
-def test_one_that_refused_is_asked_again_when_the_master_next_tells_of_the_topic() -> None:
+def test_refusing_publisher_is_retried_at_the_next_update() -> None:
     plan = SubscriptionPlan()
     plan.publishers_changed(["http://a", "http://b"])
     plan.refused("http://a")

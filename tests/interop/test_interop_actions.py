@@ -97,7 +97,7 @@ def run(request: pytest.FixtureRequest) -> Iterator[Run]:
 
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(("server", "client"), PAIRS)
-def test_goals_end_the_same_whoever_serves_and_whoever_asks(
+def test_goals_end_the_same_between_all_clients_and_servers(
     real_master: str, run: Run, server: str, client: str
 ) -> None:
     serving = run(server, "serve", real_master)
@@ -112,7 +112,7 @@ def test_goals_end_the_same_whoever_serves_and_whoever_asks(
     ("server", "client"),
     [*(("ours", stack) for stack in STACKS), ("asyncio", "ours"), ("asyncio", "asyncio")],
 )
-def test_over_our_master(run: Run, server: str, client: str, master: str) -> None:
+def test_goals_over_our_master(run: Run, server: str, client: str, master: str) -> None:
     serving = run(server, "serve", master)
     assert serving.stdout
     assert any(line.strip() == "ready" for line in serving.stdout)

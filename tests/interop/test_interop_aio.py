@@ -68,7 +68,9 @@ async def until(condition: Callable[[], bool]) -> None:
         await asyncio.sleep(0.01)
 
 
-def test_topics_services_and_parameters(any_master: str, peer: subprocess.Popen[str]) -> None:
+def test_aio_node_exchanges_topics_services_and_parameters(
+    any_master: str, peer: subprocess.Popen[str]
+) -> None:
     async def main() -> None:
         async with Node("aio", master_uri=any_master) as node:
             await node.set_param("~speed", 2.5)

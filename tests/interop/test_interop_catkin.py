@@ -224,7 +224,7 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.mark.timeout(180)
-def test_the_same_modules_and_types(trees: tuple[Path, Path]) -> None:
+def test_generated_modules_and_types_are_equal(trees: tuple[Path, Path]) -> None:
     names = json.dumps(list(PACKAGES))
     looks = []
     for root, python, path in zip(trees, (REAL, sys.executable), ("", f"{BIN}:"), strict=True):
@@ -261,7 +261,7 @@ def files(folder: Path) -> dict[str, bool]:
 
 
 @pytest.mark.timeout(180)
-def test_the_same_files(trees: tuple[Path, Path]) -> None:
+def test_devel_files_are_equal(trees: tuple[Path, Path]) -> None:
     for place in ("install", "devel"):
         real, ours = (
             {name: bit for name, bit in files(root / place).items() if "/" in name} for root in trees
@@ -271,7 +271,7 @@ def test_the_same_files(trees: tuple[Path, Path]) -> None:
 
 
 @pytest.mark.timeout(180)
-def test_the_same_programs_run(trees: tuple[Path, Path]) -> None:
+def test_programs_are_on_path_in_devel_and_install(trees: tuple[Path, Path]) -> None:
     """What setup.py and catkin_install_python name is on PATH, in devel and installed."""
     for root, path in zip(trees, ("", f"{BIN}:"), strict=True):
         for place in ("devel", "install"):
@@ -281,7 +281,7 @@ def test_the_same_programs_run(trees: tuple[Path, Path]) -> None:
 
 
 @pytest.mark.timeout(180)
-def test_real_python_reads_what_ours_generated(trees: tuple[Path, Path]) -> None:
+def test_real_python_imports_our_generated_modules(trees: tuple[Path, Path]) -> None:
     """Modules of ours need genpy alone: real ROS imports them too, and writes the same bytes."""
     code = (
         "from io import BytesIO; from beginner_tutorials.msg import Person, Num; b = BytesIO()\n"
@@ -295,7 +295,7 @@ def test_real_python_reads_what_ours_generated(trees: tuple[Path, Path]) -> None
 
 
 @pytest.mark.timeout(180)
-def test_the_same_variables(trees: tuple[Path, Path]) -> None:
+def test_setup_variables_are_equal(trees: tuple[Path, Path]) -> None:
     """Of ours, the folders of minirospy's own packages come last, where real ROS has /opt/ros or /usr."""
     script = ". '{}/devel/setup.bash'; echo $CMAKE_PREFIX_PATH; echo $PYTHONPATH; echo $ROS_PACKAGE_PATH"
     said = []
@@ -307,7 +307,7 @@ def test_the_same_variables(trees: tuple[Path, Path]) -> None:
     assert said[0] == said[1] == ["/devel", "/devel/lib/python3/dist-packages", "/src"]
 
 
-def test_a_new_package_has_what_the_real_one_has(tmp_path: Path) -> None:
+def test_create_pkg_writes_the_files_of_the_real_one(tmp_path: Path) -> None:
     """catkin_create_pkg: the same lines on the screen, the same files, a package.xml that says the same."""
     trees = []
     for name, command in (("real", "/usr/bin/catkin_create_pkg"), ("ours", str(BIN / "catkin_create_pkg"))):
@@ -337,7 +337,7 @@ def test_a_new_package_has_what_the_real_one_has(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(180)
-def test_real_catkin_make_builds_a_package_of_ours(tmp_path: Path) -> None:
+def test_real_catkin_make_builds_our_package(tmp_path: Path) -> None:
     """The files of a new package are right for CMake also."""
     (tmp_path / "src").mkdir()
     run([str(BIN / "catkin_create_pkg"), "led", "rospy", "std_msgs"], tmp_path / "src", os.environ["PATH"])
@@ -424,7 +424,7 @@ IS_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}|EXISTS /nothing/there|IS_ABSOLUTE /a|IS_A
 """.replace("\n", "|").strip("|")  # fmt: skip
 
 
-def test_cmake_says_the_same(tmp_path: Path) -> None:
+def test_cmake_conditions_are_equal(tmp_path: Path) -> None:
     """`cmake -P` is the referee of what a CMakeLists.txt comes to."""
     for name in ("msg/b.msg", "msg/a.msg", "msg/in/c.msg", "b.txt", "c.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -453,7 +453,7 @@ def test_cmake_says_the_same(tmp_path: Path) -> None:
     assert said == done.stderr.splitlines()
 
 
-def test_every_file_of_cmake_is_parsed() -> None:
+def test_every_cmake_file_is_parsed() -> None:
     files = [path for path in Path("/usr/share").glob("cmake-*/Modules/*.cmake") if path.is_file()]
     assert len(files) > 200
     for path in files:

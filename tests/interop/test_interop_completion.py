@@ -107,7 +107,7 @@ def covers(ours: str, real: str) -> bool:
 
 
 @pytest.mark.skipif(not _ROSBASH.exists(), reason="rosbash is not installed")
-def test_what_rosbash_offers(uri: str) -> None:
+def test_completion_offers_the_words_of_rosbash(uri: str) -> None:
     real = offered(_ROSBASH, uri, "rospy")
     ours = offered(_OURS, uri, "ours")
     missing = {

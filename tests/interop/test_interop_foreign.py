@@ -145,7 +145,7 @@ async def set_flag(request: Any) -> Any:
     return SetBoolResponse(True, "from minirospy")
 
 
-def test_rosnodejs(master: str, modules: Path) -> None:
+def test_rosnodejs_exchanges_messages_and_calls(master: str, modules: Path) -> None:
     async def scene() -> None:
         async with Node("ours") as node:
             await offer(node)
@@ -189,7 +189,7 @@ def test_rosnodejs(master: str, modules: Path) -> None:
     run(scene())
 
 
-def test_foxglove(master: str, modules: Path) -> None:
+def test_foxglove_client_exchanges_messages_and_calls(master: str, modules: Path) -> None:
     async def scene() -> None:
         async with Node("ours") as node:
             await offer(node)
@@ -212,7 +212,7 @@ def test_foxglove(master: str, modules: Path) -> None:
     run(scene())
 
 
-def test_our_nodes_over_the_master_of_foxglove(modules: Path) -> None:
+def test_our_nodes_use_the_master_of_foxglove(modules: Path) -> None:
     async def scene() -> None:
         master = await Peer.start(modules, "foxglove_master.js")
         try:

@@ -81,7 +81,7 @@ def said(python: str, stack: str, folder: Path) -> dict[str, str]:
     return found
 
 
-def test_the_words_are_those_of_ros(tmp_path: Path) -> None:
+def test_launch_errors_contain_the_words_of_ros(tmp_path: Path) -> None:
     (tmp_path / "inner.launch").write_text('<launch><arg name="k" value="v"/></launch>')
     real = said("/usr/bin/python3", "rospy", tmp_path)
     ours = said(str(OUR_BIN / "python"), "ours", tmp_path)

@@ -20,7 +20,7 @@ def load_test_master() -> Any:
     return module
 
 
-def test_the_golden_answers_are_those_of_real_rosmaster(real_master: str) -> None:
+def test_golden_answers_are_those_of_rosmaster(real_master: str) -> None:
     """With RECORD=1 in the environment they are recorded again."""
     referee, file = load_test_master(), RUNTIME / "master_answers.json"
     recording = "RECORD" in os.environ

@@ -254,7 +254,9 @@ ALL = [
         ("rospy", "ours", "ours"),
     ],
 )
-def test_everything_goes_both_ways(network: Network, core: str, robot: str, laptop: str) -> None:
+def test_two_machines_exchange_messages_calls_and_goals(
+    network: Network, core: str, robot: str, laptop: str
+) -> None:
     """No variable but ROS_MASTER_URI: machines tell their names, which their hosts files hold."""
     start_master(network, stack=core)
     network.peer("alpha", "robot", robot).wait_for("ready")
@@ -262,21 +264,21 @@ def test_everything_goes_both_ways(network: Network, core: str, robot: str, lapt
     assert [line for line in lines if line in ALL] == ALL, lines
 
 
-def test_by_ipv6(network: Network) -> None:
+def test_two_machines_exchange_messages_by_ipv6(network: Network) -> None:
     start_master(network, ROS_IPV6="on", ROS_HOSTNAME="alpha6")
     on = {"ROS_IPV6": "on", "ROS_MASTER_URI": f"http://alpha6:{PORT}"}
     network.peer("alpha", "robot", "rospy", ROS_HOSTNAME="alpha6", **on).wait_for("ready")
     lines = network.peer("beta", "laptop", ROS_IP=BETA6, **on).lines_until_end(20)
     assert [line for line in lines if line in ALL] == ALL, lines
     lines = network.doctor("beta", ROS_HOSTNAME="beta6", **on)
-    assert "ok      way back: the master's machine (alpha6) reaches nodes of this one" in lines
+    assert "ok      return path: the master's machine (alpha6) reaches nodes of this one" in lines
     assert not [line for line in lines if line.startswith("PROBLEM")]
 
 
 # --- diagnosis: which side, which variable
 
 
-def test_a_subscriber_says_which_side_told_a_wrong_address(network: Network) -> None:
+def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> None:
     """A name that is not known here, an address that is nobody's, and ports that a firewall lets nobody reach."""
     start_master(network)
     with network.firewall(f"to {ALPHA} ipproto tcp dport 20000-20019"):
@@ -299,13 +301,13 @@ def test_a_subscriber_says_which_side_told_a_wrong_address(network: Network) -> 
     assert "if it can, a firewall is in the way" in lines["alpha"]
 
 
-def test_a_node_on_loopback_for_a_master_elsewhere_says_so_itself(network: Network) -> None:
+def test_node_on_loopback_warns_of_a_remote_master(network: Network) -> None:
     start_master(network)
     line = network.peer("beta", "robot", ROS_IP="127.0.0.1").wait_for("set ROS_IP")
     assert "is registered at '127.0.0.1', but the master is on another machine" in line
 
 
-def test_the_doctor_sees_the_way_back_from_the_master(network: Network) -> None:
+def test_doctor_checks_the_return_path_from_the_master(network: Network) -> None:
     start_master(network)
     assert network.doctor("beta")[-1] == "all is well"
     assert (
@@ -318,22 +320,22 @@ def test_the_doctor_sees_the_way_back_from_the_master(network: Network) -> None:
             lines = network.doctor("beta", ROS_IP="10.99.2.77")
     finally:
         network.ip("beta", "addr del 10.99.2.77/24 dev eth0")
-    (line,) = [each for each in lines if "way back" in each]
+    (line,) = [each for each in lines if "return path" in each]
     assert line.startswith(
-        "PROBLEM way back: the master's machine (alpha) does not reach this one at 10.99.2.77:"
+        "PROBLEM return path: the master's machine (alpha) does not reach this one at 10.99.2.77:"
     )
     assert line.endswith(f" -> export ROS_IP={BETA}")
 
 
-def test_two_doctors_try_both_ways(network: Network) -> None:
+def test_two_doctors_check_both_directions(network: Network) -> None:
     """The master is on alpha; beta listens; what alpha says when it is well, unnamed, and behind a firewall."""
     start_master(network)
     listener = network.start("beta", [str(OUR_BIN / "minirospy"), "doctor", "--listen"])
     listener.wait_for("listening: type `minirospy doctor` on the other machine")
     lines = network.doctor("alpha")
     assert lines[-1] == "all is well"
-    assert "ok      both ways: this machine reaches beta, and beta this one" in lines
-    listener.wait_for("ok      both ways: alpha (/minirospy_doctor_alpha_")
+    assert "ok      both directions: this machine reaches beta, and beta this one" in lines
+    listener.wait_for("ok      both directions: alpha (/minirospy_doctor_alpha_")
     lines = network.doctor("alpha", "beta")
     assert lines[-1] == "all is well"
     assert (
@@ -345,9 +347,11 @@ def test_two_doctors_try_both_ways(network: Network) -> None:
         lines = network.doctor("alpha", ROS_IP=ALPHA, **ports)
     (line,) = [each for each in lines if each.startswith("PROBLEM")]
     assert line.startswith(
-        "PROBLEM way back: beta does not reach this one at 10.99.1.2:20001: no answer -> a firewall"
+        "PROBLEM return path: beta does not reach this one at 10.99.1.2:20001: no answer -> a firewall"
     )
-    listener.wait_for("PROBLEM both ways: 10.99.1.2: it reaches this machine, and this one does not reach it")
+    listener.wait_for(
+        "PROBLEM both directions: 10.99.1.2: it reaches this machine, and this one does not reach it"
+    )
     with network.firewall(f"from {BETA} to {ALPHA}"):
         # What beta answers is lost: it is not reached at all.
         (line,) = [each for each in network.doctor("alpha") if each.startswith("PROBLEM")]
@@ -356,7 +360,7 @@ def test_two_doctors_try_both_ways(network: Network) -> None:
     assert network.doctor("alpha")[-1] == "all is well"
     (line,) = [each for each in network.doctor("alpha", BETA) if each.startswith("warning")]
     assert line.startswith(
-        f"warning both ways: no doctor listens on {BETA}, so nobody tried the way back -> type"
+        f"warning both directions: no doctor listens on {BETA}, so the return path was not checked -> type"
     )
     with network.firewall(f"from {BETA} to {ALPHA}"):
         lines = network.doctor("alpha", "beta")
@@ -379,14 +383,14 @@ def test_two_doctors_try_both_ways(network: Network) -> None:
         (f"http://alpa:{PORT}", "this machine does not know the name 'alpa' of ROS_MASTER_URI"),
     ],
 )
-def test_the_doctor_says_why_there_is_no_master(network: Network, uri: str, said: str) -> None:
+def test_doctor_explains_an_unreachable_master(network: Network, uri: str, said: str) -> None:
     assert "PROBLEM master: " + said in "\n".join(network.doctor("beta", ROS_MASTER_URI=uri))
 
 
 # --- what breaks, and comes back
 
 
-def test_a_cable_that_is_pulled_for_a_while(network: Network) -> None:
+def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
     """Longer than keepalive takes: the subscriber gives the connection up, and comes again when it can."""
     start_master(network)
     robot = network.peer("alpha", "robot")
@@ -402,7 +406,7 @@ def test_a_cable_that_is_pulled_for_a_while(network: Network) -> None:
     listener.wait_for("beat")
 
 
-def test_a_master_that_forgot_everything(network: Network) -> None:
+def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
     """Its nodes register again, with the machine that it never heard of too, and what is connected stays so."""
     master = start_master(network)
     robot = network.peer("beta", "robot")

@@ -25,7 +25,7 @@ def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
 
 
 @pytest.mark.parametrize(("talker", "listener"), PAIRS)
-def test_messages_arrive_byte_by_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
+def test_messages_arrive_byte_for_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
     """Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
     said = lines_until_ready(peer(talker, "talk", any_master))
     output, errors = peer(listener, "listen", any_master).communicate(timeout=40)
@@ -37,7 +37,7 @@ def test_messages_arrive_byte_by_byte(any_master: str, peer: Peer, talker: str, 
 
 
 @pytest.mark.parametrize(("talker", "listener"), PAIRS)
-def test_messages_arrive_where_the_subscriber_was_first(
+def test_messages_arrive_if_the_subscriber_started_first(
     any_master: str, peer: Peer, talker: str, listener: str
 ) -> None:
     hearing = peer(listener, "listen", any_master)
@@ -50,7 +50,7 @@ def test_messages_arrive_where_the_subscriber_was_first(
 
 
 @pytest.mark.parametrize(("server", "client"), PAIRS)
-def test_services_answer(any_master: str, peer: Peer, server: str, client: str) -> None:
+def test_services_answer_between_all_clients(any_master: str, peer: Peer, server: str, client: str) -> None:
     """Each client calls with a connection a call, and with a persistent one."""
     lines_until_ready(peer(server, "serve", any_master))
     output, errors = peer(client, "call", any_master).communicate(timeout=40)

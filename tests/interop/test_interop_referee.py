@@ -20,7 +20,7 @@ sys.path.pop(0)
 
 @pytest.mark.timeout(250)
 @pytest.mark.parametrize("name", CASES)
-def test_the_record_is_what_real_rospy_prints(name: str, real_master: str, tmp_path: Path) -> None:
+def test_record_is_the_output_of_real_rospy(name: str, real_master: str, tmp_path: Path) -> None:
     def said() -> str:
         try:
             return run_case(name, "/usr/bin/python3", real_master, tmp_path)

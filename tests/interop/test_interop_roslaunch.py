@@ -64,7 +64,7 @@ def say(stack: str, *words: str) -> tuple[int, str]:
     [["--nodes"], ["--files"], ["--dump-params"], ["--ros-args"], ["--args=/g/n"], ["--args=i/in"], ["--find-node=/i/in"]],
     ids=" ".join,
 )  # fmt: skip
-def test_what_is_printed_without_running(package: Path, words: list[str]) -> None:
+def test_roslaunch_options_print_the_same_without_running(package: Path, words: list[str]) -> None:
     words = [*words, str(package / "outer.launch"), "need:=5"]
     (real_status, real), (status, ours) = say("rospy", *words), say("ours", *words)
     # Ours runs Python programs in its own interpreter.
@@ -99,7 +99,7 @@ def end(process: subprocess.Popen[str]) -> str:
     return said
 
 
-def test_a_real_roslaunch_on_the_other_machine(package: Path, real_master: str, tmp_path: Path) -> None:
+def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, tmp_path: Path) -> None:
     """It takes our calls, and we take its."""
     folder = tmp_path / "bin"
     folder.mkdir()
@@ -119,7 +119,7 @@ def test_a_real_roslaunch_on_the_other_machine(package: Path, real_master: str, 
 
 
 @pytest.mark.skipif(os.name != "posix" or not shutil.which("sshd", path="/usr/sbin"), reason="no sshd")
-def test_a_node_over_a_real_sshd(package: Path, real_master: str, tmp_path: Path) -> None:
+def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path: Path) -> None:
     """With a key, to a port of the sshd's own; a user's name that is not ours would be another machine."""
     for name in ("host", "user"):
         subprocess.run(

@@ -144,18 +144,18 @@ def ours(line: str, cwd: Path | None = None, function: str = "main") -> tuple[in
 
 
 @pytest.mark.timeout(180)
-def test_the_same_bytes_and_statuses(tree: Path) -> None:
+def test_rospack_prints_equal_bytes_and_statuses(tree: Path) -> None:
     different = {line: (real(line), ours(line)) for line in SAME if real(line) != ours(line)}
     assert not different
 
 
-def test_the_same_lines_in_an_order_of_ours(tree: Path) -> None:
+def test_rospack_lines_are_equal_in_another_order(tree: Path) -> None:
     for line in SORTED:
         status, out, errors = real(line)
         assert ours(line) == (status, "".join(sorted(out.splitlines(keepends=True))), errors), line
 
 
-def test_the_same_refusals_with_hints(tree: Path) -> None:
+def test_rospack_errors_are_equal_with_hints(tree: Path) -> None:
     for line in SAME_BEGINNING:
         status, out, errors = real(line)
         found = ours(line)

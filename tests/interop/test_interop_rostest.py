@@ -135,7 +135,7 @@ def test_catkin_test_results(tmp_path: Path) -> None:
         assert ours == real
 
 
-def test_what_ros_own_packages_need(tmp_path: Path) -> None:
+def test_rospack_depends_of_the_packages_of_ros(tmp_path: Path) -> None:
     """As far as they are here: ours name no package of C++."""
     known = {path.name for path in (ROOT / "minirospy" / "ros_packages").iterdir()}
     known |= {path.name for path in (ROOT / "msgs").iterdir()}

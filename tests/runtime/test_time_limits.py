@@ -168,7 +168,7 @@ class Graph:
         return []
 
 
-def test_update_within_20_ms_of_a_registration_follows_20_to_30_ms_after_it() -> None:
+def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
     async def scene(clock: ManualLoop) -> None:
         notified: list[float] = []
         for fraction in range(10):

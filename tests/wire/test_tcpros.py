@@ -76,7 +76,7 @@ def test_a_publisher_of_another_type_is_refused() -> None:
         check_publisher(publisher_header("/t", STRING, "/pub", latch=True), "/t", BOOL)
 
 
-def test_the_users_fields_win_so_that_a_relay_tells_the_type_of_what_it_relays() -> None:
+def test_user_fields_override_so_that_a_relay_sends_its_type() -> None:
     extra = {"cookies": "yes", "type": BOOL.name, "md5sum": BOOL.md5sum}
     header = publisher_header("/t", ANY_TYPE, "/pub", latch=True, extra=extra)
     assert (header["cookies"], header["topic"], header["latching"]) == ("yes", "/t", "1")

@@ -65,9 +65,11 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
             text = (
                 f"it reaches this machine, and this one does not reach it at {uri or caller}: {trouble.text}"
             )
-            report(problem("both ways", f"{where}: {text}", "see there what to do"))
+            report(problem("both directions", f"{where}: {text}", "see there what to do"))
         else:
-            report(ok("both ways", f"{where} ({caller}): it reaches this machine, and this one reaches it"))
+            report(
+                ok("both directions", f"{where} ({caller}): it reaches this machine, and this one reaches it")
+            )
 
         answer = {
             "host": socket.gethostname(),
@@ -108,7 +110,9 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
             here = trouble_of(result)
             host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]
             text, advice = node_trouble(host, here, place)
-            yield problem("both ways", f"the doctor that listens at '{host}' is not reached: {text}", advice)
+            yield problem(
+                "both directions", f"the doctor that listens at '{host}' is not reached: {text}", advice
+            )
             continue
         uri, before, text, after = result
         host = host_port(uri)[0]
@@ -119,13 +123,13 @@ def check_listeners(own: DoctorNode, graph: Graph, answers: Answers, place: Mast
             trouble = Trouble(Fault(fault), str(answer["text"])) if fault else None
         except (ValueError, KeyError, TypeError):
             yield problem(
-                "both ways", f"{service} answered what no doctor says: {text[:80]}", "end that node"
+                "both directions", f"{service} did not answer as a doctor: {text[:80]}", "end that node"
             )
             continue
         if trouble:
             yield unreached_finding(own, name, host, trouble)
         else:
-            yield ok("both ways", f"this machine reaches {name}, and {name} this one")
+            yield ok("both directions", f"this machine reaches {name}, and {name} this one")
             yield clock_finding(name, theirs, before, after)
 
 

@@ -1,4 +1,4 @@
-"""Another machine that a person names: whether it is reached, and whether a doctor listens there for the way back."""
+"""Another machine that a person names: whether it is reached, and whether a doctor listens there for the return path."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def check_listens(host: str, listeners: Answers, master_uri: str) -> Iterator[Fi
         return  # check_machine reports that
     if not any(here & {name, *known[name]} for name in theirs):
         yield warning(
-            "both ways",
-            f"no doctor listens on {host}, so nobody tried the way back",
+            "both directions",
+            f"no doctor listens on {host}, so the return path was not checked",
             f"type `minirospy doctor --listen` there, with ROS_MASTER_URI={master_uri}, and this once more",
         )

@@ -172,12 +172,12 @@ def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[
     missing = own.wait_for_log_listeners(log_listeners, CONNECT_SECONDS)
     if missing:
         yield problem(
-            "way back",
+            "return path",
             f"the master reaches this machine, but {', '.join(sorted(missing))} gets no topic from it",
             f"a firewall lets only some ports through: open TCP port {own.node.tcpros_port} too (see MINIROSPY_PORTS)",
         )
     else:
-        yield ok("way back", f"the master's machine ({master_host}) reaches nodes of this one")
+        yield ok("return path", f"the master's machine ({master_host}) reaches nodes of this one")
 
 
 def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
@@ -192,9 +192,9 @@ def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Troub
         "MINIROSPY_PORTS to ports that are open"
     )
     if host == ours:
-        return problem("way back", text, firewall)
+        return problem("return path", text, firewall)
     if ours not in addresses(host):
-        return problem("way back", text, export)
+        return problem("return path", text, export)
     if trouble and trouble.fault is not Fault.NAME:
-        return problem("way back", text, f"{firewall}; or it takes '{host}' for another machine: {export}")
-    return problem("way back", text, export if trouble else f"{export}; if that does not do, {firewall}")
+        return problem("return path", text, f"{firewall}; or it takes '{host}' for another machine: {export}")
+    return problem("return path", text, export if trouble else f"{export}; if that does not do, {firewall}")

@@ -527,7 +527,7 @@ def test_journal_is_not_rewritten_between_a_value_and_its_record(
 # --- where the disk fails
 
 
-def test_append_that_fails_is_logged_once_and_tried_again_after_half_a_minute(
+def test_failed_append_is_logged_once_and_retried_after_30_s(
     journal: Journal,
     path: Path,
     state: list[list[Any]],

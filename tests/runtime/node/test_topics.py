@@ -196,7 +196,7 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
     assert "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]" in caplog.text
 
 
-def test_a_publisher_that_sends_garbage_is_reported_and_retried_less_and_less(
+def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delays: list[float] = []
@@ -452,7 +452,7 @@ def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: p
     run(scene)
 
 
-def test_a_list_that_was_meant_for_the_subscription_before_is_not_the_last_word() -> None:
+def test_publisher_list_of_an_earlier_subscription_is_queried_again() -> None:
     """rosmaster's lists wait in a queue, and may come after the answer to a later registration."""
 
     async def scene() -> None:
@@ -577,7 +577,7 @@ def test_the_shutdown_of_the_node_does_not_overtake_a_registration(
     run(scene)
 
 
-def test_close_gives_up_a_registration_that_a_silent_master_leaves_unanswered(
+def test_close_gives_up_registrations_with_a_silent_master(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What is on its way, and what waits for its turn behind it: within the documented ten seconds."""
@@ -656,7 +656,7 @@ def test_a_restarted_master_that_knows_one_new_topic_gets_all_others() -> None:
     run(scene)
 
 
-def test_a_node_that_ends_its_last_topic_does_not_take_its_master_for_a_new_one(
+def test_closing_the_last_topic_is_not_taken_for_a_new_master(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scene() -> None:
@@ -813,7 +813,7 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
 
 
 @pytest.mark.usefixtures("transport")
-def test_a_subscription_that_is_closed_in_the_middle_of_connecting_leaves_no_link() -> None:
+def test_subscription_closed_while_connecting_leaves_no_link() -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")

@@ -166,7 +166,7 @@ def test_a_bad_uri_is_reported_immediately() -> None:
     run(test)
 
 
-def test_of_a_topic_with_many_publishers_the_next_list_follows_after_a_pause() -> None:
+def test_updates_of_many_publishers_are_rate_limited() -> None:
     async def test() -> None:
         received: list[tuple[float, str, int]] = []
         loop = asyncio.get_running_loop()

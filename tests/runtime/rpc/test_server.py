@@ -33,7 +33,7 @@ def connect(server: RpcServer) -> socket.socket:
     return socket.create_connection(("127.0.0.1", server.port), 5)
 
 
-def test_a_client_with_many_requests_delays_no_other_and_gets_answers_in_order() -> None:
+def test_many_requests_of_a_client_do_not_delay_others() -> None:
     called: list[str] = []
 
     def dispatch(method: str, args: Sequence[Any]) -> str:

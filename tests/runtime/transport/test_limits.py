@@ -236,7 +236,7 @@ def test_a_listener_without_file_descriptors_pauses_and_goes_on(caplog: pytest.L
     assert "a connection could not be accepted: this process has no file descriptor left" in caplog.text
 
 
-def test_a_master_that_cannot_be_called_for_want_of_a_socket_is_not_called_absent(
+def test_lack_of_sockets_is_not_reported_as_an_absent_master(
     master: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def fail(*_: Any) -> None:

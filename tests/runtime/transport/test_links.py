@@ -114,7 +114,7 @@ def test_a_full_queue_drops_the_oldest_and_never_half_a_frame(
     assert all(data[at : at + 4] == struct.pack("<I", size) for at in range(0, len(data), size + 4))
 
 
-def test_a_peer_that_disconnects_closes_the_link_and_releases_waiting_threads(
+def test_disconnecting_peer_closes_the_link_and_wakes_threads(
     pair: tuple[socket.socket, socket.socket], loop: LoopThread
 ) -> None:
     ended = threading.Event()
@@ -221,7 +221,7 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
     assert looked == looks
 
 
-def test_a_reader_that_looked_in_vain_or_waited_for_the_interpreter_falls_asleep(
+def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A gap is as long as the look and the sleep together; bytes that were there late are no quick ones either."""

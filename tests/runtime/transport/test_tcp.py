@@ -163,7 +163,7 @@ def test_a_silent_peer_is_disconnected_after_a_while(
     assert "timed out waiting for a connection header" in caplog.text
 
 
-def test_a_thousand_silent_connections_neither_stop_the_node_nor_fill_its_log(
+def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def scene() -> None:

@@ -129,7 +129,7 @@ def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) 
         ("", "tcp", socket.AF_INET),
     ],
 )
-def test_a_service_and_the_slave_api_are_reached_by_the_socket_beside_their_port(
+def test_services_and_slave_api_are_reached_by_unix_socket(
     of_server: str, of_client: str, family: socket.AddressFamily, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MINIROSPY_TRANSPORT", of_server)
@@ -338,7 +338,7 @@ def test_a_client_whose_unix_socket_has_a_name_is_served() -> None:
     assert where == ["this machine"]
 
 
-def test_a_large_request_is_not_copied_for_each_piece_that_the_socket_takes() -> None:
+def test_large_request_is_not_copied_for_each_partial_send() -> None:
     size = 8_000_000
 
     async def scene() -> None:
@@ -418,9 +418,7 @@ def test_a_node_on_tcp_looks_for_no_unix_socket() -> None:
 
 
 @pytest.mark.parametrize("transport", ["auto", "tcp"])
-def test_an_image_arrives_and_by_the_unix_socket_without_a_copy_of_its_array(
-    transport: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_image_arrives_by_unix_socket_without_a_copy(transport: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
     from sensor_msgs.msg import Image
 
