@@ -455,6 +455,14 @@ def test_steps_of_writing_are_of_one_size() -> None:
     assert sizes(b"x" * 100_000)[1:4] == [32768, 32768, 32768]
 
 
+@pytest.mark.parametrize("value", [1, [1] * 1000])
+def test_answer_may_be_as_long_as_the_limit(value: Any) -> None:
+    size = len(serialize_response(value))
+    assert len(b"".join(finish(serialize_response_in_steps(value, size)))) == size
+    with pytest.raises(RpcProtocolError, match=f"more than {size - 1} bytes of XML"):
+        finish(serialize_response_in_steps(value, size - 1))
+
+
 def test_answer_beyond_a_mebibyte_is_written_alone() -> None:
     needs = list(serialize_response_in_steps("x" * 20 * 65536, MAX_BODY))
     assert needs == [None] * 14 + [ALONE] + [None] * 4
