@@ -35,6 +35,8 @@ from actionlib_msgs.msg import GoalID
 rospy.init_node("cancel", argv=[])
 cancel = rospy.Publisher("run_led/cancel", GoalID, queue_size=1)
 cancel.wait_for_subscribers(timeout=30)
+print("ready", flush=True)
+input()
 cancel.publish(GoalID())
 """
 
@@ -56,6 +58,7 @@ def start(master: str) -> Iterator[Start]:
         flags = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
         process = subprocess.Popen(
             [sys.executable, *map(str, arguments)],
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -139,14 +142,17 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
 def test_action_client_prints_the_progress_of_the_leds(start: Start, board: Board) -> None:
     server = start(LISTINGS / "ledrun_server.py")
     wait_line(server, "Server pripravljen")
+    # It is there before the runs start: of ten that take a second each all may be over by then.
+    cancel = start("-c", CANCEL)
+    wait_line(cancel, "ready")
     edges = board.watch(LEDS, timeout=40)
     client = start(LISTINGS / "ledrun_client.py")
     wait_line(client, "Server is active.")
     lit = [edge.pin for edge, _ in zip((edge for edge in edges if edge.level), range(7), strict=False)]
     assert lit == [*LEDS, 2]
-    start("-c", CANCEL).communicate(timeout=30)
+    cancel.communicate("\n", timeout=30)
     output, _ = client.communicate(timeout=30)
-    # The second run, or a later one where starting CANCEL took its time.
+    # The second run, or a later one on a busy machine.
     assert re.fullmatch(r"Result: [2-9]\n", output)
     said = interrupt(server)
     assert "Stevilo iteracij: 10" in said
