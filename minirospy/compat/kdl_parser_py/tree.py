@@ -1,0 +1,140 @@
+"""The tree of a robot under PyKDL's names, as far as a tree goes: segments, joints, chains, poses. Without solvers.
+
+Source: https://www.orocos.org/kdl, http://wiki.ros.org/kdl_parser.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from minirospy.urdf.model import Joint as UrdfJoint
+from minirospy.urdf.model import JointType, Robot
+from minirospy.urdf.poses import Pose
+from minirospy.urdf.poses import Segment as JointSegment
+
+__all__ = ["Chain", "Joint", "Segment", "Tree", "tree_of"]
+
+_TYPE_NAMES = {
+    JointType.REVOLUTE: "RotAxis",
+    JointType.CONTINUOUS: "RotAxis",
+    JointType.PRISMATIC: "TransAxis",
+}
+
+
+class Joint:
+    """The joint of a segment."""
+
+    def __init__(self, joint: UrdfJoint) -> None:
+        self._joint = joint
+
+    def getName(self) -> str:
+        """Return the joint's name."""
+        return self._joint.name
+
+    def getTypeName(self) -> str:
+        """Return RotAxis, TransAxis or None, KDL's name of what does not move."""
+        return _TYPE_NAMES.get(self._joint.type, "None")
+
+
+class Segment:
+    """A joint and the link below it."""
+
+    def __init__(self, joint: UrdfJoint) -> None:
+        self._segment = JointSegment(joint)
+        self._joint = Joint(joint)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether its joint has a position."""
+        return self._segment.is_moving
+
+    @property
+    def parent(self) -> str:
+        """The link above."""
+        return self._segment.joint.parent
+
+    def getName(self) -> str:
+        """Return the link's name."""
+        return self._segment.joint.child
+
+    def getJoint(self) -> Joint:
+        """Return the joint."""
+        return self._joint
+
+    def pose(self, q: float) -> Pose:
+        """Return the link's pose in the link above: translation, and rotation as (x, y, z, w)."""
+        return self._segment.pose(q)
+
+
+class Chain:
+    """Segments one below the other."""
+
+    def __init__(self, segments: list[Segment]) -> None:
+        self._segments = segments
+
+    def getNrOfSegments(self) -> int:
+        """Return the number of segments."""
+        return len(self._segments)
+
+    def getNrOfJoints(self) -> int:
+        """Return the number of joints that move."""
+        return sum(segment.is_moving for segment in self._segments)
+
+    def getSegment(self, nr: int) -> Segment:
+        """Return a segment, the uppermost is 0."""
+        return self._segments[nr]
+
+
+class Tree:
+    """The segments of a robot below its root."""
+
+    def __init__(self, root_name: str = "root") -> None:
+        self._root = root_name
+        self._segments: dict[str, Segment] = {}
+
+    def addSegment(self, segment: Segment, hook_name: str) -> bool:
+        """Add a segment below a link; return False where that is not there, or the segment is there already."""
+        name = segment.getName()
+        is_known = hook_name == self._root or hook_name in self._segments
+        if not is_known or name in self._segments or name == self._root:
+            return False
+        self._segments[name] = segment
+        return True
+
+    def getNrOfSegments(self) -> int:
+        """Return the number of segments, the root not counted."""
+        return len(self._segments)
+
+    def getNrOfJoints(self) -> int:
+        """Return the number of joints that move."""
+        return sum(segment.is_moving for segment in self._segments.values())
+
+    def getChain(self, chain_root: str, chain_tip: str) -> Chain:
+        """Return the segments from a link down to one below it. Raises ValueError where it is not below."""
+        found: list[Segment] = []
+        link = chain_tip
+        while link != chain_root:
+            segment = self._segments.get(link)
+            if segment is None:
+                raise ValueError(f"link [{chain_tip}] is not below link [{chain_root}]")
+            found.append(segment)
+            link = segment.parent
+        return Chain(found[::-1])
+
+
+def tree_of(robot: Robot) -> Tree:
+    """Return the tree of a robot, each link after the one above it."""
+    tree = Tree(robot.root)
+    for joint in _downwards(robot):
+        tree.addSegment(Segment(joint), joint.parent)
+    return tree
+
+
+def _downwards(robot: Robot) -> Iterator[UrdfJoint]:
+    waiting, seen = [robot.root], {robot.root}
+    while waiting:
+        for joint in robot.child_joints(waiting.pop()):
+            if joint.child not in seen:
+                seen.add(joint.child)
+                waiting.append(joint.child)
+                yield joint

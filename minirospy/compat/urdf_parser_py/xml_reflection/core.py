@@ -1,0 +1,401 @@
+"""Objects between XML and Python, by a table of what each has: attributes, elements, and lists of elements.
+
+Errors and their places (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path as File
+from typing import Any, ClassVar, TypeVar
+from xml.dom import minidom
+from xml.etree import ElementTree as ET
+
+__all__ = [
+    "Attribute", "Codec", "Element", "Many", "NamedAttribute", "Number", "Object", "ObjectOf", "ParseError", "Path",
+    "Raw", "Text", "VectorOf", "on_error", "on_error_stderr", "report", "to_yaml", "xml_string",
+]  # fmt: skip
+
+_T = TypeVar("_T", bound="Object")
+
+
+def on_error_stderr(message: str) -> None:
+    """Print what a description has and a robot does not know."""
+    sys.stderr.write(message + "\n")
+
+
+on_error: Callable[[str], object] = on_error_stderr
+"""What is done about it: programs replace it, here or in the module that they import."""
+
+
+def report(message: str) -> None:
+    """Call what programs have put in the place of on_error."""
+    module = sys.modules.get("urdf_parser_py.xml_reflection.core")
+    replaced = getattr(module, "on_error", on_error_stderr)
+    (on_error if replaced is on_error_stderr else replaced)(message)
+
+
+class Path:
+    """Where in a description an element is."""
+
+    def __init__(self, tag: str, parent: Path | None = None, suffix: str = "") -> None:
+        self.tag = tag
+        self.parent = parent
+        self.suffix = suffix
+
+    def __str__(self) -> str:
+        above = "" if self.parent is None else str(self.parent)
+        return f"{above}/{self.tag}{self.suffix}"
+
+
+class ParseError(Exception):
+    """A description does not read: what is wrong (``e``), and where (``path``)."""
+
+    def __init__(self, e: Exception, path: Path) -> None:
+        self.e = e
+        self.path = path
+        super().__init__(f"ParseError in {path}:\n{e}")
+
+
+class Codec:
+    """Between an element, or an attribute's text, and a value."""
+
+    def from_string(self, text: str) -> Any:
+        """Return the value of a text. Raises ValueError."""
+        raise NotImplementedError
+
+    def to_string(self, value: Any) -> str:
+        """Return the text of a value."""
+        return str(value)
+
+    def from_xml(self, node: ET.Element, path: Path) -> Any:
+        """Return the value of an element."""
+        return self.from_string(node.text or "")
+
+    def write_xml(self, node: ET.Element, value: Any) -> None:
+        """Write a value into an element."""
+        node.text = self.to_string(value)
+
+
+class Text(Codec):
+    """A text as it is."""
+
+    def from_string(self, text: str) -> str:
+        """Return the text."""
+        return text
+
+
+class Number(Codec):
+    """A number."""
+
+    def from_string(self, text: str) -> float:
+        """Return the number. Raises ValueError."""
+        return float(text)
+
+
+class VectorOf(Codec):
+    """So many numbers."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+
+    def from_string(self, text: str) -> list[float]:
+        """Return the numbers. Raises AssertionError where they are too few or too many, ValueError."""
+        words = text.split()
+        if len(words) != self._count:
+            raise AssertionError("Invalid vector length")
+        return [float(word) for word in words]
+
+    def to_string(self, value: Iterable[float]) -> str:
+        """Return the numbers with blanks between them."""
+        words = [str(number) for number in value]
+        if len(words) != self._count:
+            raise AssertionError("Invalid vector length")
+        return " ".join(words)
+
+
+class NamedAttribute(Codec):
+    """An element whose value is one attribute: ``<parent link="base"/>``."""
+
+    def __init__(self, attribute: str, codec: Codec) -> None:
+        self._attribute = attribute
+        self._codec = codec
+
+    def from_xml(self, node: ET.Element, path: Path) -> Any:
+        """Return the attribute's value."""
+        text = node.get(self._attribute)
+        if text is None:
+            raise ParseError(Exception(f"Required attribute not set in XML: {self._attribute}"), path)
+        return self._codec.from_string(text)
+
+    def write_xml(self, node: ET.Element, value: Any) -> None:
+        """Write the attribute."""
+        node.set(self._attribute, self._codec.to_string(value))
+
+
+class Raw(Codec):
+    """An element as it is."""
+
+    def from_xml(self, node: ET.Element, path: Path) -> ET.Element:
+        """Return the element."""
+        return node
+
+    def write_xml(self, node: ET.Element, value: ET.Element) -> None:
+        """Write a copy of the element."""
+        node.extend(list(value))
+        node.text = value.text
+        node.attrib.update(value.attrib)
+
+
+class ObjectOf(Codec):
+    """An element that is an object of a class."""
+
+    def __init__(self, kind: type[Object]) -> None:
+        self.kind = kind
+
+    def from_xml(self, node: ET.Element, path: Path) -> Object:
+        """Return the object."""
+        found = self.kind()
+        found.read_xml(node, path)
+        return found
+
+    def write_xml(self, node: ET.Element, value: Object) -> None:
+        """Write the object."""
+        value.write_xml(node)
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """An attribute of an element, and of its object."""
+
+    name: str
+    codec: Codec
+    required: bool = True
+    default: Any = None
+    kind: ClassVar[str] = "attribute"
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element in an element, at most once."""
+
+    name: str
+    codec: Codec
+    required: bool = True
+    default: Any = None
+    kind: ClassVar[str] = "element"
+
+
+@dataclass(frozen=True)
+class Many:
+    """Elements in an element, any number of them: a list of the object's, called ``name`` + s."""
+
+    name: str
+    codec: Codec
+
+
+class Object:
+    """An element as an object: ``TAG`` is its tag, ``FIELDS`` what it has."""
+
+    TAG: ClassVar[str] = ""
+    FIELDS: ClassVar[tuple[Attribute | Element | Many, ...]] = ()
+
+    # --- XML in
+
+    @classmethod
+    def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
+        """Return the object of an XML text. Raises ParseError, xml.etree.ElementTree.ParseError."""
+        return cls.from_xml(ET.fromstring(xml_string), Path(cls.TAG))
+
+    @classmethod
+    def from_xml_file(cls: type[_T], file_path: str) -> _T:
+        """Return the object of a file. Raises as from_xml_string, and OSError."""
+        return cls.from_xml_string(File(file_path).read_bytes())
+
+    @classmethod
+    def from_xml(cls: type[_T], node: ET.Element, path: Path) -> _T:
+        """Return the object of an element. Raises ParseError."""
+        found = cls()
+        found.read_xml(node, path)
+        return found
+
+    def parse(self: _T, xml_string: str | bytes) -> _T:
+        """Read an XML text into this object, and return it. Raises as from_xml_string."""
+        self.read_xml(ET.fromstring(xml_string), Path(self.TAG))
+        return self
+
+    def read_xml(self, node: ET.Element, path: Path) -> None:
+        """Read an element into this object. Raises ParseError."""
+        self._read_attributes(node, path)
+        self._read_elements(node, path)
+        attributes = {each.name for each in self.FIELDS if isinstance(each, Attribute)}
+        for name in [name for name in node.attrib if name not in attributes]:
+            report(f'Unknown attribute "{name}" in {path}')
+        known = {each.name for each in self.FIELDS if not isinstance(each, Attribute)}
+        for child in node:
+            if child.tag not in known and isinstance(child.tag, str):
+                report(f'Unknown tag "{child.tag}" in {path}')
+        self.post_read_xml()
+        try:
+            self.check_valid()
+        except ParseError:
+            raise
+        except Exception as error:
+            raise ParseError(error, path) from error
+
+    def _read_attributes(self, node: ET.Element, path: Path) -> None:
+        for field in self.FIELDS:
+            if not isinstance(field, Attribute):
+                continue
+            text = node.get(field.name)
+            if text is None:
+                self._set_default(field, path)
+                continue
+            try:
+                value = field.codec.from_string(text)
+            except (ValueError, AssertionError) as error:
+                raise ParseError(
+                    error, Path(path.tag, path.parent, f"{path.suffix}[@{field.name}]")
+                ) from error
+            setattr(self, field.name, value)
+            if field.name == "name":
+                path.suffix = f"[@name='{value}']"
+
+    def _read_elements(self, node: ET.Element, path: Path) -> None:
+        fields = {field.name: field for field in self.FIELDS if not isinstance(field, Attribute)}
+        seen = set()
+        for child in node:
+            field = fields.get(child.tag)
+            if isinstance(field, Many):
+                number = len(self.get_aggregate_list(field.name)) + 1
+                value = field.codec.from_xml(child, Path(child.tag, path, f"[{number}]"))
+                self.add_aggregate(field.name, value)
+            elif field is not None and child.tag in seen:
+                report(f"Scalar element defined multiple times: {child.tag}")
+            elif field is not None:
+                seen.add(child.tag)
+                setattr(self, field.name, field.codec.from_xml(child, Path(child.tag, path)))
+        for field in fields.values():
+            if isinstance(field, Element) and field.name not in seen:
+                self._set_default(field, path)
+
+    def _set_default(self, field: Attribute | Element, path: Path) -> None:
+        if field.required:
+            raise ParseError(Exception(f"Required {field.kind} not set in XML: {field.name}"), path)
+        default = field.default
+        setattr(self, field.name, [*default] if isinstance(default, list) else default)
+
+    def post_read_xml(self) -> None:
+        """Do what follows the reading; classes of programs override it."""
+
+    def check_valid(self) -> None:
+        """Raise an exception where the object is wrong."""
+
+    def pre_write_xml(self) -> None:
+        """Do what precedes the writing; classes of programs override it."""
+
+    # --- XML out
+
+    def to_xml(self) -> ET.Element:
+        """Return the object as an element."""
+        node = ET.Element(self.TAG)
+        self.write_xml(node)
+        return node
+
+    def to_xml_string(self, addHeader: bool = True) -> str:
+        """Return the object as XML, indented."""
+        return xml_string(self.to_xml(), addHeader)
+
+    def write_xml(self, node: ET.Element) -> None:
+        """Write the object into an element. Raises an exception where a required part is None."""
+        self.check_valid()
+        self.pre_write_xml()
+        for field in self.FIELDS:
+            if isinstance(field, Many):
+                continue
+            value = getattr(self, field.name)
+            if value is None and field.required:
+                what = "attribute not set" if isinstance(field, Attribute) else "element not defined"
+                raise Exception(f"Required {what} in object: {field.name}")
+            value = field.default if value is None else value
+            if value is None:
+                continue
+            if isinstance(field, Attribute):
+                node.set(field.name, field.codec.to_string(value))
+            else:
+                field.codec.write_xml(ET.SubElement(node, field.name), value)
+        codecs = {field.name: field.codec for field in self.FIELDS if isinstance(field, Many)}
+        for name, value in self._aggregates() if codecs else ():
+            codecs[name].write_xml(ET.SubElement(node, name), value)
+
+    # --- lists of elements, in the order in which they were added
+
+    def aggregate_init(self) -> None:
+        """Start without elements in lists."""
+        self.aggregate_order: list[Any] = []
+        self.aggregate_type: dict[Any, str] = {}
+
+    def get_aggregate_list(self, xml_var: str) -> list[Any]:
+        """Return the list of the elements of a tag."""
+        found: list[Any] = getattr(self, f"{xml_var}s")
+        return found
+
+    def add_aggregate(self, xml_var: str, obj: Any) -> None:
+        """Add an element of a tag."""
+        self.get_aggregate_list(xml_var).append(obj)
+        self.aggregate_order.append(obj)
+        self.aggregate_type[obj] = xml_var
+
+    def remove_aggregate(self, obj: Any) -> None:
+        """Remove an element."""
+        self.aggregate_order.remove(obj)
+        self.get_aggregate_list(self.aggregate_type.pop(obj)).remove(obj)
+
+    def lump_aggregates(self) -> None:
+        """Put the elements of each tag together."""
+        self.aggregate_init()
+        for field in self.FIELDS:
+            if isinstance(field, Many):
+                for each in self.get_aggregate_list(field.name):
+                    self.aggregate_order.append(each)
+                    self.aggregate_type[each] = field.name
+
+    def _aggregates(self) -> list[tuple[str, Any]]:
+        return [(self.aggregate_type[each], each) for each in self.aggregate_order]
+
+    # --- for people
+
+    def to_yaml(self) -> object:
+        """Return the object as what YAML has."""
+        names = [f"{each.name}s" if isinstance(each, Many) else each.name for each in self.FIELDS]
+        return to_yaml({name: getattr(self, name) for name in names})
+
+    def __str__(self) -> str:
+        import yaml
+
+        return str(yaml.dump(self.to_yaml())).rstrip()
+
+
+def to_yaml(obj: object) -> object:
+    """Return a value as what YAML has."""
+    if isinstance(obj, bool | int | float):
+        return obj
+    if isinstance(obj, Object):
+        return obj.to_yaml()
+    if isinstance(obj, Mapping):
+        return {str(key): to_yaml(value) for key, value in obj.items()}
+    if hasattr(obj, "tolist"):
+        return to_yaml(obj.tolist())
+    if isinstance(obj, Iterable) and not isinstance(obj, str | ET.Element):
+        return [to_yaml(each) for each in obj]
+    return str(obj)
+
+
+def xml_string(rootXml: ET.Element, addHeader: bool = True) -> str:
+    """Return an element as XML, indented, without blank lines."""
+    lines = minidom.parseString(ET.tostring(rootXml)).toprettyxml(indent="  ").split("\n")
+    if lines[0].startswith("<?xml") and not addHeader:
+        del lines[0]
+    return "\n".join(line for line in lines if line.strip())

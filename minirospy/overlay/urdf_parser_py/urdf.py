@@ -1,0 +1,31 @@
+"""urdf_parser_py.urdf, provided by minirospy: `URDF.from_xml_string(text)`."""
+
+from minirospy.compat.urdf_parser_py.urdf import URDF as URDF
+from minirospy.compat.urdf_parser_py.urdf import Actuator as Actuator
+from minirospy.compat.urdf_parser_py.urdf import Box as Box
+from minirospy.compat.urdf_parser_py.urdf import Collision as Collision
+from minirospy.compat.urdf_parser_py.urdf import Color as Color
+from minirospy.compat.urdf_parser_py.urdf import Cylinder as Cylinder
+from minirospy.compat.urdf_parser_py.urdf import GeometricType as GeometricType
+from minirospy.compat.urdf_parser_py.urdf import Inertia as Inertia
+from minirospy.compat.urdf_parser_py.urdf import Inertial as Inertial
+from minirospy.compat.urdf_parser_py.urdf import Joint as Joint
+from minirospy.compat.urdf_parser_py.urdf import JointCalibration as JointCalibration
+from minirospy.compat.urdf_parser_py.urdf import JointDynamics as JointDynamics
+from minirospy.compat.urdf_parser_py.urdf import JointLimit as JointLimit
+from minirospy.compat.urdf_parser_py.urdf import JointMimic as JointMimic
+from minirospy.compat.urdf_parser_py.urdf import Link as Link
+from minirospy.compat.urdf_parser_py.urdf import LinkMaterial as LinkMaterial
+from minirospy.compat.urdf_parser_py.urdf import Material as Material
+from minirospy.compat.urdf_parser_py.urdf import Mesh as Mesh
+from minirospy.compat.urdf_parser_py.urdf import Pose as Pose
+from minirospy.compat.urdf_parser_py.urdf import PR2Transmission as PR2Transmission
+from minirospy.compat.urdf_parser_py.urdf import Robot as Robot
+from minirospy.compat.urdf_parser_py.urdf import SafetyController as SafetyController
+from minirospy.compat.urdf_parser_py.urdf import Sphere as Sphere
+from minirospy.compat.urdf_parser_py.urdf import Texture as Texture
+from minirospy.compat.urdf_parser_py.urdf import Transmission as Transmission
+from minirospy.compat.urdf_parser_py.urdf import TransmissionJoint as TransmissionJoint
+from minirospy.compat.urdf_parser_py.urdf import Visual as Visual
+from minirospy.compat.urdf_parser_py.urdf import verbose as verbose
+from minirospy.compat.urdf_parser_py.urdf import xmlr as xmlr
