@@ -49,6 +49,11 @@ class BagReader(ABC):
     chunks: Sequence[ChunkInfo]
     """The chunks in the order of the file; none in bags of version 1.2."""
 
+    @property
+    def version_name(self) -> str:
+        """The version as `rosbag info` prints it."""
+        return f"{self.version // 100}.{self.version % 100}" + ("" if self.indexed else " (unindexed)")
+
     def prepare(self) -> None:
         """Find the connections of a bag that has no index, as version 1.2 allows. Raise BagFormatError."""
         return

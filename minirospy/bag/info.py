@@ -70,7 +70,7 @@ class Summary(NamedTuple):
 
 def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summary:
     """Return what a bag holds; with ``frequencies`` the whole index is read for the topics' rates. Raise BagFormatError."""
-    version = f"{reader.version // 100}.{reader.version % 100}" + ("" if reader.indexed else " (unindexed)")
+    version = reader.version_name
     connections = list(reader.connections.values())
     counts: Counter[int] = Counter()
     if reader.chunks:

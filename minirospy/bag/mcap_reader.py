@@ -10,9 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, BinaryIO
 
 from minirospy.bag.base import BagReader, Block, Position, StoredMessage
+from minirospy.bag.chunks import StoredChunk
+from minirospy.bag.compression import NONE
 from minirospy.bag.index import ConnectionIndex
 from minirospy.bag.mcap_writer import check_mcap
-from minirospy.bag.records import ChunkInfo, Connection, Fields
+from minirospy.bag.reader import open_bag
+from minirospy.bag.records import Chunk, ChunkInfo, Connection, Fields
 from minirospy.errors import BagFormatError, BagUnindexedError
 
 if TYPE_CHECKING:
@@ -20,10 +23,18 @@ if TYPE_CHECKING:
     from mcap.records import Channel, Schema
     from mcap.summary import Summary
 
-__all__ = ["MAGIC", "McapReader"]
+__all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 MAGIC = b"\x89MCAP0\r\n"
 """The first and the last bytes of a file."""
+
+
+def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
+    """Return a reader of the bag or MCAP file that starts at the stream's position. Raise what those raise."""
+    start = stream.tell()
+    magic = stream.read(len(MAGIC))
+    stream.seek(start)
+    return McapReader(stream) if magic == MAGIC else open_bag(stream)
 
 
 class McapReader(BagReader):
@@ -54,6 +65,22 @@ class McapReader(BagReader):
                 self.foreign.append(channel.topic)
         self.statistics = summary.statistics
         self.chunks = _chunk_infos(summary)
+        self._headers = {
+            chunk.chunk_start_offset: StoredChunk(
+                Chunk(chunk.compression or NONE, chunk.uncompressed_size, chunk.compressed_size),
+                chunk.chunk_start_offset,
+            )
+            for chunk in summary.chunk_indexes
+        }
+
+    @property
+    def version_name(self) -> str:
+        """The format, in place of a bag's version."""
+        return "MCAP 0"
+
+    def chunk_headers(self) -> dict[int, StoredChunk]:
+        """See :meth:`BagReader.chunk_headers`."""
+        return self._headers
 
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
@@ -63,7 +90,7 @@ class McapReader(BagReader):
         topics = {connection.topic for connection in wanted.values()}
         with _faults():
             for _, channel, message in self._reader.iter_messages(
-                topics, start_time=start, end_time=None if end is None else end + 1
+                topics, starting_at=start, ending_before=None if end is None else end + 1
             ):
                 if connection := wanted.get(channel.id):
                     yield StoredMessage(connection, message.log_time, message.data, 0)

@@ -8,7 +8,7 @@ Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 from minirospy.bag.writer import CHUNK_THRESHOLD, Buffer
 from minirospy.errors import BagCompressionError, BagError, BagFormatError
@@ -55,7 +55,7 @@ class McapWriter:
         self._chunk_size = chunk_size
         self._gathered = 0
         self._writer: Writer = Writer(
-            stream,
+            cast(BinaryIO, _Whole(stream)),
             chunk_size=chunk_size,
             compression=CompressionType[COMPRESSIONS[compression]],
         )
@@ -112,6 +112,21 @@ class McapWriter:
     def salvage(self, written: int | None = None) -> int:
         """Raise OSError: a file without its summary is left to tools such as ``mcap recover``."""
         raise OSError("the file has no summary")
+
+
+class _Whole:
+    """A stream whose writes are whole, also those of a file without a buffer, into which the library puts its own."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.tell = stream.tell
+        self.flush = stream.flush
+
+    def write(self, data: bytes) -> int:
+        count = self._stream.write(data)
+        while count is not None and count < len(data):
+            count += self._stream.write(memoryview(data)[count:])
+        return len(data)
 
 
 def _text(value: str | bytes) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.bag import compression as compressions
 from minirospy.bag.base import BagReader
-from minirospy.bag.reader import open_bag
+from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import Connection, read_version
 from minirospy.bag.repair import Repair
@@ -46,8 +46,8 @@ _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
 @contextlib.contextmanager
 def open_reader(path: str) -> Iterator[BagReader]:
-    """Yield a reader of a bag file. Raise BagError, OSError."""
-    with open(path, "rb") as stream, contextlib.closing(open_bag(stream)) as reader:
+    """Yield a reader of a bag or an MCAP file. Raise BagError, OSError."""
+    with open(path, "rb") as stream, contextlib.closing(open_bag_or_mcap(stream)) as reader:
         yield reader
 
 

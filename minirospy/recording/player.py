@@ -225,6 +225,8 @@ class Player:
             with self._lock:
                 wait = schedule.poll(now)
             if wait is None:
+                # At a step the clock shows the message's time first.
+                self._tick(schedule, now)
                 return True
             now = self._wait.until(min(wait, self._next_line) if not self._options.quiet else wait)
         return False
@@ -274,7 +276,7 @@ class Player:
             if key == " ":
                 schedule.set_paused(not schedule.is_paused, now)
             elif key == "s":
-                schedule.step(now)
+                schedule.step()
             elif key == "t":
                 schedule.toggle_pause_topics()
         self._wait.wake()

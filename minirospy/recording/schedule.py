@@ -77,6 +77,7 @@ class Schedule:
         self._since = wall
         """Since when it has been paused or delayed."""
         self._paused = options.paused
+        self._steps = 0
         self._delayed = False
         self._pauses_at: Collection[str] = options.pause_topics
         self._controlled = first
@@ -116,6 +117,12 @@ class Schedule:
         if self._is_due:
             self._clock = self._message
             return None
+        if self._paused and self._steps:
+            self._steps -= 1
+            self._origin += wall - self._due()
+            self._since = wall
+            self._tick_now(wall)
+            return None
         if self._delayed and not self._paused and not self._is_behind():
             self._resume(wall)
             self._delayed = False
@@ -138,15 +145,13 @@ class Schedule:
         elif not self._delayed:
             self._resume(wall)
         self._paused = paused
+        self._steps = 0
         return True
 
-    def step(self, wall: int) -> None:
-        """Have the message published now, if paused."""
+    def step(self) -> None:
+        """Have the message published now, or the next one that is offered, if paused."""
         if self._paused:
-            self._origin += wall - self._due()
-            self._since = wall
-            self._is_due = True
-            self._tick_now(wall)
+            self._steps += 1
 
     def toggle_pause_topics(self) -> None:
         """Ignore the topics to pause at, or heed them again."""

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.bag.base import BagReader, StoredMessage
-from minirospy.bag.mcap_reader import MAGIC, McapReader
-from minirospy.bag.reader import open_bag
+from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.records import Connection
 from minirospy.errors import BagError, NotFoundError
 
@@ -96,11 +95,7 @@ class Bags:
 def open_reader(path: Path, opened: ExitStack) -> BagReader:
     """Return a reader of a bag or an MCAP file, which ``opened`` closes. Raise OSError, BagError."""
     stream = opened.enter_context(path.open("rb"))
-    if stream.read(len(MAGIC)) == MAGIC:
-        reader: BagReader = McapReader(stream)
-    else:
-        stream.seek(0)
-        reader = open_bag(stream)
+    reader = open_bag_or_mcap(stream)
     opened.callback(reader.close)
     reader.prepare()
     return reader

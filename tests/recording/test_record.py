@@ -331,3 +331,35 @@ def test_simulated_time_is_waited_for(talker: Talker, start: Start, tmp_path: Pa
     end(process)
 
     assert [one.time for one in messages(tmp_path / "out.bag")] == [1000 * 10**9 + 7]
+
+
+def test_mcap_files_are_recorded_and_played(talker: Talker, start: Start, tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    chatter = talker.advertise("/chatter")
+    large = b"x" * 300_000
+    process = start("record", "--mcap", "--zstd", "-l", "3", "-O", "out", "/chatter")
+    connected(chatter)
+    for text in (b"one", large, b"two"):
+        say(chatter, text)
+
+    assert process.wait(GUARD) == 0
+    with (tmp_path / "out.mcap").open("rb") as stream:
+        found = list(make_reader(stream, validate_crcs=True).iter_messages())
+    assert [message.data[4:] for _, _, message in found] == [b"one", large, b"two"]
+    assert found[0][1].metadata["callerid"] == "/talker"
+
+    again = start("record", "-l", "3", "-O", "again", "/chatter2")
+    read_until(again, "Subscribing")
+    player = start("play", "out.mcap", "-p", "/x", "--wait-for-subscribers", "/x/chatter:=/chatter2", "-i")
+    assert again.wait(GUARD) == 0
+    player.communicate(timeout=GUARD)
+    assert [one.body[4:] for one in messages(tmp_path / "again.bag")] == [b"one", large, b"two"]
+
+
+def test_a_missing_extra_is_named(start: Start) -> None:
+    process = start("record", "--mcap", "/a", prelude="sys.modules['mcap'] = None")
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert process.returncode == 1
+    assert "pip install 'minirospy[mcap]'" in errors

@@ -47,16 +47,22 @@ class Wall:
         return self.published
 
     def _poll(self) -> int | None:
+        self._tick()
+        wait = self.schedule.poll(self.now)
+        if wait is None:
+            self._tick()
+        return wait
+
+    def _tick(self) -> None:
         shown = self.schedule.tick(self.now)
         if shown is not None:
             self.ticks.append((self.now / SECOND, (shown - START) / SECOND))
-        return self.schedule.poll(self.now)
 
     def _happen(self, name: str) -> None:
         if name == "space":
             self.schedule.set_paused(not self.schedule.is_paused, self.now)
         elif name == "s":
-            self.schedule.step(self.now)
+            self.schedule.step()
         elif name == "t":
             self.schedule.toggle_pause_topics()
         else:
@@ -104,6 +110,13 @@ def test_a_step_publishes_one_message() -> None:
 
     # After the steps the third is as far from the second as it is in the bag.
     assert wall.play(0, 10, 11) == [(0, 1), (10, 2), (11, 6)]
+
+
+def test_a_step_before_the_message_is_offered_counts() -> None:
+    wall = Wall(PlayOptions(paused=True))
+    wall.schedule.step()
+
+    assert wall.play(0, 1, until=5) == [(0, 0)]
 
 
 def test_a_step_has_no_effect_while_running() -> None:

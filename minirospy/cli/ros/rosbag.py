@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import INTERRUPTED, complain
-from minirospy.cli.ros import rosbag_info, rosbag_rewrite
+from minirospy.cli.ros import rosbag_convert, rosbag_info, rosbag_play, rosbag_record, rosbag_rewrite
 from minirospy.cli.verbs import Family, HelpStatus
 from minirospy.errors import UsageError, did_you_mean
 
@@ -22,6 +22,9 @@ FAMILY = Family(
     (
         *rosbag_info.VERBS,
         *rosbag_rewrite.VERBS,
+        rosbag_convert.VERB,
+        rosbag_play.VERB,
+        rosbag_record.VERB,
     ),
     interrupted=INTERRUPTED,
     summary="record, play and change bags",

@@ -1,0 +1,58 @@
+"""Bags to MCAP files and back, without loss: messages, times, connection headers."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable
+
+from minirospy.bag.mcap_writer import McapWriter
+from minirospy.bag.writer import BagWriter
+from minirospy.errors import BagError, UsageError
+from minirospy.introspect.bags import open_reader
+
+__all__ = ["convert"]
+
+
+def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
+    """Write the messages of a bag or MCAP file into ``target``, an MCAP file if its name ends so; return how many.
+
+    ``step`` is called with the bytes of messages that are done. ``force``: replace a file. A file that was not completed is
+    removed. Raise UsageError if ``target`` exists, BagError, OSError.
+    """
+    if os.path.exists(target) and not force:
+        raise UsageError(f"{target} exists already: remove it, or add -f")
+    if os.path.exists(target) and os.path.samefile(source, target):
+        raise UsageError(f"{target} is the file that is read")
+
+    partial = f"{target}.active"
+    count = done = 0
+    with open_reader(source) as reader:
+        reader.prepare()
+        try:
+            with open(partial, "w+b", buffering=0) as stream:
+                is_mcap = target.endswith(".mcap")
+                writer: BagWriter | McapWriter = (
+                    McapWriter(stream, compression=compression)
+                    if is_mcap
+                    else BagWriter(stream, compression=compression)
+                )
+                numbers: dict[int, int] = {}
+                for message in reader.messages():
+                    connection = message.connection
+                    if connection.id not in numbers:
+                        numbers[connection.id] = writer.add_connection(connection.topic, connection.header)
+                    writer.write(numbers[connection.id], message.time, message.body)
+                    count += 1
+                    done += len(message.body)
+                    step(done)
+                writer.close()
+            os.replace(partial, target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(partial)
+            raise
+    foreign: list[str] = getattr(reader, "foreign", [])
+    if foreign:
+        raise BagError(f"{source}: left out, as they are not of ROS 1: {', '.join(sorted(foreign))}")
+    return count

@@ -1,0 +1,164 @@
+"""MCAP files: what McapWriter writes is read by the mcap library and by McapReader; bags survive the way there and back."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from minirospy.bag.base import StoredMessage
+from minirospy.bag.mcap_reader import McapReader, open_bag_or_mcap
+from minirospy.bag.mcap_writer import McapWriter
+from minirospy.bag.writer import BagWriter
+from minirospy.errors import BagCompressionError, BagError, BagUnindexedError, UsageError
+from minirospy.introspect.bag_convert import convert
+
+HEADER = {
+    "topic": "/chatter",
+    "type": "std_msgs/String",
+    "md5sum": "992ce8a1687cec8c8bd883ec73ca41d1",
+    "message_definition": "# \N{GREEK SMALL LETTER PI}\nstring data\n",
+    "callerid": "/talker",
+    "latching": "1",
+    "tcp_nodelay": "0",
+}
+
+
+def fill(writer: McapWriter | BagWriter) -> None:
+    """Write messages of two publishers, one out of order."""
+    first = writer.add_connection("/chatter", HEADER)
+    second = writer.add_connection("/other", {**HEADER, "callerid": "/second", "topic": "/chatter"})
+    for i, time in enumerate((5, 3, 4, 6)):
+        writer.write((first, second)[i % 2], 10**18 + time, b"\x01\0\0\0%d" % i)
+    writer.write(first, 10**18 + 9, b"head", b"tail" * 100_000)
+    writer.close()
+
+
+def made(compression: str = "none") -> io.BytesIO:
+    stream = io.BytesIO()
+    fill(McapWriter(stream, compression=compression, chunk_size=50))
+    stream.seek(0)
+    return stream
+
+
+def content(messages: list[StoredMessage]) -> list[tuple[int, bytes, str, dict[str, bytes]]]:
+    """Return what must not change."""
+    return [(one.time, one.body, one.connection.topic, one.connection.header) for one in messages]
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_the_library_reads_the_layout_of_ros1(compression: str) -> None:
+    reader = make_reader(made(compression), validate_crcs=True)
+    summary = reader.get_summary()
+    assert summary
+
+    assert reader.get_header().profile == "ros1"
+    assert [(one.name, one.encoding) for one in summary.schemas.values()] == [("std_msgs/String", "ros1msg")]
+    assert summary.schemas[1].data.decode() == HEADER["message_definition"]
+    channel = summary.channels[1]
+    assert (channel.topic, channel.message_encoding) == ("/chatter", "ros1")
+    assert channel.metadata == {
+        name: HEADER[name] for name in ("topic", "md5sum", "callerid", "latching", "tcp_nodelay")
+    }
+    assert [message.log_time - 10**18 for _, _, message in reader.iter_messages()] == [3, 4, 5, 6, 9]
+
+
+def test_messages_are_read_in_the_order_of_time() -> None:
+    reader = open_bag_or_mcap(made())
+
+    assert isinstance(reader, McapReader)
+    assert reader.connections[1].latching
+    assert [one.time - 10**18 for one in reader.messages()] == [3, 4, 5, 6, 9]
+    assert [one.time - 10**18 for one in reader.messages([1], 10**18 + 4, 10**18 + 5)] == [4, 5]
+    assert sum(sum(chunk.counts.values()) for chunk in reader.chunks) == 5
+
+
+@pytest.mark.parametrize("suffix", [".bag", ".mcap"])
+def test_conversion_loses_nothing(suffix: str, tmp_path: Path) -> None:
+    source = tmp_path / f"a{suffix}"
+    with source.open("wb") as stream:
+        fill(BagWriter(stream) if suffix == ".bag" else McapWriter(stream))
+    other = tmp_path / ("b.mcap" if suffix == ".bag" else "b.bag")
+    back = tmp_path / f"c{suffix}"
+    convert(str(source), str(other), compression="lz4", force=False, step=lambda _: None)
+    count = convert(str(other), str(back), compression="none", force=False, step=lambda _: None)
+
+    assert count == 5
+    found = []
+    for path in (source, other, back):
+        with path.open("rb") as stream:
+            found.append(content(list(open_bag_or_mcap(stream).messages())))
+    assert found[0] == found[1] == found[2]
+
+
+def test_conversion_spares_what_exists(tmp_path: Path) -> None:
+    source = tmp_path / "a.mcap"
+    source.write_bytes(made().getvalue())
+    target = tmp_path / "b.bag"
+    target.write_text("mine")
+    for path, force in ((target, False), (source, True)):
+        with pytest.raises(UsageError):
+            convert(str(source), str(path), compression="none", force=force, step=lambda _: None)
+    with pytest.raises(BagCompressionError):
+        convert(str(source), str(tmp_path / "c.bag"), compression="zstd", force=False, step=lambda _: None)
+
+    assert target.read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "b.bag"]
+
+
+def test_a_cut_file_is_refused_or_read() -> None:
+    whole = made("lz4").getvalue()
+    for size in range(8, len(whole), 97):
+        try:
+            reader = McapReader(io.BytesIO(whole[:size]))
+            list(reader.messages())
+        except BagError:
+            continue
+        raise AssertionError(f"{size} of {len(whole)} bytes were taken for a whole file")
+
+
+def test_a_flipped_byte_is_refused_or_read() -> None:
+    whole = made().getvalue()
+    for at in [*range(8, 400), *range(len(whole) - 600, len(whole))]:
+        data = bytearray(whole)
+        data[at] ^= 0x11
+        try:
+            list(McapReader(io.BytesIO(bytes(data))).messages())
+        except BagError:
+            pass
+
+
+def test_a_file_without_a_summary_is_named() -> None:
+    from mcap.writer import IndexType, Writer
+
+    stream = io.BytesIO()
+    writer = Writer(
+        stream,
+        index_types=IndexType.NONE,
+        use_statistics=False,
+        use_summary_offsets=False,
+        repeat_channels=False,
+        repeat_schemas=False,
+    )
+    writer.start()
+    writer.finish()  # type: ignore[no-untyped-call]
+    stream.seek(0)
+
+    with pytest.raises(BagUnindexedError):
+        McapReader(stream)
+
+
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zstandard", None)
+
+    with pytest.raises(BagError, match=r"pip install 'minirospy\[mcap\]'"):
+        McapWriter(io.BytesIO())
+    with pytest.raises(BagError, match=r"pip install 'minirospy\[mcap\]'"):
+        open_bag_or_mcap(made_bytes())
+
+
+def made_bytes() -> io.BytesIO:
+    return io.BytesIO(b"\x89MCAP0\r\n" + bytes(100))
