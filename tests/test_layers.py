@@ -24,6 +24,7 @@ LAYERS = [
     {
         "clock",
         "environment",
+        "keyboard",
         "log_levels",
         "names",
         "private_files",

@@ -6,10 +6,8 @@ import contextlib
 import math
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
-from types import TracebackType
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from minirospy.cli.command import run
 from minirospy.cli.parser import Misuse, Parser
@@ -18,6 +16,7 @@ from minirospy.errors import UsageError
 from minirospy.gpio.board import Board, BoardState
 from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Position, Pull
 from minirospy.gpio.place import Place
+from minirospy.keyboard import Keys
 from minirospy.scanner import FIELDS, Circle
 
 if TYPE_CHECKING:
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 __all__ = ["FAMILY", "Picture", "main", "render"]
-
-_LOOK_SECONDS = 0.05
-"""Between two looks at the board."""
 
 _STEP = 0.05
 """How far a key moves the person, in metres; also the width of a place on the map, and half its height."""
@@ -158,7 +154,7 @@ def _show() -> int:
             style="dim",
         )
         shown = None
-        with _Keys() as pressed, _drawing(Console()) as draw:
+        with Keys() as pressed, _drawing(Console()) as draw:
             key = ""
             while key not in {"q", "\x04"}:
                 _act(board, key)
@@ -192,60 +188,6 @@ def _act(board: Board, key: str) -> None:
         person = board.person
         ahead, left = _STEPS[key]
         board.move_person((round(person[0] + ahead, 3), round(person[1] + left, 3)) if person else _START)
-
-
-class _Keys:
-    """Single keys from the terminal, without Enter and without echo; none where stdin is not a terminal."""
-
-    _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
-    _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
-
-    def __init__(self) -> None:
-        self._is_terminal = sys.stdin is not None and sys.stdin.isatty()
-
-    def __enter__(self) -> _Keys:
-        if sys.platform != "win32" and self._is_terminal:
-            import termios
-            import tty
-
-            self._before = termios.tcgetattr(sys.stdin)
-            tty.setcbreak(sys.stdin)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if sys.platform != "win32" and self._is_terminal:
-            import termios
-
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
-
-    def next(self) -> str:
-        """Return the key that was typed (an arrow by its name), or "" after a moment."""
-        if not self._is_terminal:
-            time.sleep(_LOOK_SECONDS)
-            return ""
-        if sys.platform == "win32":
-            import msvcrt
-
-            if msvcrt.kbhit():
-                key = msvcrt.getwch()
-                return self._WINDOWS_ARROWS.get(msvcrt.getwch(), "") if key in "\x00\xe0" else key
-            time.sleep(_LOOK_SECONDS)
-            return ""
-        import select
-
-        ready, _, _ = select.select([sys.stdin], [], [], _LOOK_SECONDS)
-        if not ready:
-            return ""
-        # Past Python's buffer: what it holds, select does not see. No byte at all is the terminal's end.
-        key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
-        if key != "\x1b":
-            return key or "q"
-        # A key that sends several bytes sends them together.
-        ready, _, _ = select.select([sys.stdin], [], [], 0)
-        sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
-        return self._ARROWS.get(sequence[-1:], "")
 
 
 def _pins_parser(verb: str, description: str) -> Parser:

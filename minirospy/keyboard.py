@@ -1,0 +1,68 @@
+"""Single keys typed in a terminal, on every system."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from types import TracebackType
+from typing import ClassVar
+
+__all__ = ["LOOK_SECONDS", "Keys"]
+
+LOOK_SECONDS = 0.05
+"""How long Keys.next waits for a key."""
+
+
+class Keys:
+    """Single keys from the terminal, without Enter and without echo; none where stdin is not a terminal."""
+
+    _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
+    _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
+
+    def __init__(self) -> None:
+        self.is_terminal = sys.stdin is not None and sys.stdin.isatty()
+
+    def __enter__(self) -> Keys:
+        if sys.platform != "win32" and self.is_terminal:
+            import termios
+            import tty
+
+            self._before = termios.tcgetattr(sys.stdin)
+            tty.setcbreak(sys.stdin)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if sys.platform != "win32" and self.is_terminal:
+            import termios
+
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+
+    def next(self) -> str:
+        """Return the key that was typed (an arrow by its name), or "" after a moment."""
+        if not self.is_terminal:
+            time.sleep(LOOK_SECONDS)
+            return ""
+        if sys.platform == "win32":
+            import msvcrt
+
+            if msvcrt.kbhit():
+                key = msvcrt.getwch()
+                return self._WINDOWS_ARROWS.get(msvcrt.getwch(), "") if key in "\x00\xe0" else key
+            time.sleep(LOOK_SECONDS)
+            return ""
+        import select
+
+        ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
+        if not ready:
+            return ""
+        # Past Python's buffer: what it holds, select does not see. No byte at all is the terminal's end.
+        key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+        if key != "\x1b":
+            return key or "q"
+        # A key that sends several bytes sends them together.
+        ready, _, _ = select.select([sys.stdin], [], [], 0)
+        sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
+        return self._ARROWS.get(sequence[-1:], "")
