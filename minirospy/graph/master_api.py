@@ -59,7 +59,6 @@ class MasterApi(ABC):
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
-        self.calls = 0
         self.say: Callable[[str], object] = nothing
         """Gets a line for each registration."""
         self.note: Callable[..., object] = nothing

@@ -9,6 +9,7 @@ import pytest
 from minirospy.errors import RpcFault
 from minirospy.graph.calls import (
     ERROR,
+    FAILURE,
     SUCCESS,
     Answer,
     CallRefused,
@@ -16,6 +17,7 @@ from minirospy.graph.calls import (
     Method,
     anything,
     api_uri,
+    global_key,
     global_name,
     node_name,
     parameter_key,
@@ -140,6 +142,11 @@ def test_a_multicall_takes_one_list(args: list[Any]) -> None:
         (subgraph, "", ""),
         (subgraph, "a/", "/ns/a"),
         (uris, ["http://x:1/"], ["http://x:1/"]),
+        (uris, [], []),
+        (global_key, "/a", "/a"),
+        (global_key, "~a", "~a"),
+        (node_name, "/" + "a" * 4095, "/" + "a" * 4095),
+        (global_name, "/a//b/", "/a/b"),
     ],
 )
 def test_an_argument_is_read(read: Any, value: Any, found: Any) -> None:
@@ -168,6 +175,15 @@ def test_an_argument_is_read(read: Any, value: Any, found: Any) -> None:
         (subgraph, 5, "must be a string"),
         (uris, "x", "must be a list"),
         (uris, [5], "must be a list of strings"),
+        (uris, ["http://x:1/", "x"], r"does not contain valid URLs \[x\]"),
+        (uris, ["http:///x"], r"does not contain valid URLs \[http:///x\]"),
+        (uris, ["://x"], r"does not contain valid URLs \[://x\]"),
+        (global_key, "a", "must be a globally referenced name"),
+        (global_key, "", "must be a non-empty string"),
+        (api_uri, "http://x y", "contains illegal chars"),
+        (api_uri, 5, "is not an XMLRPC URI"),
+        (subgraph, "a" * 4097, "has more than 4096 characters"),
+        (type_name, "a/b/C", "not a valid package resource name"),
     ],
 )
 def test_a_bad_argument_is_refused_by_name(read: Any, value: Any, why: str) -> None:
@@ -176,4 +192,4 @@ def test_a_bad_argument_is_refused_by_name(read: Any, value: Any, why: str) -> N
 
 
 def test_status_codes_are_those_of_the_api() -> None:
-    assert (SUCCESS, ERROR) == (1, -1)
+    assert (SUCCESS, FAILURE, ERROR) == (1, 0, -1)

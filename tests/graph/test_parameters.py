@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sys import getsizeof
 from typing import Any
 
 import pytest
@@ -218,6 +219,76 @@ def test_a_large_value_is_weighed_in_many_steps(value: Any) -> None:
     taken = sum(1 for _ in weigh_in_steps("/p", value))
     assert finish(weigh_in_steps("/p", value)) > 50_000 * 8
     assert taken >= 40
+
+
+def test_limits_are_as_documented() -> None:
+    assert (parameters.MOST_BYTES, parameters.MOST_SUBSCRIPTIONS) == (96 * 2**20, 20_000)
+
+
+@pytest.mark.parametrize(
+    ("value", "weight"),
+    [
+        (1, 40),
+        (-(2**31), 40),
+        (2**31 - 1, 40),
+        ("abc", getsizeof("abc")),
+        (0.5, getsizeof(0.5)),
+        ([], 70),
+        ([1, [2, 3]], 2 * (70 + 16) + 3 * 40),
+        ({}, 120),
+        ({"ab": 1, "c": [2]}, 3 * 120 + getsizeof("ab") + getsizeof("c") + 40 + 78 + 40),
+        ([1] * 1000, 70 + 8000 + 40_000),
+        ({f"{number:03}": 1 for number in range(999)}, 120_000 + 999 * (getsizeof("abc") + 40)),
+        ({f"{number:03}": 1 for number in range(1000)}, 120_120 + 1000 * (getsizeof("abc") + 40)),
+    ],
+)
+def test_weight_of_a_value_is_about_its_memory(value: Any, weight: int) -> None:
+    assert finish(weigh_in_steps("/p", value)) == weight
+
+
+def test_parameter_may_be_56_levels_deep_and_is_counted_again() -> None:
+    tree = ParameterTree(most=20_000)
+    value: Any = 1
+    for _ in range(54):
+        value = [value]
+    weight = finish(weigh_in_steps("/a/b", value))
+    tree.set("/a/b", value, "", weight)
+    for _ in range(5):
+        finish(tree.make_room(weight))
+        tree.set("/a/b", value, "", weight)
+    for deeper in ([value], {"c": value}):
+        with pytest.raises(ValueError, match="a parameter is nested deeper than 56 levels"):
+            finish(weigh_in_steps("/a/b", deeper))
+
+
+def test_room_shrinks_by_each_parameter_and_its_name() -> None:
+    tree = ParameterTree(most=1000)
+    assert tree.has_room(1000)
+    assert not tree.has_room(1001)
+    tree.set("/ab", 1, "", 40)
+    left = 1000 - 40 - 3 - 120
+    assert tree.has_room(left)
+    assert not tree.has_room(left + 1)
+
+
+def test_small_tree_is_one_of_less_than_200_kb() -> None:
+    tree = ParameterTree()
+    tree.set("/p", 1, "", 199_999 - 2 - 120)
+    assert tree.is_small
+    tree.set("/p", 1, "", 1)
+    assert not tree.is_small
+
+
+def test_search_starts_in_any_namespace() -> None:
+    tree = tree_of(p=1, X={"p": 2}, boxX={"p": 3})
+    for namespace, found in (
+        ("/", "/p"),
+        ("/X", "/X/p"),
+        ("/X/", "/X/p"),
+        ("/boxX/deep", "/boxX/p"),
+        ("/box", "/p"),
+    ):
+        assert tree.search(namespace, "p") == found
 
 
 def test_names_of_a_large_tree_come_in_steps() -> None:

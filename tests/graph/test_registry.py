@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from sys import getsizeof
+
 import pytest
 
 from minirospy.graph import registry as registry_module
@@ -133,6 +135,51 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
         for number in range(registered):
             list(registry.forget(f"/n{number}", "u"))
     assert registry.is_small
+
+
+def test_limits_are_as_documented() -> None:
+    assert (registry_module.MOST_BYTES, registry_module.MOST_ENTRIES) == (96 * 2**20, 10_000)
+
+
+def test_registration_counts_once_whatever_it_is() -> None:
+    registry = Registry()
+    registry.register_publisher("/n", "/t", "a/B", "u")
+    one = registry._bytes
+    assert one == sum(map(getsizeof, ("/n", "u", "/t"))) + 1000
+    registry.register_subscriber("/n", "/t", "a/B", "u")
+    registry.register_service("/n", "/t", "rosrpc://n:1", "u")
+    list(registry.register_parameter("/n", "/t", "u"))
+    assert registry._bytes == one
+    registry.unregister_subscriber("/n", "/t", "u")
+    registry.unregister_service("/n", "/t", "rosrpc://n:1")
+    registry.unregister_parameter("/n", "/t", "u")
+    assert registry._bytes == one
+    registry.register_publisher("/n", "/other", "a/B", "u")
+    registry.unregister_publisher("/n", "/other", "u")
+    assert registry._bytes == one
+    registry.unregister_publisher("/n", "/t", "u")
+    assert registry._bytes == 0
+
+
+def test_topics_and_services_are_counted() -> None:
+    registry = Registry()
+    registry.register_publisher("/n", "/t", "a/B", "u")
+    registry.register_subscriber("/n", "/t", "a/B", "u")
+    registry.register_subscriber("/n", "/u", "a/B", "u")
+    registry.register_service("/n", "/s", "rosrpc://n:1", "u")
+    assert (registry.count_topics(), registry.count_services()) == (2, 1)
+
+
+def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry_module, "_MOST_OLD_TYPES", 3)
+    registry = Registry()
+    registry.register_publisher("/n", "/published", "a/B", "u")
+    registry.register_subscriber("/n", "/subscribed", "a/B", "u")
+    for topic in ("/old1", "/old2", "/old3"):
+        registry.set_type(topic, "a/B")
+    assert len(registry.topic_types()) == 5
+    registry.set_type("/old4", "a/B")
+    assert set(registry.topic_types()) == {"/published", "/subscribed", "/old4"}
 
 
 def test_types_of_topics_that_are_gone_are_forgotten_one_day(monkeypatch: pytest.MonkeyPatch) -> None:
