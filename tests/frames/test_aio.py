@@ -135,13 +135,14 @@ class TestBuffer:
 
     def test_time_that_jumps_back_forgets_what_moves(self, caplog: pytest.LogCaptureFixture) -> None:
         async def main(node: Node, buffer: Buffer) -> None:
-            now = Time(10)
-            node.now = lambda: now  # type: ignore[method-assign]
+            times = [Time(10)]
+            node.now = lambda: times[-1]  # type: ignore[method-assign]
             buffer._tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-            for now in (Time(10), Time(11)):
+            for later in (Time(10), Time(11)):
+                times.append(later)
                 buffer._check_for_jump()
                 assert buffer.why_not("map", "base") is None
-            now = Time(5)
+            times.append(Time(5))
             buffer._check_for_jump()
             assert buffer.why_not("map", "base")
 
