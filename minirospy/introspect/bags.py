@@ -29,10 +29,12 @@ __all__ = [
     "Progress",
     "backup_path",
     "class_of",
+    "class_of_connection",
     "compress",
     "convert12",
     "data_size",
     "filter_bag",
+    "new_bag",
     "open_reader",
     "reindex",
     "version_of",
@@ -96,7 +98,7 @@ def compress(source: str, target: str, compression: str, progress: Progress) -> 
 
     Each connection is kept. Where the source is damaged, what was before the damage is in the target.
     """
-    with open_reader(source) as reader, _new_bag(target, compression) as writer:
+    with open_reader(source) as reader, new_bag(target, compression) as writer:
         numbers: dict[int, int] = {}
         connections = list(reader.connections.values())
         done = 0
@@ -158,7 +160,7 @@ def filter_bag(
     """
     needs_message = keep.needs_message or (show is not None and show.needs_message)
     kept = read = done = 0
-    with open_reader(source) as reader, _new_bag(target, compressions.NONE) as writer:
+    with open_reader(source) as reader, new_bag(target, compressions.NONE) as writer:
         numbers: dict[int, int] = {}
         classes: dict[int, type[Message]] = {}
         connections = list(reader.connections.values())
@@ -168,7 +170,7 @@ def filter_bag(
                 message = None
                 if needs_message:
                     if rank not in classes:
-                        classes[rank] = _class_of(connection, warn)
+                        classes[rank] = class_of_connection(connection, warn)
                     message = classes[rank]()
                     message.deserialize(body)
                 time = Time(*divmod(nanoseconds, 10**9))
@@ -200,7 +202,7 @@ def reindex(path: str, progress: Progress) -> list[str]:
 
 def convert12(source: str, target: str, progress: Progress) -> None:
     """Write a bag of version 1.2, with or without an index, as a bag of version 2.0. Raise BagError, OSError."""
-    with open(source, "rb") as stream, _new_bag(target, compressions.NONE) as writer:
+    with open(source, "rb") as stream, new_bag(target, compressions.NONE) as writer:
         reader = unindexed_bag12(stream)
         for position in reader.scan():
             progress(position)
@@ -213,7 +215,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 @contextlib.contextmanager
-def _new_bag(path: str, compression: str) -> Iterator[BagWriter]:
+def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
     """Yield the writer of a new file; chunks are compressed in parallel. After an error it is a bag of what was written."""
     with contextlib.ExitStack() as stack:
         executor = None
@@ -237,7 +239,8 @@ def _add(writer: BagWriter, connection: Connection) -> int:
     return writer.add_connection(connection.topic, connection.header)
 
 
-def _class_of(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
+def class_of_connection(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
+    """Return :func:`class_of` a connection. Raise BagFormatError."""
     try:
         return class_of(connection.type, connection.md5sum, connection.definition, warn)
     except DefinitionError as error:

@@ -10,7 +10,14 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import INTERRUPTED, complain
-from minirospy.cli.ros import rosbag_convert, rosbag_info, rosbag_play, rosbag_record, rosbag_rewrite
+from minirospy.cli.ros import (
+    rosbag_convert,
+    rosbag_info,
+    rosbag_migrate,
+    rosbag_play,
+    rosbag_record,
+    rosbag_rewrite,
+)
 from minirospy.cli.verbs import Family, HelpStatus
 from minirospy.errors import UsageError, did_you_mean
 
@@ -21,6 +28,7 @@ FAMILY = Family(
     "",
     (
         *rosbag_info.VERBS,
+        *rosbag_migrate.VERBS,
         *rosbag_rewrite.VERBS,
         rosbag_convert.VERB,
         rosbag_play.VERB,
