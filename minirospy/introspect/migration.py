@@ -10,11 +10,11 @@ import inspect
 import io
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minirospy.bag.compression import NONE
+from minirospy.introspect.migration_plugins import plugin_rule_files
 from minirospy.introspect.migration_rules import (
     BagMigrationException,
     Key,
@@ -36,16 +36,7 @@ __all__ = [
     "Migration",
     "RuleChain",
     "ScaffoldNode",
-    "check_bag",
-    "check_classes",
-    "fix_bag",
 ]
-
-_PLUGIN_TAGS = (
-    ("rosbagmigration", "rule_file"),
-    ("rosbag", "migration_rule_file"),
-    ("rosbag_migration_rule", "rule_file"),
-)
 
 
 class RuleChain:
@@ -113,7 +104,7 @@ class MessageMigrator:
         for file in input_rule_files:
             self._load(Path(file), file)
         if plugins:
-            for path, name in _plugin_files():
+            for path, name in plugin_rule_files():
                 self._load(path, name)
         if self.false_rule_loaded:
             raise BagMigrationException("Cannot instantiate MessageMigrator with invalid rules")
@@ -485,103 +476,3 @@ class MessageMigrator:
         for node in path:
             message = node.rule.apply(message)
         return message
-
-
-def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations that messages of these classes need, each class once."""
-    found = []
-    seen = set()
-    for each in classes:
-        if get_message_key(each) in seen:
-            continue
-        seen.add(get_message_key(each))
-        path = migrator.find_path(each, migrator.find_target(each))
-        if path:
-            rules = migrator.expand_rules([node.rule for node in path])
-            found.append(Migration(path, [rule for rule in rules if not rule.valid]))
-    return found
-
-
-def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object]) -> list[Migration]:
-    """Return the migrations that the messages of a bag need, in the order of their first one. Raise BagError, OSError."""
-    from minirospy.introspect.bags import class_of_connection, open_reader
-
-    with open_reader(path) as reader:
-        connections = list(reader.connections.values())
-        first: dict[int, MessageClass] = {}
-        for _, _, found in reader.blocks([each.id for each in connections]):
-            for rank in dict.fromkeys(each[1] for each in found):
-                if rank not in first:
-                    first[rank] = class_of_connection(connections[rank], warn)
-            if len(first) == len(connections):
-                break
-    return check_classes(migrator, first.values())
-
-
-def fix_bag(
-    migrator: MessageMigrator, source: str, target: str, warn: Callable[[str], object], *, force: bool = False
-) -> list[Migration]:
-    """Write a bag again with its messages migrated; return the migrations that have no rule: then nothing is written.
-
-    ``force``: write it all the same, and copy what cannot be migrated. Raise BagError, OSError, BagMigrationException.
-    """
-    from minirospy.introspect.bags import class_of_connection, new_bag, open_reader
-
-    missing = [each for each in check_bag(migrator, source, warn) if each.missing]
-    if missing and not force:
-        return missing
-    with open_reader(source) as reader, new_bag(target, NONE) as writer:
-        connections = list(reader.connections.values())
-        classes: dict[int, tuple[MessageClass, MessageClass]] = {}
-        numbers: dict[int, int] = {}
-        for _, data, found in reader.blocks([each.id for each in connections]):
-            for time, rank, _, start, end in found:
-                connection = connections[rank]
-                if rank not in classes:
-                    old = class_of_connection(connection, warn)
-                    new = migrator.find_target(old)
-                    if new is None or not all(node.rule.valid for node in migrator.find_path(old, new)):
-                        warn(f"WARNING: messages of type [{connection.type}] are copied as they are")
-                        new = old
-                    classes[rank] = old, new
-                    fields = {"type": new._type, "md5sum": new._md5sum, "message_definition": new._full_text}
-                    header = connection.header | {name: text.encode() for name, text in fields.items()}
-                    numbers[rank] = writer.add_connection(connection.topic, header)
-
-                old, new = classes[rank]
-                body = data[start:end]
-                if old is not new:
-                    raw = (connection.type, body, connection.md5sum, None, old)
-                    body = migrator.migrate_raw(raw, (new._type, None, new._md5sum, None, new))[1]
-                writer.write(numbers[rank], time, body)
-    return []
-
-
-def _plugin_files() -> Iterator[tuple[Path, str]]:
-    """Yield the rule files that packages export, and their names."""
-    from minirospy.errors import ManifestError
-    from minirospy.workspace.manifest import read_manifest
-    from minirospy.workspace.packages import Packages
-
-    for package, folder in sorted(Packages().folders().items()):
-        manifest = folder / "package.xml"
-        try:
-            if not manifest.exists() or not any(
-                tag in manifest.read_text("utf-8", "replace") for tag, _ in _PLUGIN_TAGS
-            ):
-                continue
-            exports = read_manifest(manifest).exports
-        except (ManifestError, OSError):
-            continue
-        for export in exports:
-            for tag, attribute in _PLUGIN_TAGS:
-                if export.tag == tag and attribute in export.attributes:
-                    file = export.attributes[attribute]
-                    if tag == "rosbagmigration":
-                        print(
-                            f"WARNING: The package: [{package}] is using a deprecated rosbagmigration export.\n"
-                            "    The export in the manifest should be changed to:\n"
-                            f'    <rosbag migration_rule_file="{file}"/>\n',
-                            file=sys.stderr,
-                        )
-                    yield folder / file, file

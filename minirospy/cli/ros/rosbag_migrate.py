@@ -55,14 +55,14 @@ def _check(words: list[str], genrules: str | None, append: bool, noplugins: bool
         raise Misuse("-a needs -g", "Cannot specify -a without also specifying -g.")
     if genrules is not None:
         _check_rule_file(genrules, append=append)
-    from minirospy.introspect import bags, migration
+    from minirospy.introspect import bag_migration, bags
 
     path, *rule_files = words
     try:
         with bags.open_reader(path):
             pass
         migrator = _migrator([*rule_files, *([genrules] if append and genrules else [])], noplugins)
-        migrations = migration.check_bag(migrator, path, report)
+        migrations = bag_migration.check_bag(migrator, path, report)
     except (BagError, OSError) as error:
         report(unreadable(path, error))
         return 0 if isinstance(error, BagEncryptedError) else 1
@@ -170,7 +170,7 @@ def _fix(words: list[str], noplugins: bool, force: bool) -> int:
             else "Output file must be a bag file."
         )
         raise Misuse(text, text)
-    from minirospy.introspect.migration import fix_bag
+    from minirospy.introspect.bag_migration import fix_bag
     from minirospy.introspect.migration_rules import BagMigrationException
 
     temporary = f"{target}.tmp"

@@ -7,14 +7,12 @@ from collections.abc import Iterable
 from typing import Any
 
 from minirospy.compat.rosbag.exceptions import as_ros_errors
+from minirospy.introspect.bag_migration import check_bag, check_classes, fix_bag
 from minirospy.introspect.migration import (
     MessageMigrator,
     Migration,
     RuleChain,
     ScaffoldNode,
-    check_bag,
-    check_classes,
-    fix_bag,
 )
 from minirospy.introspect.migration_rules import (
     BagMigrationException,
