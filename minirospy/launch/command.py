@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,12 +10,9 @@ from pathlib import Path
 from minirospy.environment import DEFAULT_MASTER_PORT, Environment, export_local
 from minirospy.errors import LaunchError, MinirospyError, NotFoundError
 from minirospy.launch.spec import NodeSpec
-from minirospy.workspace.packages import NotExecutableError, Packages
+from minirospy.workspace.packages import NotExecutableError, Packages, with_prefix
 
 __all__ = ["node_command", "node_environment", "node_folder", "node_program", "shell_line"]
-
-# Prefixes that run a Python file themselves, so that the interpreter in front of the file is left out.
-_RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
@@ -34,10 +30,8 @@ def node_command(node: NodeSpec, packages: Packages) -> list[str]:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
     except ValueError as error:
         raise _fault(node, f"args or launch-prefix: {error}") from None
-    if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
-        program = program[-1:]
     remaps = [f"{a}:={b}" for a, b in node.remaps]
-    return [*prefix, *program, *args, *remaps, f"__name:={node.base_name}"]
+    return [*with_prefix(prefix, program), *args, *remaps, f"__name:={node.base_name}"]
 
 
 def node_environment(

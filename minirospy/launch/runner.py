@@ -12,12 +12,13 @@ import itertools
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.environment import Environment, is_own_host
 from minirospy.errors import LaunchError, MinirospyError
-from minirospy.launch.command import node_command
+from minirospy.launch.command import node_command, node_program
 from minirospy.launch.master import CORE_PARAMETERS, LaunchMaster
 from minirospy.launch.node_start import NodeStarter
 from minirospy.launch.options import RunOptions
@@ -28,7 +29,7 @@ from minirospy.launch.spec import LaunchSpec, MachineSpec, NodeSpec
 from minirospy.launch.summary import summary
 from minirospy.launch.supervisor import Supervisor
 from minirospy.launch.watch import FileWatch
-from minirospy.workspace.packages import Packages
+from minirospy.workspace.packages import Packages, why_ros_refuses
 
 if TYPE_CHECKING:
     from minirospy.launch.remote import RemoteMachines
@@ -199,6 +200,15 @@ class Launcher:
             self._output.say(summary([*here, *elsewhere], params, self._spec.clear))
         for warning in self._spec.warnings:
             self._output.warn(f"WARNING: {warning}")
+        for program in dict.fromkeys(self._programs(here)):
+            if why := why_ros_refuses(program):
+                self._output.warn(f"WARNING: {why}")
+
+    def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
+        """Yield the programs of nodes, but for those that are missing, which is reported when they are started."""
+        for node in nodes:
+            with contextlib.suppress(MinirospyError):
+                yield Path(node_program(node, self._packages)[-1])
 
     def _start_master(self) -> None:
         self._ready_guardian()

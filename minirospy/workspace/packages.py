@@ -26,12 +26,15 @@ __all__ = [
     "crawl_times",
     "is_python",
     "package_name",
+    "why_ros_refuses",
+    "with_prefix",
 ]
 
 _MANIFEST = "package.xml"
 _IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
+_RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
 _SHOWN = 12
@@ -255,6 +258,34 @@ def is_python(path: Path) -> bool:
         return True
     with path.open("rb") as file:
         return bool(_PYTHON_LINE.match(file.readline(200)))
+
+
+def why_ros_refuses(program: Path) -> str | None:
+    """Return why ROS 1 would not run a Python program that minirospy runs, and what to do; None where it would.
+
+    ROS 1 leaves the choice of the interpreter to the system, which needs the permission and a first line.
+    """
+    if sys.platform == "win32" or not is_python(program):
+        return None
+    if not os.access(program, os.X_OK):
+        return f"{program} is not executable, which ROS 1 refuses: chmod +x {program}"
+    with program.open("rb") as file:
+        first = file.readline(200)
+    if not first.startswith(b"#!"):
+        return f"{program} has no interpreter in its first line, which ROS 1 needs: #!/usr/bin/env python3"
+    if first.endswith(b"\r\n"):
+        return f"{program} has the line ends of Windows, which ROS 1 cannot run: sed -i 's/\\r$//' {program}"
+    return None
+
+
+def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
+    """Return a program's command with a prefix in front, such as ``gdb --args`` or ``python3 -m pdb``.
+
+    A prefix that runs Python files itself gets the file alone, as in ROS 1.
+    """
+    if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
+        command = command[-1:]
+    return [*prefix, *command]
 
 
 def _starts_like_program(path: Path) -> bool:

@@ -22,7 +22,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """my: Python and shell scripts, two of them named alike."""
     folder = tmp_path / "src" / "my"
     for name, text in {
-        "scripts/talker.py": "import sys\nprint('talks', *sys.argv[1:])\nsys.exit(7)\n",
+        "scripts/talker.py": "#!/usr/bin/env python3\nimport sys\nprint('talks', *sys.argv[1:])\nsys.exit(7)\n",
         "scripts/deep/down": '#!/bin/sh\necho deep down "$@"\n',
         "scripts/twin": "#!/bin/sh\necho twin of scripts\n",
         "nodes/twin": "#!/bin/sh\necho twin of nodes\n",
@@ -34,7 +34,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     }.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(text.encode())
-        if "." not in name:
+        if name.startswith(("scripts/", "nodes/")):
             (folder / name).chmod(0o755)
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
     return folder
@@ -186,6 +186,34 @@ def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None
         "option --prefix is unknown, or lacks its value (`rosrun -h` shows what there is)",
     )
     assert fails(capsys, "--prefix", "'a", "my", "talker.py") == (2, "--prefix ['a]: No closing quotation")
+
+
+@posix
+def test_python_file_that_ros_refuses_runs_with_a_warning(package: Path) -> None:
+    path = package / "scripts" / "talker.py"
+    run_ = "print('runs')\n"
+    for text, mode, why in (
+        (
+            f"#!/usr/bin/env python3\n{run_}",
+            0o644,
+            f"is not executable, which ROS 1 refuses: chmod +x {path}",
+        ),
+        (run_, 0o755, "has no interpreter in its first line, which ROS 1 needs: #!/usr/bin/env python3"),
+        (
+            f"#!/usr/bin/env python3\r\n{run_}",
+            0o755,
+            f"has the line ends of Windows, which ROS 1 cannot run: sed -i 's/\\r$//' {path}",
+        ),
+    ):
+        path.write_bytes(text.encode())
+        path.chmod(mode)
+        assert rosrun_("my", "talker.py") == (0, "runs\n", f"WARNING: {path} {why}\n")
+
+
+@posix
+def test_prefix_that_runs_python_gets_the_file_alone(package: Path) -> None:
+    status, output, _ = rosrun_("--prefix", f"{sys.executable} -u", "my", "talker.py", "x")
+    assert (status, output) == (7, "talks x\n")
 
 
 @posix

@@ -236,3 +236,11 @@ def test_local_leaves_other_machines_alone(start: Start, master: str) -> None:
     assert "local only launch specified, will not launch remote nodes\n" in said
     assert "SUMMARY" not in said
     assert "No processes to monitor\n" in said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions of POSIX systems")
+def test_program_that_ros_refuses_is_named_and_runs(start: Start, master: str, package: Path) -> None:
+    said, errors = start('<node pkg="pkg" type="stop.py" name="a" args="0"/>').process.communicate(timeout=30)
+    path = package / "stop.py"
+    assert f"WARNING: {path} is not executable, which ROS 1 refuses: chmod +x {path}" in said + (errors or "")
+    assert "process has finished cleanly" in said

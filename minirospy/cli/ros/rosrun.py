@@ -8,11 +8,12 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
-from minirospy.cli.command import RosText, WordedError, run
+from minirospy.cli.command import RosText, WordedError, run, warn
 from minirospy.environment import export_local
 from minirospy.errors import NotFoundError, UsageError
-from minirospy.workspace.packages import NotExecutableError, Packages
+from minirospy.workspace.packages import NotExecutableError, Packages, why_ros_refuses, with_prefix
 
 __all__ = ["main"]
 
@@ -66,7 +67,9 @@ def _rosrun(words: list[str]) -> int:
     package, program, *arguments = words
     commands = _find(packages, package, program)
     chosen = commands[0] if len(commands) == 1 else _choose(package, commands, packages)
-    command = [*prefix, *chosen, *arguments]
+    command = [*with_prefix(prefix, chosen), *arguments]
+    if why := why_ros_refuses(Path(chosen[-1])):
+        warn(why)
     if debug:
         print(f"[rosrun] Looking in rospack dir: {packages.find(package)}", file=sys.stderr)
         print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)
