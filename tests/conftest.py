@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import uuid
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,16 @@ def pytest_configure() -> None:
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
         # Nothing happens here; a new process starts with the system's default.
         signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+def write_files(folder: Path, texts: Mapping[str, str], executable: Collection[str] = ()) -> None:
+    """Write files by their path below ``folder``; set the executable bit of those named in ``executable``."""
+    for name, text in texts.items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(text.encode())
+        if name in executable:
+            file.chmod(0o755)
 
 
 def free_port() -> int:

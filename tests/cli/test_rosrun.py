@@ -12,6 +12,7 @@ import pytest
 
 from minirospy.cli.ros import rosrun
 from tests.cli.conftest import own_lines
+from tests.conftest import write_files
 
 BIN = Path(sys.executable).parent
 posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX systems")
@@ -21,7 +22,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX sys
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """my: Python and shell scripts, two of them named alike."""
     folder = tmp_path / "src" / "my"
-    for name, text in {
+    texts = {
         "scripts/talker.py": "#!/usr/bin/env python3\nimport sys\nprint('talks', *sys.argv[1:])\nsys.exit(7)\n",
         "scripts/deep/down": '#!/bin/sh\necho deep down "$@"\n',
         "scripts/twin": "#!/bin/sh\necho twin of scripts\n",
@@ -31,11 +32,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "scripts/windows": "#!/bin/sh\r\necho x\r\n",
         "scripts/dies": "#!/bin/sh\nkill -TERM $$\n",
         "package.xml": "<package><name>my</name></package>",
-    }.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(text.encode())
-        if name.startswith(("scripts/", "nodes/")):
-            (folder / name).chmod(0o755)
+    }
+    write_files(folder, texts, executable=texts.keys() - {"package.xml"})
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
     return folder
 

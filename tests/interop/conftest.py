@@ -118,17 +118,21 @@ def real_master() -> Iterator[str]:
         yield uri
 
 
+def compiled(source: str, folder: Path, *libraries: str) -> Path:
+    """Compile a C++ file of this folder with ``libraries`` (names of pkg-config); return the program."""
+    compiler = shutil.which("g++")
+    assert compiler
+    program = folder / Path(source).stem
+    command = ["pkg-config", "--cflags", "--libs", *libraries]
+    flags = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()
+    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / source), *flags], check=True)
+    return program
+
+
 @pytest.fixture(scope="session")
 def cpp_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """peer.cpp, compiled."""
-    compiler = shutil.which("g++")
-    assert compiler
-    program = tmp_path_factory.mktemp("cpp") / "peer"
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True
-    ).stdout.split()
-    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / "peer.cpp"), *flags], check=True)
-    return program
+    return compiled("peer.cpp", tmp_path_factory.mktemp("cpp"), "roscpp")
 
 
 @pytest.fixture

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from .conftest import compiled
 
 HERE = Path(__file__).parent
 STACKS = ("ours", "asyncio", "rospy", "roscpp")
@@ -48,17 +49,7 @@ in time ABORTED
 @pytest.fixture(scope="session")
 def cpp_action_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """action_peer.cpp, compiled."""
-    compiler = shutil.which("g++")
-    assert compiler
-    program = tmp_path_factory.mktemp("cpp") / "action_peer"
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"],
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.split()
-    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / "action_peer.cpp"), *flags], check=True)
-    return program
+    return compiled("action_peer.cpp", tmp_path_factory.mktemp("cpp"), "actionlib", "roscpp")
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import minirospy
+from tests.conftest import write_files
 
 from .conftest import REAL_PYTHON, environment, running_master, start, stop
 
@@ -44,7 +45,7 @@ _LINES = (
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Return a package with a program and two launch files; the current folder has two files."""
     package = tmp_path / "src" / "my_robot"
-    for name, text in {
+    texts = {
         "scripts/talker.py": "#!/usr/bin/env python3\n",
         "launch/all.launch": '<launch><arg name="rate" default="10"/><arg name="port"/></launch>',
         "launch/deep/more.launch": "<launch/>",
@@ -53,10 +54,8 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "<maintainer email='a@b.com'>m</maintainer><license>BSD</license></package>",
         "../../here/params.yaml": "{}",
         "../../here/x.launch": "<launch/>",
-    }.items():
-        (package / name).parent.mkdir(parents=True, exist_ok=True)
-        (package / name).write_text(text)
-    (package / "scripts" / "talker.py").chmod(0o755)
+    }
+    write_files(package, texts, executable=["scripts/talker.py"])
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path / 'src'}:/usr/share")
     monkeypatch.chdir(tmp_path / "here")
 

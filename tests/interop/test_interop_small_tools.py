@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import write_files
+
 from .conftest import OUR_BIN, REAL_BIN, REAL_PYTHON
 
 _NODE = """
@@ -26,16 +28,14 @@ rospy.spin()
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a package with programs, and a log folder."""
     package = tmp_path / "src" / "my"
-    for name, text in {
+    programs = {
         "scripts/status": '#!/bin/sh\necho "$@"\nexit 7\n',
         "scripts/deep/down": "#!/bin/sh\necho deep\n",
         "scripts/twin": "#!/bin/sh\necho twin of scripts\n",
         "nodes/twin": "#!/bin/sh\necho twin of nodes\n",
         "scripts/bare": "echo bare\n",
-    }.items():
-        (package / name).parent.mkdir(parents=True, exist_ok=True)
-        (package / name).write_text(text)
-        (package / name).chmod(0o755)
+    }
+    write_files(package, programs, executable=programs)
     (package / "package.xml").write_text(
         "<package><name>my</name><version>1.2.3</version><description>d</description>"
         "<maintainer email='a@b.com'>m</maintainer><license>BSD</license></package>"

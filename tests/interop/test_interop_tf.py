@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import random
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ import pytest
 
 from minirospy.compat.tf import transformations
 from tests.frames import transformations_calls
-from tests.interop.conftest import HERE, REAL_PYTHON, start, stop
+from tests.interop.conftest import HERE, REAL_PYTHON, compiled, start, stop
 from tests.tf2.conversation import ask_real, difference, edge_cases, questions, shortened
 from tests.tf2.ours import our_answers
 
@@ -101,14 +100,7 @@ def test_transformations_return_what_the_real_module_returns() -> None:
 @pytest.fixture(scope="module")
 def tf_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """tf_peer.cpp, compiled."""
-    compiler = shutil.which("g++")
-    assert compiler
-    program = tmp_path_factory.mktemp("cpp") / "tf_peer"
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", "tf2_ros"], check=True, capture_output=True, text=True
-    ).stdout.split()
-    subprocess.run([compiler, "-O1", "-o", str(program), str(HERE / "tf_peer.cpp"), *flags], check=True)
-    return program
+    return compiled("tf_peer.cpp", tmp_path_factory.mktemp("cpp"), "tf2_ros")
 
 
 class Peer:

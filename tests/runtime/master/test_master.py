@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import json
 import queue
 import random
@@ -23,17 +22,9 @@ from minirospy.runtime.master import notifier
 from minirospy.runtime.master.master import Master
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import Serialized, serialize_response
+from tests.runtime.master.master_calls import CALLS, SCENE
 
 HERE = Path(__file__).parent
-
-
-def referee() -> Any:
-    spec = importlib.util.spec_from_file_location("master_calls", HERE / "master_calls.py")
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def plain(value: Any) -> Any:
@@ -54,7 +45,7 @@ def answers(uri: str) -> list[Any]:
     """Return the answer to each call; what differs by process is blanked."""
     found: list[Any] = []
     with ServerProxy(uri) as proxy:
-        for method, *args in referee().CALLS:
+        for method, *args in CALLS:
             try:
                 answer: Any = getattr(proxy, method)(*args)
             except Fault as fault:
@@ -78,7 +69,7 @@ def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]
 
     try:
         with ServerProxy(uri) as proxy:
-            for at, (method, *args) in enumerate(referee().SCENE):
+            for at, (method, *args) in enumerate(SCENE):
                 words = [a.format(*(n.uri for n in nodes)) if isinstance(a, str) else a for a in args]
                 getattr(proxy, method)(*words)
                 received = [
@@ -112,7 +103,7 @@ def without_controls(value: Any) -> Any:
 
 def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
     golden = json.loads((HERE / "master_answers.json").read_text())["answers"]
-    calls = referee().CALLS
+    calls = CALLS
     assert len(golden) == len(calls) > 400
     for call, ours, real in zip(calls, answers(master), golden, strict=True):
         if ours != without_controls(real):
@@ -123,7 +114,7 @@ def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
 
 def test_nodes_are_notified_as_by_real_rosmaster(master: str) -> None:
     golden = json.loads((HERE / "master_answers.json").read_text())["notices"]
-    for call, ours, real in zip(referee().SCENE, notices(master, golden), golden, strict=True):
+    for call, ours, real in zip(SCENE, notices(master, golden), golden, strict=True):
         assert ours == real, call
 
 

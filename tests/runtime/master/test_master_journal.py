@@ -743,11 +743,10 @@ class Killed:
                     process.communicate()
 
 
-class Registering:
-    """A client that registers nodes and sets parameters, and records the acknowledged calls."""
+class BackgroundClient:
+    """A client of a master, in a thread, that calls it for the nodes at ``uris`` until :meth:`end`."""
 
     def __init__(self, master: str, uris: list[str]) -> None:
-        self.answered: set[tuple[str, str, str]] = set()
         self._master = master
         self._uris = uris
         self._over = threading.Event()
@@ -757,6 +756,17 @@ class Registering:
     def end(self) -> None:
         self._over.set()
         self._thread.join()
+
+    def _run(self) -> None:
+        raise NotImplementedError
+
+
+class Registering(BackgroundClient):
+    """A client that registers nodes and sets parameters, and records the acknowledged calls."""
+
+    def __init__(self, master: str, uris: list[str]) -> None:
+        self.answered: set[tuple[str, str, str]] = set()
+        super().__init__(master, uris)
 
     def lasts(self, seconds: float, answers: int) -> bool:
         """Wait for this many more answers, and this long after them; return whether the client still runs."""
@@ -824,7 +834,7 @@ def test_two_hundred_nodes_survive_their_master() -> None:
 State = dict[tuple[str, ...], object]
 
 
-class Oracle:
+class Oracle(BackgroundClient):
     """A client that changes the graph, and what a master has to hold after the calls that it acknowledged.
 
     While the lock is held no call is under way. One that failed may have been done or not: ``unsure`` is the state
@@ -836,15 +846,7 @@ class Oracle:
         self.unsure: State | None = None
         self.acknowledged = 0
         self.lock = threading.Lock()
-        self._master = master
-        self._uris = uris
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def end(self) -> None:
-        self._over.set()
-        self._thread.join()
+        super().__init__(master, uris)
 
     def lasts(self, calls: int) -> bool:
         """Wait until this many more calls are acknowledged; return whether they were."""
