@@ -303,7 +303,7 @@ _ros_complete_zsh() {
 _ros_commands() {
     printf '%s\n' roscd rosls rosed roscat roscp rosmv rospd rosrun roslaunch roslaunch-deps roslaunch-logs \
         roscore rosmaster rostopic rosnode rosservice rosparam rosmsg rossrv rosmsg-proto rospack rosstack rosdep \
-        rosconsole rosgraph rosclean rosversion roswtf rostest rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_make catkin_make_isolated catkin \
+        rosconsole rosgraph rosbag rosclean rosversion roswtf rostest rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_make catkin_make_isolated catkin \
         catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
         catkin_topological_order minirospy
 }
