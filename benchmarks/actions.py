@@ -1,4 +1,4 @@
-"""`python benchmarks/actions.py`: goals a second by send_goal_and_wait, server and client as processes of their own.
+"""`python benchmarks/actions.py`: goals a second by send_goal_and_wait, server and client as separate processes.
 
 Each pairing of ours and real actionlib (where /usr/bin/python3 has one) over one master of ours. Latencies in
 microseconds, from send_goal_and_wait's call to its return.

@@ -239,7 +239,7 @@ def slow_readers(target: Target) -> None:
 
 
 def pipelines(target: Target) -> None:
-    """300 clients that send a thousand calls at once each and read nothing."""
+    """300 clients that send a thousand calls each in one go and read nothing."""
     target.hold(called("getParamNames", "/bad") * 1000, 300)
 
 

@@ -1,10 +1,10 @@
 """The master under attack: how long a well-behaved client waits, and how much memory the master takes.
 
     python benchmarks/master_attack.py                    # each attack alone, for some seconds
-    python benchmarks/master_attack.py --mixed 600        # all of them at once while nodes register
+    python benchmarks/master_attack.py --mixed 600        # all of them together while nodes register
     python benchmarks/master_attack.py --only "huge tag"
 
-A client in a process of its own calls getPid fifty times a second, each time by a new connection. Its waits hold what
+A client in a separate process calls getPid fifty times a second, each time by a new connection. Its waits hold what
 the machine itself adds, so the same calls go to a server that nobody attacks (column "control"). Memory is the resident
 memory of the master. Exit status 1 where a call of the good client failed or a registration was refused.
 """
@@ -34,7 +34,7 @@ from attacks import ATTACKS, MIB, Target, called, silent_connections
 PERIOD = 0.02
 
 
-# --- the good client, the nodes, the control: programs of their own
+# --- the good client, the nodes, the control: separate programs
 
 
 def run_client(port: int) -> None:
@@ -295,7 +295,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="A master under attack: waits and memory.")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long each attack lasts (default: 5)")
     parser.add_argument("--only", default="", help="the attacks whose name contains this")
-    parser.add_argument("--mixed", type=float, default=0.0, help="all attacks at once, for so many seconds")
+    parser.add_argument(
+        "--mixed", type=float, default=0.0, help="all attacks together, for this many seconds"
+    )
     parser.add_argument("--nodes", type=int, default=200, help="nodes that register meanwhile, with --mixed")
     parser.add_argument("--json", action="store_true", help="print a JSON object for each row")
     if len(sys.argv) > 1 and sys.argv[1] in {"client", "control", "nodes", "attack", "mix"}:

@@ -140,7 +140,7 @@ class Churn:
 def samples(
     program: psutil.Process, home: Path, churn: Churn, seconds: float, pause: float
 ) -> Iterator[Sample]:
-    """Churn for so long, with a sample now and then."""
+    """Churn for the given time, with samples."""
     start = time.monotonic()
     following = start
     while (now := time.monotonic()) < start + seconds:

@@ -93,7 +93,7 @@ class StatusList(GoalStatusArray):
         return self
 
     def _bounds(self) -> list[tuple[int, int]]:
-        """Return where each status begins and ends."""
+        """Return where each status starts and ends."""
         bounds = []
         data, end = self._data, self._start
         try:

@@ -96,7 +96,7 @@ NO_MASTER = RosText("ERROR: Unable to communicate with master!")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return what ROS prints about an error; an empty text where it has no words of its own."""
+    """Return what ROS prints about an error; an empty text where it has none."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):

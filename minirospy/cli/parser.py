@@ -158,7 +158,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_intermixed_args(args, namespace)
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Raise the CommandLineError of ``message``; ``ros`` is ROS's text where it has one of its own."""
+        """Raise the CommandLineError of ``message``; ``ros`` is ROS's text where it differs."""
         ros_text = ""
         if self._ros_argparse:
             ros_text = f"{self.format_usage()}{self._ros_argparse}: error: {ros or _without_hint(message)}"

@@ -277,7 +277,7 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Give a fork a session of its own: the name, the time and log lines go on, the node stays the parent's."""
+    """Give a fork a new session: the name, the time and log lines continue, the node stays the parent's."""
     session = _Process.session
     _Process.session = Session(session, is_fork=True)
     session.abandon_in_fork()

@@ -191,7 +191,7 @@ class SubscribedTopic(SharedTopic):
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Call ``cb``, too, at once with the last message of a latched topic; rosbridge serves its clients so."""
+        """Call ``cb``, too, immediately with the last message of a latched topic; rosbridge uses this."""
         callback = _Callback(cb, cb_args)
         with self._session.lock:
             self._added.append(callback)

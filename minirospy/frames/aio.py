@@ -182,7 +182,7 @@ class Buffer:
                 try:
                     self._tree.insert_message(message.raw or b"", who, is_static=is_static)
                 except DeserializationError as error:
-                    self._node.log.error("a message of %s is no tf2_msgs/TFMessage: %s", who, error)
+                    self._node.log.error("a message of %s is not a tf2_msgs/TFMessage: %s", who, error)
                     continue
                 self._changed.set()
                 self._changed = asyncio.Event()

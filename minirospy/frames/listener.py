@@ -98,7 +98,7 @@ class TransformListener:
             try:
                 self.buffer.insert_message(raw, who, is_static)
             except DeserializationError as error:
-                rospy.logerr_throttle(1.0, f"a message of {who} is no tf2_msgs/TFMessage: {error}")
+                rospy.logerr_throttle(1.0, f"a message of {who} is not a tf2_msgs/TFMessage: {error}")
             return
 
         insert = self.buffer.set_transform_static if is_static else self.buffer.set_transform

@@ -117,7 +117,7 @@ class Link:
                 raise BoardError(f"the virtual board [{self._place.name}] does not answer")
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
-        """Set the latches of output pins, in order, without waiting; the mirror shows it at once."""
+        """Set the latches of output pins, in order, without waiting; the mirror shows it immediately."""
         with self._news:
             if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
                 self.call(None)
@@ -325,7 +325,7 @@ def _connect(place: Place) -> _Connection | None:
 
 
 def _start_server(place: Place) -> subprocess.Popen[bytes]:
-    """Return a server process of its own session, which outlives this one as long as the board has users."""
+    """Return a server process in a new session, which outlives this one as long as the board has users."""
     import subprocess
 
     if not sys.executable:

@@ -84,7 +84,7 @@ class Setup(NamedTuple):
 
 
 class Write(NamedTuple):
-    """Set the latches of several pins at once: ((pin, level), ...)."""
+    """Set the latches of several pins together: ((pin, level), ...)."""
 
     levels: Sequence[Sequence[int]]
 

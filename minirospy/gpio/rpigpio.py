@@ -192,7 +192,7 @@ class Gpio:
             raise RuntimeError("You must setup() the GPIO channel first") from None
 
     def gpio_function(self, channel: int) -> int:
-        """Return what the pin does now, whoever set it up: IN or OUT."""
+        """Return the present function of the pin: IN or OUT."""
         pin = self._pin(channel)
         return int(self._linked().states[pin].function)
 
@@ -441,7 +441,7 @@ class Gpio:
 
 
 class Wave:
-    """The square wave of one PWM, on a thread of its own."""
+    """The square wave of one PWM, on a separate thread."""
 
     def __init__(self, gpio: Gpio, pin: int, frequency: float) -> None:
         self.pin = pin

@@ -47,7 +47,7 @@ class Source:
 
     @contextmanager
     def function(self, head: str) -> Iterator[None]:
-        """Yield a block with local names of its own."""
+        """Yield a block with its own local names."""
         self._taken, self._last = set(), {}
         with self.block(head):
             yield

@@ -59,7 +59,7 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter; a dictionary sets each of its own and leaves those beside them, as rosparam does.
+    """Set a parameter; a dictionary sets each of its entries and keeps the others, as rosparam does.
 
     The single parameters that were set come back. Raise ValueTextError on what none can hold.
     """

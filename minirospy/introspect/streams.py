@@ -211,7 +211,7 @@ class _Listeners:
         self._latched: dict[str, tuple[bytes, Header]] = {}
 
     def add(self, function: Callable[[Frame, Header], None]) -> None:
-        """Call ``function`` from now on, and at once with what latched publishers have sent."""
+        """Call ``function`` from now on, and immediately with the messages of latched publishers."""
         with self._lock:
             self._functions += (function,)
             latched = [*self._latched.values()]

@@ -1,4 +1,4 @@
-"""Processes that roslaunch starts: in process groups of their own, ended step by step, and never left behind."""
+"""Processes that roslaunch starts: in separate process groups, terminated step by step, and never left behind."""
 
 from __future__ import annotations
 

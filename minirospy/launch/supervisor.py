@@ -19,7 +19,7 @@ __all__ = ["Supervisor"]
 
 _WINDOWS = sys.platform == "win32"
 _RESPAWN_SECONDS = 0.1
-"""A node that exits at once is not started more often than that."""
+"""Shortest time between two starts of a node that exits immediately."""
 
 _WATCH_SECONDS = 0.5
 _BAR = "=" * 80

@@ -1,4 +1,4 @@
-"""Files that are written by a thread: whoever gives it bytes does not wait for the disk.
+"""Files that are written by a thread: the caller does not wait for the disk.
 
 What is queued counts in :attr:`DiskThread.pending`; the caller decides what to do when that becomes too much.
 """

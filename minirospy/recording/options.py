@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 class RecordOptions(NamedTuple):
-    """What to record, and into which files. Sizes are in bytes, times in nanoseconds; 0 is no limit."""
+    """What to record, and into which files. Sizes are in bytes, times in nanoseconds; 0 means unlimited."""
 
     topics: tuple[str, ...] = ()
     all_topics: bool = False

@@ -1,6 +1,6 @@
 """joint_state_publisher_gui as sliders in a terminal: joint_state_publisher, and keys that set the joints.
 
-Where there is no terminal, as below roslaunch, it publishes the joints' zeros and what its sources publish.
+Without a terminal, as below roslaunch, it publishes the joints' zeros and what its sources publish.
 Source: http://wiki.ros.org/joint_state_publisher_gui.
 """
 
@@ -36,7 +36,7 @@ def _run() -> None:
     if sys.stdin is None or not sys.stdin.isatty() or not sys.stdout.isatty():
         rospy.loginfo(
             "no terminal: the joints stay at their zeros. `rosrun joint_state_publisher_gui joint_state_publisher_gui` in a "
-            "terminal of its own shows sliders"
+            "separate terminal shows sliders"
         )
         publisher.loop()
         return

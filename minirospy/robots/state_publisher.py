@@ -33,7 +33,7 @@ _PREFIX_SECONDS = 1.0
 
 
 def main(name: str = "robot_state_publisher") -> int:
-    """Run the node until it is shut down; return the exit status: 1 where there is no robot."""
+    """Run the node until it is shut down; return the exit status: 1 without a robot."""
     try:
         rospy.init_node(name)
         robot = robot_of_parameter()

@@ -1,4 +1,4 @@
-"""A unit test's file, run as a program of its own: its results, and what went wrong besides them.
+"""A unit test's file, run as a separate program: its results, and what went wrong besides them.
 
 Source: http://wiki.ros.org/rosunit.
 """

@@ -1,4 +1,4 @@
-"""The ``<test>`` tags of a launch file -> results: each runs with the file's nodes and a master of its own.
+"""The ``<test>`` tags of a launch file -> results: each runs with the file's nodes and a new master.
 
 Source: http://wiki.ros.org/rostest, http://wiki.ros.org/roslaunch/XML/test.
 """

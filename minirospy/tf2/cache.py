@@ -126,7 +126,7 @@ class TimeCache:
         return (self._stamps[-1], self._samples[-1][0]) if self._stamps else None
 
     def why_not(self, time: int) -> str:
-        """Return the text for a time at which there is no sample; "" without samples."""
+        """Return the text for a time without a sample; "" without any samples."""
         if not self._stamps:
             return ""
         if len(self) == 1:

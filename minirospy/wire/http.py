@@ -277,7 +277,7 @@ class HttpReader:
 
 
 def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
-    """Return where the first line that ends after ``start`` ends, and where the next one begins; -1 if none does.
+    """Return where the first line that ends after ``start`` ends, and where the next one starts; -1 if none does.
 
     A line feed alone ends a line too, where somebody writes a request by hand.
     """

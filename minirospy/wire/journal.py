@@ -2,7 +2,7 @@
 
 Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of what
 follows (4 bytes), a msgpack array ``[what, argument, ...]``. A record that is not whole ends the file: what
-stands behind it cannot be trusted to follow from what stands before.
+follows it may not be consistent with the records before.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def test_unknown_verb_has_status_0_as_in_ros(capsys: pytest.CaptureFixture[str])
     out, err = capsys.readouterr()
     assert out == ""
     assert err.startswith("Unknown command: 'inf'\nAvailable subcommands:\n")
-    assert "rosbag: ERROR: there is no `rosbag inf`; did you mean info" in err
+    assert "rosbag: ERROR: unknown command `rosbag inf`; did you mean info" in err
 
 
 def test_info_prints_text_yaml_and_values(command: Command, bag: Path) -> None:

@@ -161,10 +161,10 @@ class TestBuffer:
 
         async def bounded(node: Node, buffer: Buffer) -> None:
             task = asyncio.create_task(main(node, buffer))
-            while "is no tf2_msgs/TFMessage" not in caplog.text:
+            while "is not a tf2_msgs/TFMessage" not in caplog.text:
                 await asyncio.sleep(0.01)
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
 
         run(bounded)
-        assert "a message of /frames is no tf2_msgs/TFMessage" in caplog.text
+        assert "a message of /frames is not a tf2_msgs/TFMessage" in caplog.text

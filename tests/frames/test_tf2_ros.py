@@ -131,7 +131,7 @@ message = LazyTFMessage().deserialize(b"\\1\\0\\0\\0abc")
 message._connection_header = {"callerid": "/me"}
 listener.callback(message)
 """)
-        assert "a message of /me is no tf2_msgs/TFMessage: unpack_from requires" in said
+        assert "a message of /me is not a tf2_msgs/TFMessage: unpack_from requires" in said
         assert "Traceback" not in said
 
     def test_listening_ends(self) -> None:

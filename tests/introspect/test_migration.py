@@ -156,7 +156,7 @@ def test_type_that_has_gone_needs_half_a_rule() -> None:
          "both attempting to rename type [x/A]"),
         ([rule("a", ("x/A", ""), ("x/B", ""), "pass"), rule("b", ("x/B", ""), ("x/A", ""), "pass")],
          "introduce a renaming cycle"),
-        (["this is no Python"], "Cannot load rule file"),
+        (["this is not Python"], "Cannot load rule file"),
         ([rule("a", ("x/A", "int8 a b c"), ("x/A", "int8 b"), "pass", migrated_types=[("B", "C")])],
          "invalid definition"),
     ],

@@ -1,7 +1,7 @@
 """rosbag: record and play bags, look into them, repair and rewrite them.
 
 Source: http://wiki.ros.org/rosbag/Commandline. What is printed is what ROS prints, and the exit statuses are ROS's: an unknown
-verb is 0. Each verb is in a module of its own; a new one is a line of the table.
+verb is 0. Each verb is in a separate module; a new one is a line of the table.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
     hint = did_you_mean(words[0], map(FAMILY.verb_name, FAMILY.verbs))
-    error = UsageError(f"there is no `rosbag {words[0]}`{hint} (`rosbag -h` shows what there is)")
+    error = UsageError(f"unknown command `rosbag {words[0]}`{hint} (`rosbag -h` shows what there is)")
     return complain("rosbag", error, 0, f"Unknown command: '{words[0]}'\n{_verbs()}")
 
 

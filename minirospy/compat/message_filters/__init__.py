@@ -256,7 +256,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue: Queue, my_queue_index: int | None, stamp: Time) -> list[object]:
-        """Take the set that a stamp completes out of the queues; return its messages, none where there is no such set."""
+        """Take the set that a stamp completes out of the queues; return its messages, none without such a set."""
         # A class that is derived from this one may have made its own list, of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:

@@ -31,7 +31,7 @@ class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
 
 
 class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
-    """Answers each connection in a thread of its own."""
+    """Answers each connection in a separate thread."""
 
     daemon_threads = True
     allow_reuse_address = True

@@ -82,7 +82,7 @@ class Master:
         return ServerProxy(self.uri)
 
     def get_multi(self) -> MultiCall:
-        """Return a proxy that sends several calls at once."""
+        """Return a proxy that sends several calls in one request."""
         from xmlrpc.client import MultiCall
 
         return MultiCall(self.get())

@@ -43,7 +43,7 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Connect back to each doctor that requests it, from now on; ``report`` is called with each, in a thread of its own.
+    """Connect back to each doctor that requests it, from now on; ``report`` is called with each, in a separate thread.
 
     Raise MasterUnreachableError, RpcError.
     """

@@ -230,7 +230,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # The disk may take long, and whoever writes to the file meanwhile waits for it.
+            # The disk may take long, and other writers to the file wait for it.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():

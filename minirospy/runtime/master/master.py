@@ -77,7 +77,7 @@ class Master(MasterApi):
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
-        """``journal``: the file that keeps what it knows (None: no file); ``fresh``: what stands there is dropped.
+        """``journal``: the file that keeps what it knows (None: no file); ``fresh``: its contents are dropped.
 
         ``timeout``: seconds that a node has to take a call. ``same_host``: processes of this machine may come, and are
         called, by Unix sockets. ``owns_process``: nothing else runs in it, so the garbage collector is the master's.
@@ -175,7 +175,7 @@ class Master(MasterApi):
                 self._journal.remove()
 
     def adopt(self, node: Node) -> None:
-        """``node``, which has started, is on this loop: it is told of publishers without a call."""
+        """``node``, which has started, is on this loop: it is notified of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> Any:
@@ -335,7 +335,7 @@ class Master(MasterApi):
         self.news.append(f"journal: recovered {what}")
 
     def _replay(self, what: str, *args: Any) -> None:
-        """One change, as it was noted; whom it told then needs no word now."""
+        """One change, as it was recorded; the nodes that it notified then are not notified again."""
         registry, parameters = self.registry, self.parameters
         actions: Iterable[Notice] = ()
 

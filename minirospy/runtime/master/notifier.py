@@ -63,7 +63,7 @@ class State(Protocol):
 
 @dataclass(eq=False, slots=True)
 class _Node:
-    """What one node is still to be told: the newest of each topic and parameter."""
+    """The pending notifications of one node: the newest of each topic and parameter."""
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class _Node:
 
 @dataclass(eq=False, slots=True)
 class _Line:
-    """Nodes that wait for their call; ``most`` are called at once."""
+    """Nodes that wait for their call; ``most`` are called concurrently."""
 
     most: int
     under_way: int = 0
@@ -182,7 +182,7 @@ class Notifier:
         self._start_soon()
 
     def _start_soon(self) -> None:
-        # Not at once: who registers gets its answer first.
+        # Not immediately: the registering node gets its answer first.
         if not self._starts_soon:
             self._starts_soon = True
             asyncio.get_running_loop().call_soon(self._start)

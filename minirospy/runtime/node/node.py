@@ -165,7 +165,7 @@ class Node:
             return_exceptions=True,
         )
 
-        # Its name goes before the port, which the next server takes with a name of its own.
+        # Its name goes before the port, which the next server takes with its own name.
         await self._unix_listener.close()
         await self._listener.close()
         for table in (self.publications, self.subscriptions, self.services):

@@ -39,7 +39,7 @@ _LOOK_SECONDS = 5.0
 
 _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up on a master that answers nothing for this long; the shorter limit is for one that was already
-silent before. There is no limit on the whole: a busy master that answers call after call is waited for."""
+silent before. The total is not limited: a busy master that answers call after call is waited for."""
 
 _CLOSING_CALL_SECONDS = 3600.0
 _PROBE_SECONDS = 3.0

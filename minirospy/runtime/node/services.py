@@ -53,7 +53,7 @@ AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
 
 
 class ServiceServer:
-    """A service that this node offers; each connection is served by a worker of its own."""
+    """A service that this node offers; each connection is served by a separate worker."""
 
     def __init__(
         self,

@@ -170,7 +170,7 @@ class InLink:
 
     @property
     def number(self) -> int:
-        """What tells this link from the node's others: its file descriptor."""
+        """The link's number among those of the node: its file descriptor."""
         return self.sock.fileno()
 
     @property
@@ -195,7 +195,7 @@ class InLink:
 class Subscription:
     """A topic that this node listens to: one connection to each publisher, made again when it breaks.
 
-    Each connection is read by a worker of its own that calls ``deliver``: one publisher's messages stay in
+    Each connection is read by a separate worker that calls ``deliver``: one publisher's messages stay in
     order, and neither topics nor publishers wait for each other. With ``on_loop``, ``deliver`` is called
     on the loop instead and must be quick. ``newest`` may be changed at any time: of the messages that came
     while a delivery lasted, only so many are delivered, the newest (0: all).
@@ -470,7 +470,7 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
     try:
         host = split_uri(uri)[0]
     except ValueError:
-        return "That is no address of a node: whoever registered it has to say http://host:port/"
+        return "That is not the address of a node: it must be registered as http://host:port/"
 
     if nameless:
         return (

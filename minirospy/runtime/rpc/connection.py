@@ -37,7 +37,7 @@ __all__ = ["Connection", "State"]
 _log = logging.getLogger(__name__)
 
 _REQUEST_SECONDS = 30.0
-"""A request that has begun must be whole after this, and an answer taken."""
+"""Time limit for a started request to be complete, and for an answer to be read."""
 
 _LINGER_SECONDS = 2.0
 """Who is refused may still be sending: so long it is heard out, or the answer would be lost with the connection."""
@@ -238,7 +238,7 @@ class Connection:
                 data += self._receive() or b""
             self.received(data)
         elif self._out and self._state is _OPEN:
-            # It asks no more, but waits for what it asked.
+            # It sends no more requests, but waits for answers.
             self._state = _CLOSING
             self._stop_reading()
         else:

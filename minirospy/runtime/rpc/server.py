@@ -222,7 +222,7 @@ class RpcServer:
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """One goes that asks nothing, or else the one that was silent longest."""
+        """Close an idle connection, or else the one that was silent longest."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()

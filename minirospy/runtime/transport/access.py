@@ -74,7 +74,7 @@ def listening_lines(bind_host: str, port: int, access: Access, *, local: bool = 
     public = [text for text in own if ipaddress.ip_address(text.partition("%")[0]).is_global]
     if public:
         lines.append(
-            f"WARNING: the open internet reaches this master at {', '.join(public)}, and ROS asks for no password: "
+            f"WARNING: the open internet reaches this master at {', '.join(public)}, and ROS has no passwords: "
             "say who may connect with --allow (as --allow 192.168.65.0/24), or listen elsewhere with ROS_IP"
         )
     return lines

@@ -46,7 +46,7 @@ __all__ = ["OutLink", "QueueSize", "ReaderSet", "read_frames", "watch_frames"]
 _GATHER = 64
 _DRAIN_BYTES = 64 * 1024 * 1024
 _CLAIM = 16 * 1024 * 1024
-"""Bytes that one receive asks for at most: a length is only a claim until they come."""
+"""Largest receive, in bytes: a length is only a claim until the bytes arrive."""
 
 _PUSH_SECONDS = 0.005
 _PUSH_WAIT_MS = 1
@@ -62,7 +62,7 @@ _Waiting = bytes | list[bytes | memoryview]
 class OutLink:
     """The publisher's end of one connection: frames from any thread, in order, without blocking the publisher.
 
-    A frame is written at once by the thread that sends it. What the socket does not take waits in the
+    A frame is written immediately by the thread that sends it. What the socket does not take waits in the
     outbox, which the loop empties; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit).
     Before that a thread waits for room, a few milliseconds at most, but only for a peer on this machine that has read
     since the last wait.
@@ -112,7 +112,7 @@ class OutLink:
 
     @property
     def number(self) -> int:
-        """What tells this link from the node's others: its file descriptor."""
+        """The link's number among those of the node: its file descriptor."""
         return self._sock.fileno()
 
     @property
@@ -134,7 +134,7 @@ class OutLink:
         self._start_writing()
 
     def send(self, frame: bytes | LargeFrame) -> None:
-        """Send ``frame``: at once, or after those that wait."""
+        """Send ``frame``: immediately, or after the queued ones."""
         with self._drained:
             if self._closed:
                 return
@@ -225,7 +225,7 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # No socket takes a large message at once, and a peer that reads makes room in microseconds: to hand
+            # No socket takes a large message in one call, and a peer that reads makes room in microseconds: to hand
             # each step to the loop would cost more than to stay.
             try:
                 left -= self._gather(buffers)
@@ -292,7 +292,7 @@ class OutLink:
         """Write some of what waits. Raises OSError."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # What has begun, and what is large, goes alone.
+            # A partly sent frame, and a large one, is sent alone.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:

@@ -96,7 +96,7 @@ def is_readable(sock: socket.socket) -> bool:
 
 
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Return whether the socket is writable within so long; busy-polls first, as busy_poll() does."""
+    """Return whether the socket becomes writable within the timeout; busy-polls first, as busy_poll() does."""
     if hasattr(select, "poll"):
         return (may_busy_poll(sock) and _busy_poll(sock, select.POLLOUT)) or bool(
             _poll(sock, select.POLLOUT).poll(milliseconds)

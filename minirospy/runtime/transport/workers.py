@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 class Workers:
     """Daemon threads that are kept for a while when their work is done, since starting one costs.
 
-    There is no limit on their number: each connection that waits for bytes has one, and peers are
+    Their number is not limited: each connection that waits for bytes has one, and peers are
     limited where they are accepted.
     """
 

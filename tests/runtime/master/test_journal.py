@@ -431,7 +431,7 @@ def test_rewrite_that_was_given_up_leaves_a_later_one_alone(
     assert path.with_name("journal-1.new").exists()
     finish(steps[1])
     assert records(path)[1:] == state
-    # Not even begun.
+    # Not even started.
     stepping.append("set", "/p", "x" * MIB)
     stepping.rewrite()
     finish(steps[2])

@@ -168,7 +168,7 @@ BAD: dict[str, tuple[bytes, str]] = {
 
 
 def result_of(answer: Any) -> Any:
-    """Return what a call is answered, whether at once or in steps."""
+    """Return what a call is answered, whether in one step or several."""
     return finish(answer) if isinstance(answer, Generator) else answer
 
 

@@ -1,4 +1,4 @@
-"""runtime/node/node and runtime/node/slave: what a node answers its peers, and what it says of its own address."""
+"""runtime/node/node and runtime/node/slave: the answers of a node to its peers, and the address that it advertises."""
 
 from __future__ import annotations
 
