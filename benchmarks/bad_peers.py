@@ -49,7 +49,7 @@ while not rospy.is_shutdown():
 
 
 class Row(NamedTuple):
-    """What an attack cost."""
+    """The cost of an attack."""
 
     attack: str
     before: float

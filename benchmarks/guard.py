@@ -26,7 +26,7 @@ TRIES = 4
 
 
 class Limit(NamedTuple):
-    """What one ``case`` may cost: so many times what one ``yardstick`` does."""
+    """The limit of one ``case``: this many times the cost of one ``yardstick``."""
 
     case: str
     yardstick: str

@@ -146,7 +146,7 @@ class Watch:
 
 
 class Row(NamedTuple):
-    """What an attack cost."""
+    """The cost of an attack."""
 
     attack: str
     median: float

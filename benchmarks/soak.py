@@ -37,7 +37,7 @@ MOST_FILES = 50
 
 
 class Sample(NamedTuple):
-    """What the master takes at one moment."""
+    """The resources of the master at one moment."""
 
     seconds: float
     mb: float
@@ -55,7 +55,7 @@ class Sample(NamedTuple):
 
 
 class Churn:
-    """What nodes and tools do to a master."""
+    """The calls of nodes and tools to a master."""
 
     def __init__(self, port: int, seed: int) -> None:
         self._port = port

@@ -46,7 +46,7 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 
 class Clock(Protocol):
-    """What the sleeping functions need to know of time."""
+    """The time, as the sleeping functions need it."""
 
     def now(self) -> int:
         """Return the time in nanoseconds."""

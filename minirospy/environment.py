@@ -52,7 +52,7 @@ net.ipv4.route_localnet, as hosts of containers set it, lets neighbours in."""
 
 
 class Environment(NamedTuple):
-    """Where the master is, how this process is reached, and where its files go.
+    """The master's URI, the address of this process, and the folders of its files.
 
     ``host`` is the name that is advertised to peers; ``bind_host`` the address that servers listen on
     (loopback when ``host`` is, else every interface; with ``ipv6`` those of IPv6). ``ports`` are those

@@ -15,7 +15,7 @@ _T = TypeVar("_T")
 
 
 class Need(Enum):
-    """What a step may yield in place of None."""
+    """A request that a step may yield in place of None."""
 
     ALONE = "no other work that takes much memory may run beside this"
     PAUSE = "there is nothing to do at present"

@@ -15,7 +15,7 @@ _V = TypeVar("_V", bound="TVal")
 
 
 class TVal:
-    """What Time and Duration share: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalised."""
+    """The common part of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalised."""
 
     __slots__ = ["nsecs", "secs"]
 

@@ -1,4 +1,4 @@
-"""What a server holds of a goal: a StatusTracker each, and the ServerGoalHandle by which user code moves it on.
+"""The server's state of a goal: a StatusTracker each, and the ServerGoalHandle by which user code moves it on.
 
 Which state follows which is a table (`minirospy.graph.goals`).
 """

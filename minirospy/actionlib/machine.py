@@ -1,4 +1,4 @@
-"""What a client knows of its goals: one CommStateMachine a goal, found by the GoalManager, read through a ClientGoalHandle.
+"""The client's state of its goals: one CommStateMachine a goal, found by the GoalManager, read through a ClientGoalHandle.
 
 The machine's rules are tables (`minirospy.graph.goals`). Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """

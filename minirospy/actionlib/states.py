@@ -17,7 +17,7 @@ def get_name_of_constant(C: type, n: int) -> str:
 
 
 class CommState:
-    """How far a client is with a goal."""
+    """The state of a goal in the client."""
 
     WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
     PENDING = int(ClientState.PENDING)
@@ -36,7 +36,7 @@ class CommState:
 
 
 class TerminalState:
-    """How a goal's life has ended."""
+    """The final state of a goal."""
 
     RECALLED = int(GoalState.RECALLED)
     REJECTED = int(GoalState.REJECTED)
@@ -52,7 +52,7 @@ class TerminalState:
 
 
 class SimpleGoalState:
-    """How far the simple client is with its goal."""
+    """The state of the goal in the simple client."""
 
     PENDING = int(SimpleState.PENDING)
     ACTIVE = int(SimpleState.ACTIVE)

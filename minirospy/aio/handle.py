@@ -1,4 +1,4 @@
-"""What publishers, subscriptions and services have in common: they are registered in the background."""
+"""The common part of publishers, subscriptions and services: they are registered in the background."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _Response_co = TypeVar("_Response_co", bound=Message, covariant=True)
 
 
 class ServiceClass(Protocol[_Request_co, _Response_co]):
-    """What a service class has, as ``std_srvs.srv.SetBool``: the classes of its request and response."""
+    """The members of a service class, as ``std_srvs.srv.SetBool``: the classes of its request and response."""
 
     @property
     def _md5sum(self) -> str: ...

@@ -1,4 +1,4 @@
-"""What can be read from a bag, whatever its version."""
+"""Reading of bags, of any version."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Block(NamedTuple):
 
 
 class BagReader(ABC):
-    """What can be read from a bag, of each version."""
+    """The interface of the readers of each version."""
 
     version: int
     """200 for 2.0."""

@@ -1,4 +1,4 @@
-"""What a bag holds, as `rosbag info` prints it: a reader in, a summary out, and its text or YAML.
+"""The contents of a bag, as `rosbag info` prints them: a reader in, a summary out, and its text or YAML.
 
 Source: http://wiki.ros.org/rosbag/Commandline#info. The texts are those of ROS, which programs parse.
 """

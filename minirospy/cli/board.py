@@ -56,7 +56,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """What rich draws for a board: its lights, its buttons, the person, and the other pins in use."""
+    """The picture of a board for rich: its lights, its buttons, the person, and the other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state

@@ -1,4 +1,4 @@
-"""What every command does the same way: how it reads its words, is a node of the graph, and ends.
+"""The common part of all commands: reading arguments, being a node of the graph, errors and exit statuses.
 
 A command is a typed function that raises; `main(argv)` hands it to :func:`run`, which turns what was
 raised into one line on stderr and an exit status:
@@ -72,7 +72,7 @@ def refuse_bag(command: str, bag: str) -> NoReturn:
 
 
 class RosText(NamedTuple):
-    """What ROS prints about an error, and its exit status.
+    """The text that ROS prints about an error, and its exit status.
 
     ``text`` may name ``{name}`` and ``{uri}`` of the error.
     """

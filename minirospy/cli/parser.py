@@ -1,4 +1,4 @@
-"""How a command reads its words: an argument parser whose usage, help and errors are printed as ROS prints them.
+"""The parsing of a command line: an argument parser whose usage, help and errors are printed as ROS prints them.
 
 Most of ROS's commands are built on optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own
 tests match these lines, so a :class:`Parser` that is given ROS's usage prints exactly them; what minirospy adds follows

@@ -1,4 +1,4 @@
-"""What a command is made of: a parser and a typed function; and a family of such verbs under one name.
+"""The parts of a command: a parser and a typed function; and families of such verbs under one name.
 
 The function's parameters are called as the parser's arguments: `Command.run` passes them by name. So a parser can be
 had without running its command, and the function be called without a command line.

@@ -1,4 +1,4 @@
-"""What a process that is interrupted prints: what it still waits for; and what it does not: tracebacks of the interrupt."""
+"""The texts of an interrupted process: what it still waits for, without tracebacks of the interrupt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who a node is: its name, its namespace, and what the command line and the environment say of it.
+"""The identity of a node: its name, its namespace, its settings from the command line and the environment.
 
 Source: http://wiki.ros.org/Names, http://wiki.ros.org/Remapping%20Arguments.
 """

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from minirospy.client.session import Session
 
     class _Keywords(TypedDict, total=False):
-        """What a log function passes on, as Python's logging has it."""
+        """The keywords that a log function passes to Python's logging."""
 
         exc_info: object
         extra: Mapping[str, object] | None

@@ -145,7 +145,7 @@ def get_param_names() -> list[str]:
 
 
 class KeptParameters:
-    """What get_param_cached keeps, for a program that reads it, or is to be notified of its changes.
+    """The parameters that get_param_cached keeps, for a program that reads them or is notified of changes.
 
     Such a program may replace :meth:`update` by its own function.
     """

@@ -13,7 +13,7 @@ __all__ = ["Action", "Phase", "ShutdownMachine", "ThreadState"]
 
 
 class Phase(enum.IntEnum):
-    """How far the shutdown has come."""
+    """The phase of the shutdown."""
 
     RUNNING = 0
     HOOKS = 1
@@ -27,7 +27,7 @@ class Phase(enum.IntEnum):
 
 
 class Action(enum.Enum):
-    """What the shell is to do."""
+    """An action for the shell to perform."""
 
     RUN_HOOKS = enum.auto()
     """Shut down in a thread of the library: the main thread does not run Python code."""
@@ -44,7 +44,7 @@ class Action(enum.Enum):
 
 
 class ThreadState:
-    """What one thread of the program knows of the shutdown."""
+    """The shutdown as one thread of the program sees it."""
 
     __slots__ = ("notified", "polled", "polls")
 

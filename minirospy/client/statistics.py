@@ -28,7 +28,7 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """How a window adapts: it doubles below ``min_elements`` messages and halves above ``max_elements``.
+    """The limits of a window that adapts: it doubles below ``min_elements`` messages and halves above ``max_elements``.
 
     ``min_size`` and ``max_size`` bound it, in seconds.
     """
@@ -63,7 +63,7 @@ class Spread(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What one window saw of one publisher. Times are nanoseconds, spreads seconds, ``traffic`` bytes."""
+    """The measurements of one window of one publisher. Times are nanoseconds, spreads seconds, ``traffic`` bytes."""
 
     publisher: str
     start: int

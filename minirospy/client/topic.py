@@ -52,7 +52,7 @@ class AnyMsg(Message):
 
 
 class Topic(Generic[_M_co]):
-    """What Publisher and Subscriber share: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
+    """The common part of Publisher and Subscriber: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
 
     ``impl`` is what all handles of the topic in this process share, None once unregistered.
     """
@@ -94,7 +94,7 @@ class Topic(Generic[_M_co]):
 
 
 class SharedTopic:
-    """What the handles of one topic in this process share: the ``impl`` that user code sees of rospy's."""
+    """The common part of the handles of one topic in this process: rospy's ``impl``, which user code reads."""
 
     def __init__(self, session: Session, topic: str, data_class: type[protocols.Message]) -> None:
         self._session = session

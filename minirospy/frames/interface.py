@@ -1,4 +1,4 @@
-"""What a buffer and a client of a buffer server share: transforming whole messages, and conversions between types.
+"""The common part of a buffer and a client of a buffer server: transforming whole messages, and conversions between types.
 
 Source: http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2/Tutorials/Transforming%20your%20own%20datatypes.
 """

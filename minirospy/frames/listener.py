@@ -18,7 +18,7 @@ __all__ = ["TransformListener"]
 
 
 class TransformSink(Protocol):
-    """What a listener puts transforms into: a Buffer, or a program's own object."""
+    """The target of a listener's transforms: a Buffer, or a program's own object."""
 
     def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
         """Take a transform."""

@@ -1,4 +1,4 @@
-"""What a board does: operations in, changed pins out. Pure.
+"""The behaviour of a board: operations in, changed pins out. Pure.
 
 A pin is an input or an output. An output's level is its latch; an input's is what the world drives it to
 (a pressed button, a jumper wire), else its pull resistor, else 0. The latch outlives the direction and the
@@ -42,7 +42,7 @@ BUTTONS = (11, 12)
 
 
 class Function(IntEnum):
-    """What a pin does, with RPi.GPIO's numbers."""
+    """The function of a pin, with RPi.GPIO's numbers."""
 
     OUT = 0
     IN = 1

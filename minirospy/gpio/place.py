@@ -1,4 +1,4 @@
-"""Where a board lives: its name in, the paths of its socket, lock and saved pins out.
+"""The files of a board: its name in, the paths of its socket, lock and saved pins out.
 
 ``MINIROSPY_BOARD`` names the board (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder that holds
 it, by default one in the temporary folder that only this user may enter.

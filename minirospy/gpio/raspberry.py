@@ -1,4 +1,4 @@
-"""Whether this computer is a Raspberry Pi, whose own pins the virtual board does not move."""
+"""Detection of a Raspberry Pi, whose own pins the virtual board does not move."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class GoalState(IntEnum):
 
 
 class ClientState(IntEnum):
-    """How far a client is with a goal: actionlib.CommState."""
+    """The state of a goal in the client: actionlib.CommState."""
 
     WAITING_FOR_GOAL_ACK = 0
     PENDING = 1
@@ -63,7 +63,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """What a server does with a goal, or is asked to do. The value names where it leads, for a person."""
+    """A server's action on a goal, or a request for one. The value names the resulting state, for a person."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"
@@ -74,7 +74,7 @@ class GoalEvent(Enum):
 
 
 class SimpleStep(Enum):
-    """What a change of the client's state means to the simple client."""
+    """The meaning of a change of the client's state for the simple client."""
 
     NONE = "nothing"
     ACTIVATE = "the goal has become active"

@@ -1,4 +1,4 @@
-"""What a node knows of parameters that it has asked for before: values in, news of changes in, values out.
+"""The parameters that a node has read before: values in, notifications of changes in, values out.
 
 Pure. A change makes the node forget what it concerns, and the next read queries the master: so updates that overtake
 each other, and the empty dictionary that means "deleted" as well as "empty", do no harm.

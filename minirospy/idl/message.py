@@ -1,4 +1,4 @@
-"""What generated messages are based on: the base class, checks, the text of a message, and filling from values.
+"""The base of generated messages: the base class, checks, the text of a message, and filling from values.
 
 The names and rules are genpy's, since user code relies on them: http://docs.ros.org/api/genpy/html/.
 """
@@ -50,7 +50,7 @@ _FOLDED = 76
 
 
 class _Options(NamedTuple):
-    """How :func:`strify_message` prints."""
+    """The options of :func:`strify_message`."""
 
     time_offset: Time | None
     current_time: object

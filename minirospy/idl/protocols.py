@@ -1,4 +1,4 @@
-"""What messages, services and actions look like to code that works with all of them.
+"""The protocols of messages, services and actions, for code that works with all of them.
 
 Protocols, since the classes come from several generators: ours, real genpy's in packages that were built with ROS, and
 those made at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
@@ -32,7 +32,7 @@ Buffer: TypeAlias = bytes | bytearray | memoryview
 
 
 class Writer(Protocol):
-    """What a message is written to: a BytesIO, a list of pieces."""
+    """The target of ``serialize``: a BytesIO, a list of pieces."""
 
     def write(self, data: bytes, /) -> object:
         """Take the next bytes."""
@@ -110,7 +110,7 @@ class ServiceClass(Protocol):
 
 
 class ActionGoal(Stamped, Protocol):
-    """What an action client sends."""
+    """The message of an action client."""
 
     @property
     def goal_id(self) -> GoalID:
@@ -122,7 +122,7 @@ class ActionGoal(Stamped, Protocol):
 
 
 class ActionResult(Stamped, Protocol):
-    """What an action server sends at the end of a goal."""
+    """The message of an action server at the end of a goal."""
 
     @property
     def status(self) -> GoalStatus:
@@ -134,7 +134,7 @@ class ActionResult(Stamped, Protocol):
 
 
 class ActionFeedback(Stamped, Protocol):
-    """What an action server sends on the way."""
+    """The message of an action server during a goal."""
 
     @property
     def status(self) -> GoalStatus:

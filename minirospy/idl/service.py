@@ -1,4 +1,4 @@
-"""What a service's handler returned, as the response that is sent."""
+"""The conversion of a service handler's return value into the response."""
 
 from __future__ import annotations
 

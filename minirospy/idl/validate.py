@@ -1,4 +1,4 @@
-"""What may become Python source: the names of types and fields, and their sizes, checked before anything is generated.
+"""Checks of all text that becomes Python source: names of types and fields, and sizes, before anything is generated.
 
 A definition may come from a file or from any publisher's connection header; its names are written into source that is
 executed. So they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which leaves no
@@ -112,7 +112,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
 
 
 class _Size(NamedTuple):
-    """What a message unfolds to."""
+    """The size of an unfolded message."""
 
     fields: int
     levels: int

@@ -1,4 +1,4 @@
-"""What `rostopic echo` prints of a message, and the message that `rostopic pub` sends. Pure."""
+"""The text of `rostopic echo` for a message, and the message of `rostopic pub`. Pure."""
 
 from __future__ import annotations
 

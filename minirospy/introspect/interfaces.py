@@ -21,7 +21,7 @@ _INDENT = "  "
 
 
 class Kind(Enum):
-    """What a definition defines; the value is its folder and the ending of its name."""
+    """The kind of a definition; the value is its folder and the ending of its name."""
 
     MESSAGE = "msg"
     SERVICE = "srv"

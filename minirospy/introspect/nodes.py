@@ -60,7 +60,7 @@ class TypedName(NamedTuple):
 
 
 class NodeDetail(NamedTuple):
-    """What the master knows of a node."""
+    """A node's registrations at the master."""
 
     name: str
     uri: str | None
@@ -70,7 +70,7 @@ class NodeDetail(NamedTuple):
 
 
 class Connections(NamedTuple):
-    """What a node says of itself."""
+    """The connections that a node reports."""
 
     pid: int
     links: list[BusConnection]

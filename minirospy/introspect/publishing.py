@@ -1,4 +1,4 @@
-"""What `rostopic pub` publishes: YAML values of a command line, a file or a stream become messages, at a rate.
+"""The messages of `rostopic pub`: YAML values of a command line, a file or a stream become messages, at a rate.
 
 Source: http://wiki.ros.org/rostopic#rostopic_pub.
 """

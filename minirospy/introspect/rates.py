@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """How late the latest messages came after their stamps (at most ``size`` of them; 0 for no limit)."""
+    """The delays of the latest messages after their stamps (at most ``size`` of them; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)

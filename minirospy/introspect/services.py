@@ -53,7 +53,7 @@ class ServiceNode(NamedTuple):
 
 
 class ServiceOffer(NamedTuple):
-    """What the master knows of a service: the node that offers it, and where it is called."""
+    """A service's registration at the master: the node that offers it, and its URI."""
 
     node: str
     uri: str

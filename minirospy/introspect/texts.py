@@ -1,4 +1,4 @@
-"""What `rosnode info` and `rostopic info` print, as texts. Pure but for the addresses that are looked up in the graph."""
+"""The texts of `rosnode info` and `rostopic info`. Pure but for the addresses that are looked up in the graph."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with launch files, found without running them."""
+"""Errors of launch files, found without running them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What launch files need: nodes, files and packages, and what their package.xml does not name of it.
+"""The dependencies of launch files: nodes, files and packages, and those that package.xml does not name.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """
@@ -18,7 +18,7 @@ __all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
 
 
 class FileNeeds(NamedTuple):
-    """What one launch file needs: the (package, program) of its nodes, the files that it includes, all packages."""
+    """The dependencies of one launch file: the (package, program) of its nodes, the files that it includes, all packages."""
 
     nodes: tuple[tuple[str, str], ...]
     includes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""How a launch is run: what the options of `roslaunch` say."""
+"""The settings of a launch: the options of `roslaunch`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["RunOptions"]
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a spec is run.
+    """The options for running a spec.
 
     ``screen``, ``log``: where all output goes, in place of the file's settings; ``log_errors``: what nodes write to standard
     error goes to their log file, too. ``required``: every node is. ``local``: nodes of other machines are not run.

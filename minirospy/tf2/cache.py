@@ -1,4 +1,4 @@
-"""What a frame knows of its place: samples (stamp, parent, transform) in -> the sample at a time out.
+"""The history of a frame's transforms: samples (stamp, parent, transform) in -> the sample at a time out.
 
 Times are nanoseconds since the epoch; time 0 means the newest. Source: http://wiki.ros.org/tf2/Design.
 """

@@ -1,4 +1,4 @@
-"""What a robot consists of: frozen records, as http://wiki.ros.org/urdf/XML has them.
+"""The parts of a robot: frozen records, as http://wiki.ros.org/urdf/XML has them.
 
 Lengths are metres, angles radians, masses kilograms; a joint's position is metres where it is prismatic.
 """
@@ -41,7 +41,7 @@ Color = tuple[float, float, float, float]
 
 
 class JointType(Enum):
-    """How a joint moves; the value is that of its ``type`` attribute."""
+    """The kind of a joint; the value is that of its ``type`` attribute."""
 
     REVOLUTE = "revolute"
     CONTINUOUS = "continuous"
@@ -121,7 +121,7 @@ class Inertial(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """How far, how fast and how hard a joint may move."""
+    """The limits of a joint's position, velocity and effort."""
 
     lower: float
     upper: float

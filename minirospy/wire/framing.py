@@ -75,7 +75,7 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """What a message's ``serialize`` writes to: the bytes are joined once, and large ones never."""
+    """The target of a message's ``serialize``: the bytes are joined once, and large ones never."""
 
     __slots__ = ()
     write = list.append

@@ -145,7 +145,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """What was done for a package. ``made``: what was generated, as text; empty where nothing had changed."""
+    """The result of building a package. ``made``: the generated parts, as text; empty where nothing had changed."""
 
     plan: Plan
     made: str

@@ -1,4 +1,4 @@
-"""What a CMakeLists.txt comes to: its commands in, those that CMake would run out, with variables filled in.
+"""The evaluation of a CMakeLists.txt: its commands in, those that CMake would run out, with variables filled in.
 
 ``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are followed, and the
 commands that set variables; all other commands are passed on. An unset variable is empty, and false, as in CMake.
@@ -38,7 +38,7 @@ class Command(NamedTuple):
 
 
 class _Macro(NamedTuple):
-    """What ``macro()`` or ``function()`` defines, and the file where it does."""
+    """A definition by ``macro()`` or ``function()``, and its file."""
 
     parameters: list[str]
     body: tuple[Node, ...]

@@ -19,7 +19,7 @@ _NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_-]*$")
 
 
 class NewPackage(NamedTuple):
-    """What is known of a package before it exists."""
+    """The description of a package before it exists."""
 
     name: str
     depends: Sequence[str] = ()

@@ -1,4 +1,4 @@
-"""Where ROS keeps its own files, by the environment: ROS_HOME and the folders in it.
+"""The folders of ROS's own files, by the environment: ROS_HOME and the folders in it.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables.
 """

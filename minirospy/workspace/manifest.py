@@ -42,7 +42,7 @@ PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
 
 
 class Kind(Enum):
-    """What a dependency is for. The value is the tag of formats 2 and 3."""
+    """The purpose of a dependency. The value is the tag of formats 2 and 3."""
 
     BUILD = "build_depend"
     BUILD_EXPORT = "build_export_depend"
@@ -86,7 +86,7 @@ class Export(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What catkin would refuse, and the line where."""
+    """An error that catkin would report, and its line."""
 
     line: int
     text: str

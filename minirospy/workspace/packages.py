@@ -1,4 +1,4 @@
-"""Where ROS packages are, and what can be run in them.
+"""The folders of ROS packages, and their programs.
 
 ROS_PACKAGE_PATH comes first, then minirospy's own packages: so a workspace's package hides ours of the same
 name. Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.

@@ -1,4 +1,4 @@
-"""What a package requires of its build: package.xml and CMakeLists.txt in, a :class:`Plan` out.
+"""The build of a package as a plan: package.xml and CMakeLists.txt in, a :class:`Plan` out.
 
 Of CMake only the macros are read that matter to packages of Python. What needs a compiler is named in
 ``Plan.skipped``. Source: http://wiki.ros.org/catkin/CMakeLists.txt,

@@ -1,4 +1,4 @@
-"""What a package's setup.py names: Python packages, modules and scripts.
+"""The contents of a package's setup.py: Python packages, modules and scripts.
 
 The file is run, with a ``setup()`` that only listens: so it may compute what it likes, and needs neither setuptools
 nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.

@@ -1,4 +1,4 @@
-"""What is sourced: ``devel/setup.bash`` and its like, as texts. Pure.
+"""The files to source: ``devel/setup.bash`` and its like, as texts. Pure.
 
 The shells do all of it themselves, so that a new terminal waits for no Python. Sourcing one workspace's setup file
 takes the variables of the one before back, and puts those of the workspaces below it and its own in front.
@@ -18,7 +18,7 @@ SHELLS = ("bash", "zsh", "sh", "fish", "bat")
 
 
 class SetUp(NamedTuple):
-    """What the texts are made of.
+    """The data for the texts.
 
     ``prefix``: the devel or install folder; ``sources``: its folders of packages; ``parents``: the prefixes of the
     workspaces below it, the nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own

@@ -1,4 +1,4 @@
-"""What both ends of an action have in common in asyncio programs: the action's class, its topics and tasks."""
+"""The common part of both ends of an action in asyncio programs: the action's class, its topics and tasks."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """What an action's class has, as ``runningLedAction``: the classes of its goal, result and feedback."""
+    """The members of an action's class, as ``runningLedAction``: the classes of its goal, result and feedback."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
@@ -65,7 +65,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """What both ends have in common: their topics, and tasks that read them."""
+    """The common part of both ends: their topics, and tasks that read them."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)

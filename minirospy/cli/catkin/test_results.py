@@ -22,7 +22,7 @@ _SKIPPED = ("skip", "skipped", "disabled")
 
 
 class Counts(NamedTuple):
-    """How many tests, and how they went."""
+    """Numbers of tests, by their results."""
 
     tests: int = 0
     errors: int = 0

@@ -46,7 +46,7 @@ def catkin(argv: Sequence[str] | None = None) -> int:
 
 
 class _Settings(NamedTuple):
-    """What `catkin config` keeps for `catkin build`; None where it was not set."""
+    """The settings that `catkin config` saves for `catkin build`; None where not set."""
 
     install: bool | None = None
     blacklist: Sequence[str] | None = None

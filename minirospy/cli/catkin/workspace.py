@@ -1,4 +1,4 @@
-"""What catkin_make and catkin have in common: the folders of a workspace, building, installing, removing."""
+"""The common part of catkin_make and catkin: the folders of a workspace, building, installing, removing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What TAB offers: packages, files, launch arguments, what is in the graph, types, whole messages.
+"""The candidates of TAB: packages, files, launch arguments, what is in the graph, types, whole messages.
 
 A :class:`Place` comes in, candidates go out, unquoted; `complete` picks those that fit. Nothing of a graph is waited
 for longer than a person at the keyboard waits: without a master, or with one that is silent, there is nothing to offer.
@@ -41,7 +41,7 @@ _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Place(NamedTuple):
-    """Where the cursor is: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
+    """The cursor's place: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
 
     verb: str
     given: tuple[str, ...]

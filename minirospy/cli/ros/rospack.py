@@ -36,7 +36,7 @@ _FOOTER = """\
 
 
 class _RospackError(MinirospyError):
-    """What rospack refuses, in its words."""
+    """An error of rospack, in its words."""
 
 
 class _Line(NamedTuple):

@@ -34,7 +34,7 @@ _CLOCK_SECONDS = 1.0
 
 
 class Publishing(NamedTuple):
-    """What `rostopic pub` is given."""
+    """The arguments of `rostopic pub`."""
 
     topic: str
     type: str

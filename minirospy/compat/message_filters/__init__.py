@@ -29,7 +29,7 @@ _NO_HEADER = (
 
 
 class Input(Protocol):
-    """What a filter can be connected to."""
+    """An object that a filter can be connected to."""
 
     def registerCallback(self, cb: Callback, *args: object) -> object:
         """Call ``cb`` with each message, and ``args`` after it."""

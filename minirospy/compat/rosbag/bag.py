@@ -62,7 +62,7 @@ _CLOSED = "I/O operation on closed bag"
 
 
 class Compression:
-    """How the chunks of a bag are compressed."""
+    """The compression of the chunks of a bag."""
 
     NONE = compressions.NONE
     BZ2 = compressions.BZ2
@@ -75,7 +75,7 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[Any]):
-    """What a message's ``serialize`` writes to."""
+    """The buffer that a message's ``serialize`` writes to."""
 
     __slots__ = ()
     write = list.append

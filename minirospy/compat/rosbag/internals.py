@@ -1,4 +1,4 @@
-"""What rosbag.bag keeps of a bag: records as objects, which rqt_bag and programs read through private names."""
+"""The private parts of rosbag.bag: records as objects, which rqt_bag and programs read through private names."""
 
 from __future__ import annotations
 

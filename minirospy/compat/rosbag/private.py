@@ -49,7 +49,7 @@ class BagMessageWithConnectionHeader(NamedTuple):
 
 
 class PrivateBag(ABC):
-    """What rosbag.Bag has besides its public names."""
+    """The private names of rosbag.Bag."""
 
     @abstractmethod
     def _current(self) -> BagReader:

@@ -1,4 +1,4 @@
-"""What the environment says, under the words of rosgraph."""
+"""The environment's settings, under rosgraph's names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What programs know of launch files: the classes of roslaunch.core and roslaunch.config, over a LaunchSpec.
+"""Launch files as programs see them: the classes of roslaunch.core and roslaunch.config, over a LaunchSpec.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """

@@ -18,7 +18,7 @@ class RoslaunchDepsException(Exception):
 
 
 class RoslaunchDeps:
-    """What a launch file needs: ``nodes`` (package, program), ``includes`` (files), ``pkgs`` (packages)."""
+    """The dependencies of a launch file: ``nodes`` (package, program), ``includes`` (files), ``pkgs`` (packages)."""
 
     def __init__(
         self,

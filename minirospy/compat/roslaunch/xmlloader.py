@@ -19,7 +19,7 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """What launch files are loaded into: a ROSLaunchConfig."""
+    """The object that launch files are loaded into: a ROSLaunchConfig."""
 
     def add(self, spec: LaunchSpec) -> None:
         """Add the content of launch files."""

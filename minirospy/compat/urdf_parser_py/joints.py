@@ -50,7 +50,7 @@ class JointCalibration(Object):
 
 
 class JointLimit(Object):
-    """How far, how fast and how hard a joint may move."""
+    """The limits of a joint's position, velocity and effort."""
 
     TAG = "limit"
     FIELDS = (

@@ -1,4 +1,4 @@
-"""What is wrong with this machine's ROS, its network and its graph: an environment in, findings out.
+"""Checks of this machine's ROS, its network and its graph: an environment in, findings out.
 
 Source: http://wiki.ros.org/roswtf, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/Troubleshooting.
 """

@@ -1,4 +1,4 @@
-"""What a check says: one finding, one line."""
+"""The result of a check: one finding, one line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["Finding", "Status", "ok", "problem", "warning"]
 
 
 class Status(str, Enum):
-    """How a check ended. A warning may be just fine; a problem is one."""
+    """The result of a check. A warning may be harmless; a problem is not."""
 
     OK = "ok"
     WARNING = "warning"

@@ -47,7 +47,7 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class NodeAnswer:
-    """What a node says of itself; ``trouble`` where it says nothing."""
+    """The answers of a node to queries; ``trouble`` if it did not answer."""
 
     node: NodeAddress
     trouble: Trouble | None = None

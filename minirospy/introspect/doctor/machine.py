@@ -1,4 +1,4 @@
-"""What can be said of this machine without the network: Python, the variables, the packages.
+"""Checks of this machine without the network: Python, the variables, the packages.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/roswtf.
 """

@@ -1,4 +1,4 @@
-"""Whether an address can be reached from here, and if not, why: a host and a port in, a named fault out.
+"""Checks that an address can be reached: a host and a port in, a named fault out.
 
 Everything blocks its thread for a bounded time; :func:`in_parallel` makes many calls at the same time.
 """
@@ -81,7 +81,7 @@ class Trouble(NamedTuple):
 
 
 class MasterPlace(NamedTuple):
-    """Where ROS_MASTER_URI says that the master is, and the addresses of that host ([]: the name is not known)."""
+    """The master's place in ROS_MASTER_URI, and the addresses of that host ([]: the name is not known)."""
 
     host: str
     port: int

@@ -59,7 +59,7 @@ _Call: TypeAlias = tuple[str, tuple[object, ...]]
 
 
 class Registrations:
-    """What one node has registered with its master, and the calls of the master that this takes. On the loop."""
+    """The registrations of one node with its master, and the calls for them. On the loop."""
 
     def __init__(
         self,

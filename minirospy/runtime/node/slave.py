@@ -39,7 +39,7 @@ _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 
 
 class ServedNode(Protocol):
-    """What the Slave API needs of a node."""
+    """The part of a node that the Slave API uses."""
 
     environment: Environment
     name: str

@@ -66,7 +66,7 @@ _ANSWERS_AT_ONCE = 1
 
 
 class State(Enum):
-    """What a server does with one client."""
+    """The state of a server's connection to one client."""
 
     OPEN = "it is served"
     BUSY = "it requested much at once: nothing more is read from it before that is answered"

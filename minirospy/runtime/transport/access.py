@@ -1,4 +1,4 @@
-"""Who may connect: the networks of ``--allow`` and MINIROSPY_ALLOW."""
+"""Access control: the networks of ``--allow`` and MINIROSPY_ALLOW."""
 
 from __future__ import annotations
 

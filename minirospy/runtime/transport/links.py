@@ -330,7 +330,7 @@ class OutLink:
 
 
 class QueueSize(Protocol):
-    """How many frames a slow receiver gets; the number may change at any time."""
+    """The number of frames kept for a slow receiver; it may change at any time."""
 
     newest: int
 

@@ -11,7 +11,7 @@ __all__ = ["Registration", "ServiceManager", "TopicManager", "get_service_manage
 
 
 class Registration:
-    """What a node registers with the master."""
+    """A kind of registration with the master."""
 
     PUB = "pub"
     SUB = "sub"
