@@ -33,8 +33,8 @@ def _parser() -> Parser:
         about="Play back the contents of one or more bag files in a time-synchronized fashion.",
     )
     add = parser.add_argument
-    add("bagfiles", nargs="*", help="bags, or MCAP files", completer="files")
-    add("-p", "--prefix", default="", metavar="PREFIX", help="prefix all output topics")
+    add("bagfiles", nargs="*", help="bags, or MCAP files", completer="bag_files")
+    add("-p", "--prefix", default="", metavar="PREFIX", help="prefix all output topics", completer="nothing")
     add("-q", "--quiet", action="store_true", help="suppress console output")
     add("-i", "--immediate", action="store_true", help="play back all messages without waiting")
     add("--pause", action="store_true", help="start in paused mode")
@@ -64,10 +64,11 @@ def _parser() -> Parser:
     )
     for name, text in lists:
         metavar = "BAGS" if name == "--bags" else ""
-        add(name, nargs="*", default=[], action="extend", help=text, metavar=metavar)
+        completer = "bag_files" if name == "--bags" else "topics"
+        add(name, nargs="*", default=[], action="extend", help=text, metavar=metavar, completer=completer)
     add("--wait-for-subscribers", action="store_true",
         help="wait for at least one subscriber on each topic before publishing")  # fmt: skip
-    add("--rate-control-topic", default="", metavar="RATE_CONTROL_TOPIC",
+    add("--rate-control-topic", default="", metavar="RATE_CONTROL_TOPIC", completer="topics",
         help="watch the given topic, and if the last publish was more than <rate-control-max-delay> ago, wait until the "
         "topic publishes again to continue playback")  # fmt: skip
     add("--rate-control-max-delay", type=float, default=1.0, metavar="RATE_CONTROL_MAX_DELAY",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import Misuse, Parser, attach_completer
 from minirospy.cli.verbs import Command, Verb
 from minirospy.errors import BagCompressionError, ROSInterruptException, UsageError
 
@@ -37,10 +37,10 @@ def _parser() -> Parser:
     add("-a", "--all", action="store_true", help="record all topics")
     add("-e", "--regex", action="store_true", help="match topics using regular expressions")
     add("-p", "--publish", action="store_true", help="publish a msg when the record begin")
-    add("-x", "--exclude", default="", metavar="EXCLUDE_REGEX",
+    add("-x", "--exclude", default="", metavar="EXCLUDE_REGEX", completer="nothing",
         help="exclude topics matching the follow regular expression (subtracts from -a or regex)")  # fmt: skip
     add("-q", "--quiet", action="store_true", help="suppress console output")
-    add("-o", "--output-prefix", default="", metavar="PREFIX",
+    add("-o", "--output-prefix", default="", metavar="PREFIX", completer="nothing",
         help="prepend PREFIX to beginning of bag name (name will always end with date stamp)")  # fmt: skip
     add("-O", "--output-name", default="", metavar="NAME", help="record to bag with name NAME.bag",
         completer="files")  # fmt: skip
@@ -50,7 +50,7 @@ def _parser() -> Parser:
         "of files.")  # fmt: skip
     add("--size", type=int, default=None, metavar="SIZE",
         help="record a bag of maximum size SIZE MB. (Default: infinite)")  # fmt: skip
-    add("--duration", default="", metavar="DURATION",
+    add("--duration", default="", metavar="DURATION", completer="nothing",
         help="record a bag of maximum duration DURATION in seconds, unless 'm', or 'h' is appended.")  # fmt: skip
     add("-b", "--buffsize", type=int, default=256, metavar="SIZE",
         help="use an internal buffer of SIZE MB (Default: 256, 0 = infinite)")  # fmt: skip
@@ -69,12 +69,18 @@ def _parser() -> Parser:
         help="Repeat latched msgs at the start of each new bag file.")  # fmt: skip
 
     own = parser.own_options()
-    own.add_argument("-L", "--min-space", default="1G", metavar="SIZE",
-                     help="stop below this space on the disk (Default: 1G; G, M, k multipliers), as `rosrun rosbag "
-                     "record` of ROS")  # fmt: skip
-    own.add_argument(
+    space = own.add_argument(
+        "-L",
+        "--min-space",
+        default="1G",
+        metavar="SIZE",
+        help="stop below this space on the disk (Default: 1G; G, M, k multipliers), as `rosrun rosbag record` of ROS",
+    )
+    attach_completer(space, "nothing")
+    topic = own.add_argument(
         "--topic", action="append", default=[], metavar="TOPIC", help="a topic, as its name alone"
     )
+    attach_completer(topic, "topics")
     own.add_argument(
         "--mcap", action="store_true", help="record MCAP files (minirospy[mcap]) instead of bags"
     )
