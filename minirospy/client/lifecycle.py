@@ -9,7 +9,7 @@ import contextlib
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 from minirospy import errors
 from minirospy.client.deferral import Deferral, is_main_thread
@@ -102,19 +102,12 @@ class Lifecycle:
                 self._end()
         return True
 
-    @contextlib.contextmanager
-    def interrupting(self, interrupt: Callable[[], object]) -> Iterator[None]:
+    def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
         """While a block runs, have a shutdown call ``interrupt`` to end what blocks in it.
 
         A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
         """
-        self.interrupts.append(interrupt)
-        try:
-            if self.shutting_down.is_set():
-                interrupt()
-            yield
-        finally:
-            self.interrupts.remove(interrupt)
+        return _Interrupting(self.interrupts, interrupt, self.shutting_down)
 
     def spin(self) -> None:
         """Wait until the node shuts down."""
@@ -203,3 +196,24 @@ class Lifecycle:
         finally:
             self.machine.phase = Phase.LEFT
             self.left.set()
+
+
+class _Interrupting:
+    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
+
+    __slots__ = ("_down", "_interrupt", "_interrupts")
+
+    def __init__(
+        self, interrupts: list[Callable[[], object]], interrupt: Callable[[], object], down: threading.Event
+    ) -> None:
+        self._interrupts = interrupts
+        self._interrupt = interrupt
+        self._down = down
+
+    def __enter__(self) -> None:
+        self._interrupts.append(self._interrupt)
+        if self._down.is_set():
+            self._interrupt()
+
+    def __exit__(self, *_: object) -> None:
+        self._interrupts.remove(self._interrupt)

@@ -49,17 +49,19 @@ def serialize_failure(error: Exception) -> bytes:
 
 def parse_request_head(head: bytes) -> int:
     """Return the length of the body behind these :data:`REQUEST_HEAD` bytes. Raises WireError where it is over the limit."""
-    (length,) = _LENGTH.unpack(head)
-    return _checked(length)
+    length: int = _LENGTH.unpack(head)[0]
+    if length > MAX_FRAME:
+        raise _too_long(length)
+    return length
 
 
 def parse_response_head(head: bytes) -> tuple[bool, int]:
     """Return whether the call succeeded, and the length of what follows. Raises WireError where it is over the limit."""
     ok, length = _OK_LENGTH.unpack(head)
-    return bool(ok), _checked(length)
-
-
-def _checked(length: int) -> int:
     if length > MAX_FRAME:
-        raise WireError(f"a body of {length} bytes is over the limit of {MAX_FRAME}")
-    return length
+        raise _too_long(length)
+    return ok != 0, length
+
+
+def _too_long(length: int) -> WireError:
+    return WireError(f"a body of {length} bytes is over the limit of {MAX_FRAME}")
