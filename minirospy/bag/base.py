@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from typing import BinaryIO, NamedTuple
 
@@ -87,6 +88,10 @@ class BagReader(ABC):
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
         """Return the indexes of these connections, and read those that have not been read. Raise BagFormatError."""
+
+    def times(self, connections: Iterable[int]) -> list[array[int]]:
+        """Return the times of the messages of these connections, in arrays for the caller to keep. Raise BagFormatError."""
+        return [array("Q", index.times) for index in self.index(connections)]
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
         """Return the headers of the chunks by their positions. Raise BagFormatError."""

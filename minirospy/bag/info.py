@@ -24,7 +24,6 @@ __all__ = [
     "as_text",
     "as_yaml",
     "compression_of",
-    "frequency_of",
     "seconds",
     "summarize",
     "value_of",
@@ -32,6 +31,9 @@ __all__ = [
 
 _NUMPY_PAYS = 100_000
 """Times whose median numpy finds sooner than Python does, the import of numpy included."""
+
+_BLOCK = 1 << 16
+"""Times that numpy handles together."""
 
 
 class Topic(NamedTuple):
@@ -97,13 +99,17 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         types.setdefault(each.type, each.md5sum)
         by_topic.setdefault(each.topic, []).append(each)
 
+    times: dict[int, array[int]] = {}
+    if frequencies:
+        numbers = [each.id for each in connections]
+        times = dict(zip(numbers, reader.times(numbers), strict=True))
     topics = [
         Topic(
             name,
             of_topic[0].type,
             sum(counts[each.id] for each in of_topic),
             len(of_topic),
-            frequency_of(reader, of_topic) if frequencies else None,
+            _frequency([times.pop(each.id) for each in of_topic]) if frequencies else None,
         )
         for name, of_topic in sorted(by_topic.items())
     ]
@@ -129,13 +135,6 @@ def compression_of(reader: BagReader) -> list[Stored]:
             sums[at] += value
     stored = [Stored(name, *sums) for name, sums in found.items()]
     return sorted(stored, key=lambda each: (each.chunks, each.compression), reverse=True)
-
-
-def frequency_of(reader: BagReader, connections: Sequence[Connection]) -> float | None:
-    """Return the rate of a topic's messages in Hz: the inverse of the median of their periods, if that is positive."""
-    indexes = reader.index(each.id for each in connections)
-    median = _median_period([index.times for index in indexes])
-    return 1.0 / median if median is not None and median > 0.0 else None
 
 
 def seconds(nanoseconds: int) -> float:
@@ -237,26 +236,45 @@ def _printed(value: object) -> str:
     return "\n  ".join(f"{name}: {each}" for name, each in value.items())
 
 
-def _median_period(times: Sequence[array[int]]) -> float | None:
-    if sum(map(len, times)) > _NUMPY_PAYS:
-        import numpy as np
+def _frequency(times: list[array[int]]) -> float | None:
+    """Return the rate of a topic's messages in Hz: the inverse of the median of their periods, if that is positive."""
+    count = sum(map(len, times))
+    if count < 2:
+        return None
+    median = (_median_by_numpy if count > _NUMPY_PAYS else _median)(times)
+    return 1.0 / median if median > 0.0 else None
 
-        joined = np.sort(np.concatenate([np.frombuffer(each, np.uint64) for each in times if each]))
-        stamps = joined // 10**9 + (joined % 10**9) / 1e9
-        ordered = np.sort(np.diff(stamps))
-        middle = len(ordered) // 2
-        if len(ordered) % 2:
-            return float(ordered[middle])
-        return float(ordered[middle - 1] + ordered[middle]) / 2
 
+def _median(times: list[array[int]]) -> float:
     in_order = [seconds(each) for each in sorted(each for part in times for each in part)]
     periods = sorted(after - before for before, after in pairwise(in_order))
-    if not periods:
-        return None
+    middle = len(periods) // 2
+    return periods[middle] if len(periods) % 2 else (periods[middle - 1] + periods[middle]) / 2
+
+
+def _median_by_numpy(times: list[array[int]]) -> float:
+    """Return the same in the memory of the times themselves, which are overwritten."""
+    import numpy as np
+
+    joined = np.frombuffer(times[0], np.uint64)
+    if len(times) > 1:
+        joined = np.concatenate([np.frombuffer(each, np.uint64) for each in times if each])
+    joined.sort()
+    periods = joined.view(np.float64)
+    last = 0.0
+    for start in range(0, len(joined), _BLOCK):
+        block = joined[start : start + _BLOCK]
+        stamps = block // 10**9 + (block % 10**9) / 1e9
+        periods[start : start + _BLOCK] = np.diff(stamps, prepend=last)
+        last = float(stamps[-1])
+
+    periods = periods[1:]
     middle = len(periods) // 2
     if len(periods) % 2:
-        return periods[middle]
-    return (periods[middle - 1] + periods[middle]) / 2
+        periods.partition(middle)
+        return float(periods[middle])
+    periods.partition((middle - 1, middle))
+    return float(periods[middle - 1] + periods[middle]) / 2
 
 
 def _compressions(stored: Sequence[Stored]) -> str:

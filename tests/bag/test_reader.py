@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag1 import Reader as Oracle
 
+from minirospy.bag import info
 from minirospy.bag import reader as reading
 from minirospy.bag.base import BagReader, StoredMessage
 from minirospy.bag.compression import COMPRESSIONS
@@ -169,3 +170,19 @@ def test_two_types_and_two_publishers_on_a_topic_stay_apart() -> None:
     reader = opened(make_bag([[Given(number, number, b"") for number in range(3)]], given_connections))
 
     assert [each.connection for each in reader.messages()] == given_connections
+
+
+def test_rates_of_numpy_are_those_of_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    shuffled = random.Random(3)
+    for count in (2, 3, 10, 1001):
+        chunks = [
+            [Given(each % 2, shuffled.randrange(10**13), b"") for each in range(count)] for _ in range(2)
+        ]
+        names = [connection(0, "/a"), connection(1, "/a")]
+        texts = set()
+        for limit, block in ((10**9, 10), (1, 7), (1, 1 << 16)):
+            monkeypatch.setattr(info, "_NUMPY_PAYS", limit)
+            monkeypatch.setattr(info, "_BLOCK", block)
+            texts.add(info.as_yaml(info.summarize(opened(make_bag(chunks, names)), "a", frequencies=True)))
+        assert len(texts) == 1
+        assert "frequency:" in texts.pop()
