@@ -91,7 +91,7 @@ class MessageMigrator:
     Raise BagMigrationException if a rule is marked as not valid.
     """
 
-    def __init__(self, input_rule_files: Iterable[str] = (), plugins: bool = True) -> None:
+    def __init__(self, input_rule_files: Iterable[str] = [], plugins: bool = True) -> None:
         self.rulechains: defaultdict[str, RuleChain] = defaultdict(RuleChain)
         self.base_nodes: list[ScaffoldNode] = []
         self.extra_nodes: list[ScaffoldNode] = []

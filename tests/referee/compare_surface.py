@@ -77,6 +77,9 @@ AROUND = [
     "message_filters",
     "sensor_msgs.point_cloud2",
     "angles",
+    "rosbag",
+    "rosbag.bag",
+    "rosbag.migration",
 ]
 """The modules of the second page."""
 FRAMES = [
@@ -108,8 +111,9 @@ REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 OF_ROS = (
     "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
-    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters", "sensor_msgs", "angles",
-    "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions", "PyKDL",
+    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "rosbag", "message_filters", "sensor_msgs",
+    "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
+    "PyKDL",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
@@ -131,6 +135,7 @@ REASONS = {
     "ProtocolHandler": "rospy's inside of TCPROS",
     "TIMEOUT_READY": "not used by rospy itself",
     "python3": "a leftover of Python 2",
+    "ComparableMixin": "the inside of rosbag's index entries",
     **dict.fromkeys(
         (
             "argv_publish",

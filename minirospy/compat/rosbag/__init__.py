@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
+
 from minirospy.compat.rosbag.bag import (
     Bag,
     Compression,
@@ -10,4 +13,18 @@ from minirospy.compat.rosbag.bag import (
     ROSBagUnindexedException,
 )
 
-__all__ = ["Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException"]
+__all__ = [
+    "Bag",
+    "Compression",
+    "ROSBagException",
+    "ROSBagFormatException",
+    "ROSBagUnindexedException",
+    "rosbagmain",
+]
+
+
+def rosbagmain(argv: Sequence[str] | None = None) -> int:
+    """Run the command rosbag with ``argv``, whose first word is the program's name; return its exit status."""
+    from minirospy.cli.ros import rosbag
+
+    return rosbag.main((sys.argv if argv is None else argv)[1:])

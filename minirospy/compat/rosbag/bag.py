@@ -56,7 +56,11 @@ __all__ = [
     "ROSBagException",
     "ROSBagFormatException",
     "ROSBagUnindexedException",
+    "found_lz4",
 ]
+
+found_lz4 = True
+"""That LZ4 can be read and written, for programs that look."""
 
 _CLOSED = "I/O operation on closed bag"
 

@@ -22,16 +22,19 @@ __all__ = [
 class ROSBagException(Exception):
     """The root of rosbag's errors; ``value`` is the text."""
 
-    def __init__(self, value: str = "") -> None:
+    def __init__(self, value: str | None = None) -> None:
         super().__init__(value)
         self.value = value
 
     def __str__(self) -> str:
-        return self.value
+        return self.value or ""
 
 
 class ROSBagFormatException(ROSBagException):
     """A bag's bytes are not what the format prescribes."""
+
+    def __init__(self, value: str) -> None:
+        super().__init__(value)
 
 
 class ROSBagUnindexedException(ROSBagException):
@@ -44,9 +47,15 @@ class ROSBagUnindexedException(ROSBagException):
 class ROSBagEncryptNotSupportedException(ROSBagException):
     """A bag is encrypted, or should be: that is not supported."""
 
+    def __init__(self, value: str) -> None:
+        super().__init__(value)
+
 
 class ROSBagEncryptException(ROSBagException):
     """Encryption failed."""
+
+    def __init__(self, value: str) -> None:
+        super().__init__(value)
 
 
 @contextmanager

@@ -6,6 +6,9 @@ from minirospy.compat.rosbag import (
     ROSBagException,
     ROSBagFormatException,
     ROSBagUnindexedException,
+    rosbagmain,
 )
 
-__all__ = ["Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException"]
+__all__ = [
+    "Bag", "Compression", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException", "rosbagmain",
+]  # fmt: skip

@@ -10,10 +10,12 @@ from minirospy.compat.rosbag.bag import (
     ROSBagException,
     ROSBagFormatException,
     ROSBagUnindexedException,
+    found_lz4,
 )
 
 __all__ = [
     "Bag", "BagMessage", "BagMessageWithConnectionHeader", "Compression", "ROSBagEncryptException",
     "ROSBagEncryptNotSupportedException", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException",
+    "found_lz4",
 ]  # fmt: skip
 from minirospy.compat.rosbag.internals import _get_message_type as _get_message_type
