@@ -13,7 +13,8 @@ python3-tf2-ros python3-tf python3-tf2-geometry-msgs python3-tf2-sensor-msgs pyt
 tf2-tools tf-tools libtf2-dev libtf2-ros-dev
 catkin cmake ros-message-generation
 python3-rosbag python3-roslz4 rosbag
-g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev iproute2"
+g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev iproute2
+ros-robot-state-publisher joint-state-publisher liburdfdom-tools tf-tools tf2-tools python3-tf2-ros graphviz"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || missing="$missing $package"
