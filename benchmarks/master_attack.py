@@ -169,6 +169,7 @@ def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.
     environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     with open(Path(folder) / "master.out", "wb") as out:
         process = subprocess.Popen([*python, "-q", "-p", str(port)], env=environ, stdout=out, stderr=out)
+
     try:
         while True:
             with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
@@ -177,6 +178,7 @@ def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.
         yield process, port
     finally:
         process.send_signal(signal.SIGINT)
+
         try:
             process.wait(20)
         except subprocess.TimeoutExpired:
@@ -204,6 +206,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
             stack.callback(fleet.close)
         time.sleep(1.0)
         memory, peak, begin = psutil.Process(master.pid), 0.0, time.monotonic()
+
         if nodes:
             random.seed(1)
             parts = [stack.enter_context(_mix(names, port, seconds, number)) for number in range(4)]
@@ -212,6 +215,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
                 subprocess.Popen([sys.executable, __file__, "attack", name, str(port), str(seconds)])
                 for name in names
             ]
+
         while any(part.poll() is None for part in parts) and time.monotonic() < begin + seconds + 60:
             peak = max(peak, memory.memory_info().rss / MIB)
             time.sleep(0.02)
@@ -229,6 +233,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         if last < end:
             # The present call has no answer yet.
             worst, failed = max(worst, time.monotonic() - last - wait), failed + 1
+
         if fleet:
             _, _, wait, rounds, _ = fleet.since(0.0)
             alive = fleet.process.poll() is None
@@ -238,6 +243,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
             failed += not alive
         else:
             said = ""
+
         return Row(label, median, p99, worst, idle.since(begin)[2], peak, after, calls, failed), said
 
 
@@ -260,6 +266,7 @@ def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
     if seed == 0:
         silent_connections(Target(port, end))
         return
+
     while time.monotonic() < end:
         child = subprocess.Popen(
             [
@@ -271,6 +278,7 @@ def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
                 str(min(10.0, end - time.monotonic())),
             ]
         )
+
         try:
             child.wait(30)
         except subprocess.TimeoutExpired:
@@ -281,6 +289,7 @@ def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
 def main() -> int:
     """Run the benchmark; return its exit status."""
     _raise_file_limit()
+
     match sys.argv[1:]:
         case ["client", port]:
             run_client(int(port))
@@ -292,6 +301,7 @@ def main() -> int:
             run_attack(name, int(port), float(seconds))
         case ["mix", port, seconds, seed, names]:
             run_mix(int(port), float(seconds), int(seed), json.loads(names))
+
     parser = argparse.ArgumentParser(description="A master under attack: waits and memory.")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long each attack lasts (default: 5)")
     parser.add_argument("--only", default="", help="the attacks whose name contains this")
@@ -308,11 +318,13 @@ def main() -> int:
         print(f"{'attack':24} median ms    p99 ms  worst ms  control ms  peak MiB  after MiB  calls  failed")
     failed = 0
     runs = [("mixed", names)] if options.mixed else [(name, [name]) for name in names]
+
     for label, each in runs:
         row, said = measure(
             each, options.mixed or options.seconds, options.nodes if options.mixed else 0, label
         )
         failed += row.failed
+
         if options.json:
             print(json.dumps(row._asdict()), flush=True)
         else:
@@ -321,8 +333,10 @@ def main() -> int:
                 f"{row.control * 1e3:11.1f} {row.peak:9.0f} {row.after:10.0f} {row.calls:6} {row.failed:7}",
                 flush=True,
             )
+
         if said:
             print(said)
+
     return 1 if failed else 0
 
 

@@ -149,6 +149,7 @@ def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str],
             heard = [ear.said() for ear in ears]
             delivered = sum(ear["delivered"] for ear in heard)
             cpu = 1e6 * cost([*ears, mouth]) / max(1, delivered)
+
         if hz:
             late = sorted(us for ear in heard for us in ear["late_us"])
             return {
@@ -156,6 +157,7 @@ def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str],
                 f"{name} at {hz:g} Hz, p99 us": late[int(0.99 * (len(late) - 1))],
                 f"{name} at {hz:g} Hz, CPU us": cpu,
             }
+
         per_second = sum(ear["per_s"] for ear in heard)
         figures = {f"{name}, per second": per_second, f"{name}, CPU us": cpu}
         if kind in IMAGE_MB:
@@ -239,6 +241,7 @@ def plot(medians: dict[str, dict[str, float]]) -> str:
         'font-family="sans-serif" font-size="13">',
         f'<text x="{left}" y="16">times better than rospy</text>',
     ]
+
     for number, (name, value) in enumerate(bars):
         y = step * (number + 1)
         parts += [
@@ -246,6 +249,7 @@ def plot(medians: dict[str, dict[str, float]]) -> str:
             f'<rect x="{left}" y="{y + 2}" width="{width * value / most:.1f}" height="{step - 6}" fill="#3572a5"/>',
             f'<text x="{left + width * value / most + 6:.1f}" y="{y + 14}">{value:.1f}</text>',
         ]
+
     one = left + width / most
     parts.append(
         f'<line x1="{one:.1f}" x2="{one:.1f}" y1="{step}" y2="{step * (len(bars) + 1)}" stroke="#c33"/>'
@@ -271,12 +275,14 @@ def main() -> int:
     if unknown:
         parser.error(f"unknown cases {', '.join(unknown)}: they are {', '.join(CASES)}")
     rounds: dict[str, dict[str, list[float]]] = {stack: defaultdict(list) for stack in stacks}
+
     for number in range(options.rounds):
         for case in wanted:
             for stack in stacks:
                 print(f"round {number + 1}: {case}, {stack}", file=sys.stderr, flush=True)
                 for name, value in CASES[case](stack).items():
                     rounds[stack][name].append(value)
+
     medians = {
         stack: {name: statistics.median(values) for name, values in figures.items()}
         for stack, figures in rounds.items()

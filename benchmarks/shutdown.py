@@ -216,6 +216,7 @@ def main() -> int:
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     ghosts = []
+
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         with socket.create_server(("127.0.0.1", 0)) as probe:
@@ -231,8 +232,10 @@ def main() -> int:
         }
         file = write_package(folder, options.nodes)
         stack.enter_context(busy_loops(options.busy))
+
         try:
             master = stack.enter_context(running_master(dict(os.environ), is_real=options.real))
+
             for _ in range(options.rounds):
                 if options.launch or options.kill:
                     seconds, failed = round_of_launch(
@@ -240,12 +243,14 @@ def main() -> int:
                     )
                 else:
                     seconds, failed = round_of_forks(master, options.nodes)
+
                 ghosts.append(len(left(master)))
                 print(
                     f"{options.nodes} nodes, {seconds:6.2f} s, {failed} failed, {ghosts[-1]} left", flush=True
                 )
         except MinirospyError as error:
             raise SystemExit(f"the master: {error}") from error
+
     print(f"left: {min(ghosts)} to {max(ghosts)} of {options.nodes}, {options.rounds} rounds")
     return 1 if any(ghosts) else 0
 

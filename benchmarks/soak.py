@@ -143,13 +143,16 @@ def samples(
     """Churn for the given time, with samples."""
     start = time.monotonic()
     following = start
+
     while (now := time.monotonic()) < start + seconds:
         churn.step()
         if pause:
             time.sleep(pause)
+
         if now >= following:
             following += SAMPLE_SECONDS
             journal = sum(path.stat().st_size for path in (home / "master").glob("journal-*"))
+
             with program.oneshot():
                 yield Sample(
                     now - start,
@@ -173,11 +176,13 @@ def main() -> int:
     options = parser.parse_args()
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
+
     with tempfile.TemporaryDirectory() as folder:
         environ = {k: v for k, v in os.environ.items() if not k.startswith("ROS_")}
         environ |= {"ROS_HOME": folder, "ROS_LOG_DIR": folder, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
         command = [sys.executable, "-m", "minirospy.cli.ros.master", "-q", "-p", str(port)]
         master = subprocess.Popen(command, env=environ | {"ROS_IP": "127.0.0.1"})
+
         try:
             while True:
                 try:
@@ -186,6 +191,7 @@ def main() -> int:
                     break
                 except RpcError:
                     time.sleep(0.05)
+
             found = []
             program = psutil.Process(master.pid)
             for sample in samples(program, Path(folder), churn, 60 * options.minutes, options.pause):
@@ -194,6 +200,7 @@ def main() -> int:
         finally:
             master.send_signal(signal.SIGINT)
             master.wait(20)
+
     third = max(1, len(found) // 3)
     middle, end = found[third : 2 * third] or found, found[-third:]
     mb = [statistics.median(sample.mb for sample in part) for part in (middle, end)]

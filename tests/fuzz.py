@@ -224,16 +224,19 @@ def main() -> int:
     )
     parser.add_argument("finding", nargs="?", type=Path, help="an input to run again")
     options = parser.parse_args()
+
     if options.finding:
         target = Target()
         target(options.finding.read_bytes())
         target.close()
         return 0
+
     if not options.mutations:
         try:
             return with_atheris(options.minutes)
         except ImportError:
             print("atheris is not installed: mutations without coverage")
+
     return with_mutations(options.minutes)
 
 

@@ -157,6 +157,7 @@ def _untested(node: ast.AST) -> Iterator[ast.AST]:
             # What a class body holds is evaluated once, before there is a mutant.
             yield from (each for each in node.body if not isinstance(each, ast.FunctionDef))
             yield from (*node.bases, *node.decorator_list, *(each.value for each in node.keywords))
+
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
         yield from (*node.decorator_list, *node.args.defaults, *filter(None, node.args.kw_defaults))
         if node.returns:
@@ -197,6 +198,7 @@ def _faults(node: ast.AST) -> Iterator[tuple[str, Mutate]]:
         case ast.Break() | ast.Continue():
             other = ast.Continue if isinstance(node, ast.Break) else ast.Break
             yield "break and continue swapped", lambda node: other()
+
     if isinstance(node, ast.AugAssign):
         yield "statement removed", lambda node: ast.Pass()
 
@@ -432,6 +434,7 @@ class Mutants:
         tree = self._trees[mutant.module][1]
         statement: ast.AST = tree
         inside = None
+
         while True:
             children = [
                 each
@@ -444,6 +447,7 @@ class Mutants:
             statement = within[0]
             if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
                 inside = statement
+
         if inside is None:
             found = {
                 index
@@ -463,6 +467,7 @@ class Mutants:
                 for line in range(first, last + 1)
                 for index in self._lines.get((mutant.module, line), ())
             }
+
         return sorted(found, key=self._seconds.__getitem__)
 
     def _child(
@@ -474,6 +479,7 @@ class Mutants:
     ) -> None:
         """Run the tests with the fault in place; exit with 1 as soon as one fails."""
         status = 1
+
         try:
             nowhere = os.open(os.devnull, os.O_RDWR)
             for stream in (0, 1, 2):
@@ -484,6 +490,7 @@ class Mutants:
             if not install(mutant, tree, path, functions[mutant.module]):
                 status = _IMPOSSIBLE
                 return
+
             for index in tests:
                 item = session.items[index]
                 item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)

@@ -537,12 +537,14 @@ def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture)
             with pytest.raises(ServiceException, match=r"^service \[/s\] unavailable$"):
                 await b.call("/s", SetBool, True)
             await a.serve("/s", SetBool, fails)
+
             for name, arguments, error in (
                 ("/s", (True,), r"responded with an error: b'error processing request: bad thing'"),
                 ("/s", (False,), r"b'service cannot process request: service handler returned None'"),
             ):
                 with pytest.raises(ServiceException, match=error):
                     await b.call(name, SetBool, *arguments)
+
             with pytest.raises(ServiceException, match=r"remote error reported: .*md5sums do not match"):
                 await b.call("/s", Trigger)
             with pytest.raises(TypeError):
@@ -749,6 +751,7 @@ def test_simulated_time(master: str) -> None:
         async with Node("clock") as clock:
             await clock.set_param("/use_sim_time", True)
             ticks = clock.advertise("/clock", Clock, latch=True)
+
             async with Node("n") as node:
                 assert node.now() == Time()
                 await ticks.wait_for_subscribers()
@@ -757,6 +760,7 @@ def test_simulated_time(master: str) -> None:
                 sleeping = asyncio.ensure_future(node.sleep(5))
                 await ticks.publish(Time(14))
                 await until(lambda: node.now() == Time(14))
+
                 assert not sleeping.done()
                 await ticks.publish(Time(15))
                 await sleeping
@@ -813,6 +817,7 @@ def test_aio_node_and_rospy_node_exchange_messages(master: str) -> None:
         assert peer.stdin
         assert peer.stdout
         assert await peer.stdout.readline() == b"ready\n"
+
         async with Node("aio") as node:
             await node.serve("/aio_flag", SetBool, set_flag)
             publisher = node.advertise("/to_peer", String)
@@ -825,6 +830,7 @@ def test_aio_node_and_rospy_node_exchange_messages(master: str) -> None:
             assert (await node.call("/peer_flag", SetBool, True)).message == "peer"
             peer.stdin.write(b"call\n")
             assert await peer.stdout.readline() == b"flag: True\n"
+
         peer.stdin.close()
         assert await peer.wait() == 0
 

@@ -106,9 +106,11 @@ def test_player_types_commands_and_compares_output(page: str, printed: str | Non
     file = tmp_path / "page.md"
     file.write_text(f"```console\n{page}```\n")
     player = record.Player(tmp_path, {})
+
     if printed is None:
         player.play(file)
         return
+
     with pytest.raises(record.CourseError) as error:
         player.play(file)
     assert printed in str(error.value)

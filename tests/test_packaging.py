@@ -52,6 +52,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         str(source),
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
+
     assert done.returncode == 0, done.stdout + done.stderr
     (found,) = target.glob("*.whl")
     return found
@@ -62,6 +63,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     assert wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
+
     for name in (
         "minirospy_overlay.pth",
         "minirospy/py.typed",
@@ -77,6 +79,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/workspace/shell/ros.bat",
     ):
         assert name in names
+
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
 
 
@@ -95,10 +98,12 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
         text=True,
         check=False,
     )
+
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0] == str(site / "minirospy" / "__init__.py")
     assert lines[1] == "90c7ef2dc6895d81024acba2ac42f369 09fb03525b03e7ea1fd3992bafd87e16"
+
     share = site / "minirospy" / "share"
     assert [Path(line) for line in lines[2:]] == [
         share / "msgs" / "std_msgs",

@@ -135,6 +135,7 @@ def test_journal_follows_no_link(
     journal.append("set", "/p", 1)
     journal.touch()
     journal.remove()
+
     assert mine.read_text() == "precious"
     # A symbolic link is not read either. The content of a hard link is its own.
     assert left
@@ -219,10 +220,12 @@ def test_roscore_follows_no_links_in_its_folder(
     )
     assert core.stdout
     said = ""
+
     for line in core.stdout:
         said += line
         if "Ctrl-C" in line:
             break
+
     core.send_signal(signal.SIGTERM)
     said += core.communicate(timeout=30)[0]
     assert core.returncode == 0

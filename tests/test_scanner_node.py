@@ -66,15 +66,18 @@ def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
                 await until_paths_are(node, PROTECTIVE)
                 await until_person_is(board, (0.3, 0.0))
                 answer = await node.call("move_person", MovePerson, True, 2.0, -1.0)
+
                 assert (answer.success, answer.message) == (True, "the person is at x 2.00 m, y -1.00 m")
                 await until_paths_are(node, FREE)
                 answer = await node.call("move_person", MovePerson, True, 50.0, 0.0)
+
                 assert (answer.success, answer.message) == (
                     False,
                     "x and y are metres, within 40 m of the scanner",
                 )
                 await until_person_is(board, (2.0, -1.0))
                 assert (await node.call("move_person", MovePerson, present=False)).success
+
                 await until_person_is(board, None)
                 await node.publish("person", Point(x=0.3))
                 await until_paths_are(node, PROTECTIVE)
@@ -93,6 +96,7 @@ def test_raw_data_match_the_scan(scanner: subprocess.Popen[str]) -> None:
                 await until_paths_are(node, PROTECTIVE)
                 raw = await node.wait_for_message("raw_data", RawMicroScanDataMsg)
                 scan = await node.wait_for_message("scan", LaserScan)
+
         values, points = raw.derived_values, raw.measurement_data.scan_points
         assert raw.measurement_data.number_of_beams == values.number_of_beams == len(points) == BEAMS
         assert math.radians(values.start_angle) == pytest.approx(scan.angle_min)

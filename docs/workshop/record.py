@@ -95,6 +95,7 @@ def steps(page: Path) -> list[Step]:
     found: list[Step] = []
     lines = iter(enumerate(page.read_text(encoding="utf-8").splitlines(), 1))
     before = ""
+
     for number, line in lines:
         if not line.startswith("```"):
             before = line.strip() or before
@@ -109,6 +110,7 @@ def steps(page: Path) -> list[Step]:
         elif name := re.search(r"`(~/[^`]+)`:$", before):
             found.append(Step(f"{page.name}:{number}", path=name[1], text="\n".join(block) + "\n"))
         before = ""
+
     return found
 
 
@@ -116,8 +118,10 @@ def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
     """Return the steps of a ```console block that starts in this line."""
     terminal = 1
     open_steps: list[Step] = []
+
     for at, line in enumerate(block, number + 1):
         typed = shown = None
+
         if command := re.fullmatch(r"(?:terminal (\d))?\$ (.+)", line):
             terminal, shown = int(command[1] or 1), line
             typed = command[2] + "\n"
@@ -125,6 +129,7 @@ def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
             terminal, shown, typed = int(look[1]), line, ""
         elif key := re.fullmatch(r"<(Ctrl-C|.)>", line):
             shown, typed = line, KEYS.get(key[1], key[1])
+
         if typed is None:
             if not open_steps:
                 raise CourseError(f"{page}:{at}: a block starts with a command")
@@ -133,6 +138,7 @@ def _console(page: str, number: int, block: list[str]) -> Iterator[Step]:
         else:
             assert shown is not None
             open_steps.append(Step(f"{page}:{at}", terminal=terminal, shown=shown, typed=typed))
+
     following: list[Step | None] = [*open_steps[1:], None]
     for step, after in zip(open_steps, following, strict=True):
         key_follows = after is not None and after.terminal == step.terminal and after.shown.startswith("<")
@@ -270,15 +276,19 @@ class Player:
             self._terminals[step.terminal] = Terminal(self._environment)
             self._wait(Step(step.place, terminal=step.terminal, shown="(a new terminal)"), deadline)
         terminal = self._terminals[step.terminal]
+
         if step.typed and terminal.is_busy:
             printed, has_ended = terminal.printed()
             if has_ended:
                 raise self._error(step, "the program before has ended, and printed", self._shown(printed))
             if step.typed.endswith("\n"):
                 raise CourseError(f"{step.place}: a program still runs in terminal {step.terminal}")
+
         looked: CourseError | None = None
+
         while True:
             terminal.type(self._real(step.typed))
+
             try:
                 printed = self._wait(step, deadline)
                 break
@@ -286,6 +296,7 @@ class Player:
                 if terminal.is_busy or not LOOKS.search(step.typed) or time.monotonic() > deadline:
                     raise (looked or error) from None
                 looked = error
+
         self.record.append(f"{step.shown}\n{printed}" + ("...\n" if step.answer[-1:] == ("...",) else ""))
 
     def _wait(self, step: Step, deadline: float) -> str:
@@ -296,6 +307,7 @@ class Player:
             step.answer[:-1] if leaves else step.answer,
             skip=terminal.skips and not step.typed.endswith("\n"),
         )
+
         while True:
             printed, has_ended = terminal.printed()
             text = "".join(self._shown(printed).splitlines(keepends=True)[terminal.seen :])
@@ -305,11 +317,13 @@ class Player:
                 terminal.finish()
                 if "Traceback (most recent call last)" in text and "Traceback" not in "".join(step.answer):
                     raise self._error(step, "prints a traceback", text)
+
             if found and (step.goes_on or has_ended):
                 count = found[0].count("\n")
                 terminal.seen += 0 if has_ended else count
                 terminal.skips = leaves or (terminal.skips and not step.answer)
                 return "".join(text.splitlines(keepends=True)[:count])
+
             if has_ended:
                 raise self._error(step, "prints", text)
             if not self._read(deadline):

@@ -75,10 +75,12 @@ def ask_server(server: subprocess.Popen[str], answers: str, *words: str, until: 
     process.stdin.write(answers)
     process.stdin.flush()
     said = ""
+
     while until not in said:
         line = process.stdout.readline()
         assert line, said + process.communicate(timeout=30)[1]
         said += line
+
     server.stdin.write("succeed\n")
     server.stdin.flush()
     rest, errors = process.communicate(timeout=30)
@@ -139,17 +141,21 @@ def test_a_person_serves(master: str) -> None:
     assert process.stdin
     assert process.stdout
     assert process.stdout.readline() == "Serving /ask (actionlib/TestAction)\n"
+
     process.stdin.write("s\n7\nwell done\n")
     process.stdin.flush()
     said, _, status = ask("", "/ask", "{goal: 5}")
+
     assert said.endswith("Succeeded: well done\nresult: 7\n")
     assert status == 0
     process.stdin.close()
     # The next goal finds nobody to answer it.
     said, _, status = ask("", "/ask", "{goal: 6}")
+
     assert "Aborted: the person who answered has left\n" in said
     assert process.wait(30) == 0
     assert "Goal:\ngoal: 5\n" in process.stdout.read()
+
     process.stdout.close()
     assert process.stderr
     process.stderr.close()

@@ -51,6 +51,7 @@ def robot(master: str) -> Iterator[Robot]:
     heard: list[bytes] = []
     node = Node("/robot", Environment.read(), on_shutdown=stopped.append)
     loop.run(node.start())
+
     try:
         for topic, cls in (("/button_state", Bool), ("/ns/chatter", String), ("/poly", PolygonStamped)):
             type_ = InterfaceType(cls._type, cls._md5sum, cls._full_text)
@@ -60,6 +61,7 @@ def robot(master: str) -> Iterator[Robot]:
         loop.run(node.subscribe(subscription))
         anything = node.make_subscription("/any", InterfaceType(ANY, ANY), lambda *_: None)
         loop.run(node.subscribe(anything))
+
         for name, srv, handler in (
             ("/set_led_state", SetBool, _set_led_state),
             ("/fail", Trigger, _fail),
@@ -72,6 +74,7 @@ def robot(master: str) -> Iterator[Robot]:
                 response_type=srv._response_class._type,
             )
             loop.run(node.serve(server))
+
         robot = Robot(node, loop, heard, stopped)
         robot.publish("/button_state", Bool(True))
         robot.publish("/ns/chatter", String("hello"))

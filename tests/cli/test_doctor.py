@@ -51,6 +51,7 @@ def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
     status, out, err = command("doctor")
     assert (status, err) == (0, "")
     checks = [line.split(":")[0] for line in out.splitlines()]
+
     assert checks == [
         "ok      python",
         "ok      variables",
@@ -75,6 +76,7 @@ def test_nodes_that_are_dead_nowhere_or_others(
     robot: Any, master: str, closed_port: int, command: Any
 ) -> None:
     proxy = MasterProxy(master, "/")
+
     for name, uri in (
         ("/dead", f"http://localhost:{closed_port}/"),
         ("/dead_too", f"http://localhost:{closed_port}/"),
@@ -83,6 +85,7 @@ def test_nodes_that_are_dead_nowhere_or_others(
     ):
         proxy.caller_id = name
         proxy.register_publisher("/boo", "std_msgs/Bool", uri)
+
     proxy.close()
     status, out, _ = command("doctor")
     assert status == 1

@@ -35,7 +35,9 @@ def started(*command: str, until: str, **environ: str) -> Iterator[tuple[subproc
         env={**os.environ, **environ},
     )
     assert process.stdout
+
     printed = ""
+
     try:
         for line in process.stdout:
             printed += line

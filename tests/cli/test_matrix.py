@@ -177,6 +177,7 @@ def run(line: str, **streams: Any) -> Result:
     before = {name: getattr(sys, name) for name in put}
     for name, stream in put.items():
         setattr(sys, name, stream)
+
     try:
         status = main(words[1:])
     except SystemExit as ended:
@@ -186,6 +187,7 @@ def run(line: str, **streams: Any) -> Result:
             if getattr(sys, name) is not put[name]:
                 getattr(sys, name).close()  # the command's own, in the place of one that was closed
             setattr(sys, name, stream)
+
     return Result(
         status,
         *(put[name].getvalue() if isinstance(put[name], Told) else "" for name in ("stdout", "stderr")),
@@ -235,11 +237,13 @@ def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
     log = InterfaceType(Log._type, Log._md5sum, Log._full_text)
     robot.loop.run(robot.node.advertise(Publication("/rosout", log, latch=True)))
     robot.publish("/rosout", Log(level=Log.ERROR, name="/robot", msg="it hurts"))
+
     with contextlib.closing(MasterProxy(master, "/ghost")) as ghost:
         ghost.register_publisher("/boo", "std_msgs/Bool", "http://localhost:1/")
         for service in ("/haunt", "/ghost/get_loggers"):
             ghost.register_service(service, "rosrpc://localhost:1", "http://localhost:1/")
         ghost.set_param("/text", "日本")
+
     monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.02)
     return robot
 
@@ -301,6 +305,7 @@ def test_a_missing_argument(lines: list[str]) -> None:
         usage = run(f"{line} -h").out.partition("\n\n")[0].partition(line)[2]
         while "[" in usage:
             usage = re.sub(r"\[[^][]*\](\.\.\.)?", "", usage)
+
         # What ROS's usage does not have in brackets, though it may be left out.
         if usage.split() and line not in (
             "minirospy",
@@ -380,10 +385,12 @@ def test_no_master(uri: str, status: int, says: str, monkeypatch: pytest.MonkeyP
     if "invalid" in uri:
         # Asked of the network, this takes seconds where there is none.
         monkeypatch.setattr(socket, "getaddrinfo", _no_such_host)
+
     for line in GRAPH:
         result = run(f"{line} {ROWS[line].good or ROWS[line].unknown}")
         assert result.status == (2 if line.startswith("rosservice") else status), line
         ros_output = {"rosnode ping": "rosnode: node is [/robot]\n", "rosnode info": RULE}
+
         assert result.out == (ros_output.get(line, "") if status == 1 else ""), line
         said = one_line(result, line)
         assert uri in said

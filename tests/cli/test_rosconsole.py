@@ -98,15 +98,18 @@ def test_echo(
     words = ["rosconsole", "echo", "--nocolor", "-1"]
     echoes = [program(words), program([*words, "/other"]), program([*words, "-l", "info", "/talk"])]
     assert talker.stdin
+
     # Until both listen: what is logged before is theirs to miss.
     while any(echo.poll() is None for echo in (echoes[0], echoes[2])):
         talker.stdin.write("quiet\n!loud\n")
         talker.stdin.flush()
+
         for echo in (echoes[0], echoes[2]):
             try:
                 echo.wait(0.2)
             except subprocess.TimeoutExpired:
                 break
+
     assert echoes[0].stdout
     assert echoes[2].stdout
     assert echoes[0].stdout.read() == "[ ERROR ] [\033[1m/talker\033[21m]: !loud\n"

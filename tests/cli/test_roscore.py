@@ -139,6 +139,7 @@ def test_folders_that_cannot_be_created_are_reported(
     core = start()
     master = proxy()
     run_id = master.get_param("/run_id")
+
     assert (
         f"WARNING: cannot write logs to {tmp_path}/file/log/{run_id}: Not a directory; set ROS_LOG_DIR\n"
         in core.said
@@ -148,10 +149,12 @@ def test_folders_that_cannot_be_created_are_reported(
     assert " cannot be written: Not a directory; set ROS_HOME (it is tried again every 30 s)\n" in core.said
     assert "Errno" not in core.said
     assert f"setting /run_id to {run_id}\n" in core.said
+
     # The /rosout node receives what is logged, and runs without its file.
     monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
+
     assert core.end() == "master stopped\n"
 
 
@@ -195,6 +198,7 @@ def test_log_folder(start: Start) -> None:
     master.call("unsubscribeParam", "http://127.0.0.1:1/", "/p")
     master.close()
     core.end()
+
     # There from the start, for `tail -f`; with the first lines of real rosout.
     assert re.fullmatch(r"\n\n[0-9]+\.[0-9]{9}  Node Startup\n", (folder / "rosout.log").read_text())
     log = (folder / "master.log").read_text()

@@ -106,6 +106,7 @@ def test_ping(robot: Any, command: Any, program: Start, monkeypatch: pytest.Monk
     uri = re.escape(robot.node.uri)
     status, out, err = command("rosnode", "ping", "-c", "1", "robot")
     assert "average" not in out
+
     monkeypatch.setattr("minirospy.cli.ros.rosnode.time.sleep", lambda _: None)
     status, out, err = command("rosnode", "ping", "-c", "2", "robot")
     assert (status, err) == (0, "")
@@ -114,12 +115,14 @@ def test_ping(robot: Any, command: Any, program: Start, monkeypatch: pytest.Monk
         rf"(xmlrpc reply from {uri}\ttime=\d+\.\d{{6}}ms\n){{2}}ping average: \d+\.\d{{6}}ms\n",
         out,
     )
+
     ping = program(["rosnode", "ping", "/robot"])
     assert ping.stdout is not None
     while not ping.stdout.readline().startswith("xmlrpc reply"):
         pass
     ping.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
     out, err = ping.communicate(timeout=30)
+
     assert (ping.returncode, err) == (0, "")
     assert "ping average: " in out
 

@@ -78,10 +78,12 @@ def test_files(master: str, command: Any, tmp_path: Path, monkeypatch: pytest.Mo
     assert Path("out.yaml").read_text() == "a: 1\ninner:\n  b: 3.141592653589793\n"
     assert command("rosparam", "dump", "-", "/ns").out == "a: 1\ninner:\n  b: 3.141592653589793\n"
     assert "ns:\n  a: 1\n" in command("rosparam", "dump").out
+
     monkeypatch.setattr(sys, "stdin", io.StringIO("x: 3\n"))
     assert command("rosparam", "load", "-v", "-", "/std").out == "reading parameters from stdin\n/std/x=3\n"
     Path("text").write_bytes(b"hello\n")
     command("rosparam", "set", "-t", "text", "/text")
+
     assert command("rosparam", "get", "/text").out == "'hello\n\n  '\n\n"
     command("rosparam", "set", "-b", "text", "/bytes")
     assert command("rosparam", "get", "/bytes").out == "!!binary |\n  aGVsbG8K\n\n"
@@ -122,6 +124,7 @@ def test_what_cannot_be(
     Path("five.yaml").write_text("5\n")
     command("rosparam", "set", "/name", "x")
     result = command("rosparam", *argv)
+
     assert (result.status, result.out) == (status, "")
     assert why in result.err
     assert len(own_lines(result.err)) == 1

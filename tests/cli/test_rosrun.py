@@ -169,12 +169,14 @@ def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None
     for word in ("talker.py", "my/talker.py"):
         assert fails(capsys, word) == (2, "type rosrun PACKAGE EXECUTABLE, as `rosrun my talker.py`")
     assert fails(capsys, "nowhere.py")[1].startswith("package [nowhere.py] not found")
+
     # Where no name is near, those that there are; a path is one below the package.
     for wrong in ("zzz", "/etc/passwd"):
         status, said = fails(capsys, "my", wrong)
         assert status == 3
         assert said.startswith(f"executable [{wrong}] not found: package [my] in {package} has dies, ")
         assert "talker.py" in said
+
     (package.parent / "none").mkdir()
     (package.parent / "none" / "package.xml").write_text("<package><name>none</name></package>")
     assert fails(capsys, "none", "x")[1].endswith("/none has no programs")
@@ -190,6 +192,7 @@ def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None
 def test_python_file_that_ros_refuses_runs_with_a_warning(package: Path) -> None:
     path = package / "scripts" / "talker.py"
     run_ = "print('runs')\n"
+
     for text, mode, why in (
         (
             f"#!/usr/bin/env python3\n{run_}",

@@ -390,6 +390,7 @@ def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
     now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
     # A node goes by /clock and listens to it with one subscription.
     clock = program(["rostopic", "echo", "-n1", "/clock"])
+
     assert clock.communicate(timeout=30)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
     out, err = row.communicate(timeout=30)
     # The message may have come before the clock's.

@@ -198,18 +198,22 @@ def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
     )
     launch = start(started, "roslaunch", "pkg", "two.launch", "n:=5")
     said = read_until(launch, "waiting -x")
+
     assert "auto-starting new master\nprocess[master]: started with pid [" in said
     assert "PARAMETERS\n * /p: 5\n" in said
     assert "  /deep/\n    two (pkg/wait.py)\n" in said
     assert "waiting -x a:=b __name:=one __log:=" in said
+
     if "process[deep/two-3]" not in said:
         read_until(launch, "process[deep/two-3]: started with pid [")
     proxy = MasterProxy(f"http://localhost:{port}", "/test")
     assert proxy.get_param("/p") == 5
+
     proxy.close()
     children = psutil.Process(launch.pid).children(recursive=True)
     # The master, both nodes, and what would end them if roslaunch were killed.
     assert len(children) == 4
+
     launch.send_signal(signal.SIGINT)
     output, _ = launch.communicate(timeout=30)
     assert launch.returncode == 0
@@ -220,6 +224,7 @@ def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
         "... shutting down processing monitor complete",
         "done",
     ]
+
     _, left = psutil.wait_procs(children, timeout=30)
     assert not left
     assert list(Path(os.environ["ROS_LOG_DIR"]).glob("*/deep-two-3-stdout.log"))

@@ -64,6 +64,7 @@ def test_error_begins_with_ros_words(
     name, *words = line.split()
     assert import_module(f"minirospy.cli.ros.{name}").main(words) == status
     ros, own = capsys.readouterr().err.partition(f"{name}: ERROR: ")[::2]
+
     assert ros == text
     assert own
 

@@ -344,10 +344,12 @@ finally:
 """
     process = start(script)
     process.send_signal(signal.SIGTERM)
+
     assert read_line(process) == "cleans\n"
     process.send_signal(signal.SIGTERM)
     assert read_line(process) == "KeyboardInterrupt\n"
     assert read_line(process) == "cleans\n"
+
     process.send_signal(signal.SIGTERM)
     output, _ = process.communicate(timeout=GUARD)
     assert (process.returncode, output) == (130, "")
@@ -391,6 +393,7 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
         process = start(LEAVES.format(body))
         stop()
         process.send_signal(signal.SIGINT)
+
         assert process.stderr
         assert process.stderr.readline() == (
             "shutdown: still waiting for the master to unregister this node. "
@@ -399,6 +402,7 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
         start_time = time.monotonic()
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=GUARD)
+
         assert (process.returncode, output.splitlines()[-1], errors) == (0, "finally", "")
         # Ten seconds is the limit for a master that is silent.
         assert time.monotonic() - start_time < 7.0
@@ -887,6 +891,7 @@ os.kill(child, signal.SIGTERM)
 print("ended with", os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), rospy.is_shutdown())
 """)
     out, _ = process.communicate("now\n", timeout=GUARD)
+
     assert out.splitlines() == ["the child's hook", "[True, False]", "ended with 7 False"]
 
 

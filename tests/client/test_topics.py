@@ -388,9 +388,11 @@ while publisher.get_num_connections():
 publisher.publish("to nobody")
 print("alone", flush=True)
 """)
+
     assert line(talker) == "connected"
     listener.kill()
     output, errors = talker.communicate("go\n", timeout=30)
+
     assert (output, talker.returncode) == ("alone\n", 0)
     # Python 3.13 shows the line too.
     (warning,) = [text for text in errors.splitlines() if not text.startswith(" ")]

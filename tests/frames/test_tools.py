@@ -141,6 +141,7 @@ def test_frames_are_drawn(
     assert program.returncode == 0, errors
     graph = Path("frames.gv").read_text(encoding="utf-8")
     assert re.search(r'"b" -> "c"\[label=" ?Broadcaster: /fixed\\nAverage rate: 10000.0', graph)
+
     if has_dot:
         assert Path("frames.pdf").read_bytes().startswith(b"%PDF")
     else:
@@ -148,6 +149,7 @@ def test_frames_are_drawn(
             each.text for each in ElementTree.parse("frames.svg").iter("{http://www.w3.org/2000/svg}text")
         }
         assert {"a", "b", "c", "Broadcaster: /moving"} <= texts
+
     if tool[0] == "tf":
         assert output.startswith("Listening to /tf for 5.0 seconds\nDone Listening\n")
 

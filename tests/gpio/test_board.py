@@ -125,9 +125,11 @@ def test_many_start_one_server() -> None:
         thread.start()
     for thread in threads:
         thread.join(30)
+
     for child in children:
         assert child.stdout is not None
         assert child.stdout.readline().startswith("test-")
+
     assert len(opened) == 4
     opened[0].press(11)
     edges = opened[1].watch([12], timeout=40)
@@ -138,9 +140,11 @@ def test_many_start_one_server() -> None:
     while len(servers(Place.find())) > 1 and time.monotonic() < deadline:
         time.sleep(0.02)
     assert len(servers(Place.find())) == 1
+
     for child in children:
         child.communicate("\n", timeout=30)
         assert child.returncode == 0
+
     for board in opened:
         board.close()
 

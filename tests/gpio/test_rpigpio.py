@@ -429,6 +429,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     wave.start()
     several = [next(edges) for _ in range(11)]
     high = [after.time - edge.time for edge, after in itertools.pairwise(several) if edge.level]
+
     assert sorted(high)[len(high) // 2] == pytest.approx(0.015, abs=0.008)
     wave.set(duty=100)
     deadline = time.monotonic() + 30
@@ -436,6 +437,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
         next(edges)
     wave.stop()
     _synchronize(bcm, board)
+
     assert heard(board, 7) == 0
     assert bcm.output_pin(7) == 7
 

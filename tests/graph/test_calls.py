@@ -101,13 +101,16 @@ def test_a_multicall_yields_between_its_calls() -> None:
     ]
     steps = DISPATCHER.dispatch("system.multicall", [calls])
     taken = 0
+
     while True:
         try:
             next(steps)
         except StopIteration as end:
             answers = end.value
             break
+
         taken += 1
+
     assert taken == len(calls) + 2
     assert answers == [
         [[1, "/n", ["/t", "http://default:1/"]]],

@@ -384,6 +384,7 @@ def test_arguments_are_named_as_by_rosmaster(master: Recorded) -> None:
         assert master.call(method, "/n", *args)[1] == f"ERROR: parameter [{name}] is not an XMLRPC URI"
     for method in ("getParam", "hasParam", "deleteParam", "searchParam"):
         assert master.call(method, "/n", "")[1] == "ERROR: parameter [key] must be specified and non-empty"
+
     assert master.call("setParam", "/n", "", 1)[1] == "ERROR: parameter [key] must be specified and non-empty"
     assert master.call("getPublishedTopics", "/n", 5)[1] == "ERROR: parameter [subgraph] must be a string"
 

@@ -28,6 +28,7 @@ def test_a_change_concerns_parents_and_children(changed: str, forgotten: set[str
     for key in KEYS:
         cache.store(key, 1, cache.changes)
     cache.changed(changed)
+
     for key in KEYS:
         if key in forgotten:
             with pytest.raises(LookupError):
@@ -59,6 +60,7 @@ steps = st.lists(
 @given(steps)
 def test_what_it_knows_is_what_the_master_says(program: list[tuple[str, str, object]]) -> None:
     tree, cache, subscribed = ParameterTree(), ParameterCache(), set[str]()
+
     for verb, key, value in program:
         if verb == "read":
             if key not in subscribed:
@@ -70,6 +72,7 @@ def test_what_it_knows_is_what_the_master_says(program: list[tuple[str, str, obj
             except LookupError:
                 cache.store(key, truth, cache.changes)
             continue
+
         try:
             updates = tree.set(key, value, "/writer") if verb == "set" else tree.delete(key)
         except KeyError:

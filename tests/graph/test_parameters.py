@@ -84,8 +84,10 @@ VALUES = st.integers(0, 3) | st.dictionaries(st.sampled_from("abc"), st.integers
 def test_any_calls_leave_what_was_returned_as_it_was(calls: list[tuple[str, str, Any]]) -> None:
     tree, returned = ParameterTree(), []
     oracle: dict[str, Any] = {}
+
     for what, key, value in calls:
         path = [part for part in key.split("/") if part]
+
         if what == "set" and path:
             tree.set(key, value, "")
             table = oracle
@@ -103,6 +105,7 @@ def test_any_calls_leave_what_was_returned_as_it_was(calls: list[tuple[str, str,
         elif tree.has(key):
             found = tree.get(key)
             returned.append((found, repr(found)))
+
     assert tree.get("/") == oracle
     assert all(repr(found) == text for found, text in returned)
 

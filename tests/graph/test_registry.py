@@ -115,13 +115,16 @@ def test_one_node_registers_so_much_and_no_more(monkeypatch: pytest.MonkeyPatch)
 def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
     registry = Registry(most_bytes=100_000)
     registered = 0
+
     while registered < 1000:
         try:
             registry.register_publisher(f"/n{registered}", f"/t{registered}", "a/B", "u")
         except RegistryFullError as error:
             limit = error.limit
             break
+
         registered += 1
+
     assert limit == "0 MiB for all registrations"
     assert 40 < registered < 200
     # A long name takes more.
@@ -129,11 +132,13 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
         registry.unregister_publisher(f"/n{number}", f"/t{number}", "u")
     with pytest.raises(RegistryFullError):
         registry.register_publisher("/n" + "x" * 100_000, "/t", "a/B", "u")
+
     for _ in range(10):
         for number in range(registered):
             registry.register_publisher(f"/n{number}", f"/t{number}", "a/B", "u")
         for number in range(registered):
             list(registry.forget(f"/n{number}", "u"))
+
     assert registry.is_small
 
 

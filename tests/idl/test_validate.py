@@ -194,6 +194,7 @@ def test_module_that_is_not_a_package_of_messages_is_not_imported(
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "__init__.py").write_text("" if folder.startswith("real") else ran)
     monkeypatch.syspath_prepend(str(tmp_path))
+
     for name in (
         "evil_module/X",
         "evil_package/X",
@@ -203,6 +204,7 @@ def test_module_that_is_not_a_package_of_messages_is_not_imported(
         "real_msgs/X",
     ):
         assert get_message_class(name) is None
+
     assert not EXECUTED
     assert "antigravity" not in sys.modules
     (tmp_path / "real_msgs/msg/__init__.py").write_text(
@@ -244,6 +246,7 @@ lines = st.one_of(
 @example("p/M", f'string A=\\"+{CODE}+\\"', "p/N")
 def test_no_definition_of_any_name_and_text_runs_anything(name: str, text: str, inner: str) -> None:
     definition = f"{text}\n{SEPARATOR}\nMSG: p/N\nint8 x\n{SEPARATOR}\nMSG: {inner}\n{text}"
+
     try:
         specs = specs_of_text(name, definition)
         emitted = [emit_class(specs[each], specs.__getitem__).source for each in specs]
@@ -253,6 +256,7 @@ def test_no_definition_of_any_name_and_text_runs_anything(name: str, text: str, 
     else:
         for source, spec in zip(emitted, specs.values(), strict=True):
             assert_harmless(source, {spec.name})
+
     executed_by(name, definition)
     executed_by(name, text)
     assert not EXECUTED

@@ -61,6 +61,7 @@ def write(folder: Path) -> None:
 def read(folder: Path) -> None:
     for path in sorted(folder.glob("*.bag")):
         found: dict[str, Any] = {"name": path.name}
+
         try:
             with rosbag.Bag(str(path)) as bag:
                 digest = hashlib.sha256()
@@ -80,6 +81,7 @@ def read(folder: Path) -> None:
                 found["entries"] = [entry.time.to_nsec() for entry in bag._get_entries()]
         except rosbag.ROSBagException as error:
             found["error"] = f"{type(error).__name__}: {error}"
+
         print(json.dumps(found))
 
 

@@ -679,11 +679,13 @@ def page(sections: dict[str, list[Row]]) -> str:
         "its own line. Long",
         "output is cut here, not in the comparison; numbers and folders that change from run to run are replaced.",
     ]
+
     for title, section in sections.items():
         lines += ["", f"## {title}", "", "| typed | real ROS | minirospy |", "|---|---|---|"]
         for row in section:
             ours = f"**{_cell(row.why)}**<br>{_shown(row.ours)}" if row.why else _same(row)
             lines.append(f"| `{_cell(row.typed)}` | {_shown(row.real)} | {ours} |")
+
     return "\n".join(lines) + "\n"
 
 
@@ -741,6 +743,7 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
     )
     if streaming:
         return _interrupted(program, count)
+
     try:
         out, err = program.communicate(text.replace("\\n", "\n"), timeout=25)
         status: int | str = program.returncode
@@ -748,11 +751,13 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
         program.send_signal(signal.SIGINT)
         out, err = program.communicate(timeout=40)
         status = "never"
+
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
         # Nodes come in the order of a set there, which no two runs share.
         out = "".join(sorted(out.splitlines(keepends=True)))
         if "Usage: " not in err:
             err = "".join(sorted(err.splitlines(keepends=True)))
+
     return Ended(status, *(_steady(part, folder) for part in (out, err)))
 
 

@@ -91,6 +91,7 @@ def running_master(stack: str) -> Iterator[str]:
         "rospy": [str(REAL_BIN / "rosmaster"), "--core", "-p", str(port)],
     }
     program = start(commands[stack], uri, stack)
+
     try:
         end = time.monotonic() + 40
         while not answers(uri):

@@ -33,6 +33,7 @@ LOADED = {}
 def compile_below(root, target):
     """All packages below ``root``, as catkin compiles them: actions to messages, messages and services to modules."""
     search, sources = {}, {}
+
     for folder in sorted(root.iterdir()):
         files = {kind: sorted(folder.glob(kind + "/*." + kind)) for kind in ("msg", "srv", "action")}
         made = target / "share" / folder.name
@@ -42,8 +43,10 @@ def compile_below(root, target):
         messages = {path.name: path for path in (*files["msg"], *sorted(made.glob("*.msg")))}
         sources[folder.name] = {"msg": messages.values(), "srv": files["srv"]}
         search[folder.name] = [str(made), str(folder / "msg")]
+
     for package, files in sources.items():
         generators = {"msg": genpy.generator.MsgGenerator(), "srv": genpy.generator.SrvGenerator()}
+
         for kind, generator in generators.items():
             if files[kind]:
                 out = target / package / kind

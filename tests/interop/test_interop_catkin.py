@@ -310,6 +310,7 @@ def test_setup_variables_are_equal(trees: tuple[Path, Path]) -> None:
 def test_create_pkg_writes_the_files_of_the_real_one(tmp_path: Path) -> None:
     """catkin_create_pkg: the same lines on the screen, the same files, a package.xml that says the same."""
     trees = []
+
     for name, command in (("real", "/usr/bin/catkin_create_pkg"), ("ours", str(BIN / "catkin_create_pkg"))):
         folder = tmp_path / name
         folder.mkdir()
@@ -333,6 +334,7 @@ def test_create_pkg_writes_the_files_of_the_real_one(tmp_path: Path) -> None:
         ).stdout
         files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
         trees.append((done.stdout.replace(str(folder), ""), parsed, files))
+
     assert trees[0] == trees[1]
 
 
@@ -431,6 +433,7 @@ def test_cmake_conditions_are_equal(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     (tmp_path / "more.cmake").write_text("set(MORE 1)\nreturn()\nset(MORE 2)\n")
     lines = [SCRIPT, "set(SET text)", "set(OFFED off)", "set(LIST one two)"]
+
     for condition in CONDITIONS.split("|"):
         lines += [
             f"if({condition})",
@@ -439,6 +442,7 @@ def test_cmake_conditions_are_equal(tmp_path: Path) -> None:
             f"message([[no {condition}]])",
             "endif()",
         ]
+
     file = tmp_path / "CMakeLists.txt"
     file.write_text("\n".join(lines))
     done = subprocess.run(

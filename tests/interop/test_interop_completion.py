@@ -77,6 +77,7 @@ def uri(workspace: None) -> Iterator[str]:
 def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
     """Line -> what bash is given for a TAB at its end."""
     script = [f". {functions}"]
+
     for line in _LINES:
         words = line.split(" ")
         script.append(
@@ -88,6 +89,7 @@ def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
             printf '%s\\a' "${{COMPREPLY[@]}}"; printf '\\f'
             """
         )
+
     done = subprocess.run(
         ["bash", "--norc", "--noprofile", "-c", "\n".join(script)],
         env={**environment(uri, stack), "HOME": os.getcwd()}, capture_output=True, text=True, timeout=120, check=False,

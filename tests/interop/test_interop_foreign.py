@@ -43,6 +43,7 @@ def modules() -> Path:
     digest = hashlib.sha256((FOREIGN / "package.json").read_bytes()).hexdigest()[:12]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "minirospy-tests"
     place = cache / f"npm-{digest}"
+
     if not place.exists():
         cache.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(dir=cache))
@@ -53,6 +54,7 @@ def modules() -> Path:
             folder.rename(place)
         except OSError:  # another worker was first
             shutil.rmtree(folder)
+
     return place / "node_modules"
 
 
@@ -215,8 +217,10 @@ def test_foxglove_client_exchanges_messages_and_calls(master: str, modules: Path
 def test_our_nodes_use_the_master_of_foxglove(modules: Path) -> None:
     async def scene() -> None:
         master = await Peer.start(modules, "foxglove_master.js")
+
         try:
             uri = await master.line()
+
             async with Node("ours", master_uri=uri) as node, Node("others", master_uri=uri) as others:
                 await offer(node)
                 got = await others.wait_for_message("/ours/scan", LaserScan, timeout=40)

@@ -362,9 +362,11 @@ def test_options_of_the_text(real: Callable[[str], Peer], options: dict[str, Any
     kept = dict(options)
     if "time_offset" in kept:
         kept["time_offset"] = Time(*kept["time_offset"])
+
     if "field_filter" in kept:
         wanted = kept["field_filter"]
         kept["field_filter"] = lambda message: [field for field in message.__slots__ if field in wanted]
+
     assert strify_message(ours_of("ours", "sensor_msgs").build(name, value), **kept) == theirs
 
 
@@ -537,16 +539,19 @@ def test_a_message_and_a_service_of_one_name(
         (folder / kind).mkdir(parents=True)
         (folder / kind / f"Twin.{kind}").write_text(text)
     written = write_package(Catalogue.below(tmp_path / "source"), "odd_twins_msgs", tmp_path / "made")
+
     assert written
     monkeypatch.syspath_prepend(str(tmp_path / "made"))
     found = service_class("odd_twins_msgs/Twin")
     (tmp_path / "peer").mkdir()
     peer = Peer(tmp_path / "peer", tmp_path / "source")
+
     try:
         names = ["odd_twins_msgs/Twin"]
         theirs = peer.ask("describe", (names, ("msg",)))
         assert_same({names[0]: described(message_class(names[0]))}, theirs)
         theirs = peer.ask("describe", (names, ("srv",)))
+
         assert theirs == {names[0]: {"type": names[0], "md5sum": found._md5sum}}
         parts = {part._type: described(part) for part in (found._request_class, found._response_class)}
         assert_same(parts, peer.ask("describe", (list(parts), ("srv",))))

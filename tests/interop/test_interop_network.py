@@ -53,6 +53,7 @@ class Network:
         """Make the machines. Raises CalledProcessError where this is not permitted."""
         for name in self.names.values():
             sh(f"ip netns add {name}")
+
         for machine, at, address, address6 in (("alpha", "va", ALPHA, ALPHA6), ("beta", "vb", BETA, BETA6)):
             self.ip(machine, "link set lo up")
             sh(
@@ -71,6 +72,7 @@ class Network:
             (folder / "hosts").write_text(HOSTS)
             # A name server that refuses immediately: an outside one would time out.
             (folder / "resolv.conf").write_text("nameserver 127.0.0.1\n")
+
         for switch in ("ipv4/ip_forward", "ipv6/conf/all/forwarding"):
             subprocess.run(
                 ["ip", "netns", "exec", self.names["router"], "sh", "-c", f"echo 1 > /proc/sys/net/{switch}"],
@@ -281,6 +283,7 @@ def test_two_machines_exchange_messages_by_ipv6(network: Network) -> None:
 def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> None:
     """A name that is not known here, an address that is nobody's, and ports that a firewall lets nobody reach."""
     start_master(network)
+
     with network.firewall(f"to {ALPHA} ipproto tcp dport 20000-20019"):
         listener = network.peer("beta", "listen")
         network.publish("alpha", ROS_HOSTNAME="alfa")
@@ -293,6 +296,7 @@ def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> N
         while len(lines) < 3:
             line = listener.wait_for("cannot connect to the publisher of /beat at http://")
             lines[line.split("http://")[1].split(":")[0]] = line
+
     assert (
         "This machine does not know the name 'alfa': on the publisher's machine set ROS_IP" in lines["alfa"]
     )
@@ -352,9 +356,11 @@ def test_two_doctors_check_both_directions(network: Network) -> None:
     listener.wait_for(
         "PROBLEM both directions: 10.99.1.2: it reaches this machine, and this one does not reach it"
     )
+
     with network.firewall(f"from {BETA} to {ALPHA}"):
         # What beta answers is lost: it is not reached at all.
         (line,) = [each for each in network.doctor("alpha") if each.startswith("PROBLEM")]
+
     assert "nothing comes back from 'beta' -> if `ping beta` fails too" in line
     listener.end()
     assert network.doctor("alpha")[-1] == "all is well"

@@ -156,11 +156,13 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
     ssh.write_text(
         ssh.read_text().replace("-l root", f"-l root -o HostName=127.0.0.1 -o HostKeyAlias={name}")
     )
+
     try:
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
         refused, _ = process.communicate(timeout=40)
         assert "Host key verification failed" in refused
         assert "unable to start remote roslaunch child" in refused
+
         process = launch(
             text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}", ROSLAUNCH_SSH_UNKNOWN="1"
         )

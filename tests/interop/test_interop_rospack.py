@@ -107,6 +107,7 @@ find a b
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     tree = tmp_path / "tree"
+
     for name, body in TREE.items():
         folder = tree / ("another_name" if name == "t" else name)
         (folder / "src" / "deep").mkdir(parents=True)
@@ -116,11 +117,13 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             '<maintainer email="a@example.org">Ann</maintainer><author>Bob</author>'
             f"<license>BSD</license><license>MIT</license><url>http://w</url>{body}</package>"
         )
+
     for marker in ("CATKIN_IGNORE", "rospack_nosubdirs"):
         ignored = tree / f"with_{marker}" / "ignored"
         ignored.mkdir(parents=True)
         (ignored / "package.xml").write_text("<package><name>ignored</name></package>")
         (ignored.parent / marker).touch()
+
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tree))
     monkeypatch.chdir(tmp_path)
     return tree
@@ -189,6 +192,7 @@ def test_rosstack(tree: Path) -> None:
         -q find nope
     """.strip().splitlines():
         assert ours(line, function="rosstack") == real(line, tool="rosstack"), line
+
     for line in ("find nope", "depends nope"):
         status, out, errors = real(line, tool="rosstack")
         found = ours(line, function="rosstack")

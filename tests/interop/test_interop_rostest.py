@@ -37,11 +37,13 @@ class Ran:
                 else {}
             ),
         }
+
         if real:
             # Real rosunit runs a file with `python`, which Debian does not have.
             (home / "bin").mkdir(parents=True)
             (home / "bin" / "python").symlink_to("/usr/bin/python3")
             variables["PATH"] = f"{home / 'bin'}:{variables['PATH']}"
+
         keep = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "PYTHON"))}
         self._popen = subprocess.Popen(
             command, env={**keep, **variables}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

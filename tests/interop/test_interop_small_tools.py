@@ -169,12 +169,14 @@ def test_catkin(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for words in (["my", "src"], ["my"], ["nope"]):
         ours, real = both("catkin_find_pkg", *words)
         assert ours == real, words
+
     for name, needs in (("a", "<depend>my</depend>"), ("zz", "<depend>a</depend>"), ("b", "")):
         (workspace / "src" / name).mkdir()
         (workspace / "src" / name / "package.xml").write_text(
             f'<package format="2"><name>{name}</name><version>1.0.0</version><description>d</description>'
             f'<maintainer email="a@b.com">m</maintainer><license>BSD</license>{needs}</package>'
         )
+
     for words in (["src"], ["--only-names", "src"], ["--only-folders"]):
         ours, real = both("catkin_topological_order", *words)
         assert ours == real, words
@@ -183,6 +185,7 @@ def test_catkin(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (devel / name).mkdir(parents=True)
     (devel / ".catkin").write_text(str(workspace / "src"))
     monkeypatch.setenv("CMAKE_PREFIX_PATH", str(devel))
+
     for words in (
         ["my"],
         ["my", "scripts"],

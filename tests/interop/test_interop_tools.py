@@ -95,6 +95,7 @@ def test_the_table(scene: str, tmp_path: Path) -> None:
     if os.environ.get("WRITE"):
         PAGE.write_text(page(sections))
     different = unexpected(row for rows in sections.values() for row in rows)
+
     assert not different, different
     assert other_words(row for rows in sections.values() for row in rows) == OTHER_WORDS
     assert verdicts(page(sections)) == verdicts(PAGE.read_text())
@@ -131,8 +132,10 @@ def test_publishing_and_echoing(
     assert "does not appear to be published yet" in echo.stderr.readline()
     # `pub -1` goes after three seconds, in which a machine that is busy may stand still.
     out = err = ""
+
     for _ in range(3):
         pub = _start(any_master, publishing, ["rostopic", "pub", *options, "/t", *values])
+
         try:
             out, err = echo.communicate(timeout=20)
             break
@@ -141,6 +144,7 @@ def test_publishing_and_echoing(
         finally:
             pub.terminate()
             pub.communicate(timeout=40)
+
     echo.kill()
     assert out == shown, err
 

@@ -136,10 +136,12 @@ def test_rosparam(master: str, tmp_path: Path) -> None:
         rosparam.get_param("/ns")
     with pytest.raises(rosparam.RosParamException, match="does not exist"):
         rosparam.load_file("/nope.yaml")
+
     for content, why in ((b"\xff", "not UTF-8"), (b"a: [1\n", "expected")):
         file.write_bytes(content)
         with pytest.raises(rosparam.RosParamException, match=why):
             rosparam.load_file(str(file))
+
     with pytest.raises(rosparam.RosParamException, match="cannot be read"):
         rosparam.load_file(str(tmp_path))
 

@@ -96,10 +96,12 @@ def test_no_node_outlives_its_program(master: str, package: Path, end: str) -> N
     )
     assert program.stdout
     line = next(line for line in program.stdout if line.startswith("pid "))
+
     try:
         left = [psutil.Process(int(line.split()[1]))]
     except psutil.NoSuchProcess:
         left = []
+
     program.communicate(timeout=30)
     _, left = psutil.wait_procs(left, timeout=30)
     assert not left

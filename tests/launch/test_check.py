@@ -24,6 +24,7 @@ def test_every_fault_is_reported_with_its_line(package: Path, capsys: pytest.Cap
     )
     assert roslaunch.main(["--check", str(file), "k:=1"]) == 1
     said = capsys.readouterr().out
+
     for line in (
         f"{file}:2: warning: unrecognized tag <nod>: did you mean <node>?\n",
         f"{file}:3: error: node [a]: executable [wai.py] not found; did you mean wait.py?",
@@ -35,6 +36,7 @@ def test_every_fault_is_reported_with_its_line(package: Path, capsys: pytest.Cap
         "2 files, 2 nodes, 1 parameters: 5 errors, 2 warnings\n",
     ):
         assert line in said
+
     file.write_text('<launch><node name="a" pkg="pkg" type="wait.py"/></launch>')
     assert roslaunch.main(["--check", str(file)]) == 0
     assert capsys.readouterr().out == "1 files, 1 nodes, 0 parameters: 0 errors, 0 warnings\n"

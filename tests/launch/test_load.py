@@ -228,6 +228,7 @@ def test_an_include_that_is_not_there_has_the_nearest_names(
         (tmp_path / "launch" / name).touch()
     with pytest.raises(LaunchError) as raised:
         load(packages, f'<include file="{tmp_path / file}"/>')
+
     assert str(raised.value).startswith(f"<stdin>:2: cannot include [{tmp_path / file}]: ")
     hint = str(raised.value).partition("; ")[2]
     assert hint == (near and f"did you mean {near.format(package=tmp_path)}?")

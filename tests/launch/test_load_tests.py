@@ -22,11 +22,13 @@ def test_attributes_of_a_test() -> None:
     assert (test.test_name, test.time_limit, test.retry) == ("a", 60.0, 0)
     assert test.node.name == "/a"
     assert not spec.nodes
+
     inside = '<param name="v" value="1"/><remap from="x" to="y"/><env name="E" value="f"/>'
     spec = load(
         'name="n" ns="q" args="b c" retry="2" time-limit="3.5" cwd="node" clear_params="true"', inside
     )
     (test,) = spec.tests
+
     assert (test.time_limit, test.retry) == (3.5, 2)
     node = test.node
     assert (node.name, node.args, node.cwd, node.remaps, node.env) == (

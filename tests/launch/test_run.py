@@ -198,12 +198,15 @@ def test_a_node_on_another_machine(start: Start, master: str, ssh: Path) -> None
         "remote[127.0.0.1-0]: [c] cannot be launched",
     )
     assert "remote[127.0.0.1-0]: creating ssh connection to 127.0.0.1:22, user[somebody]\n" in said
+
     called = ssh.read_text()
     assert "-p 22 somebody@127.0.0.1 ROS_MASTER_URI=" in called
     assert " env roslaunch -c 127.0.0.1-0 -u http://localhost:" in called
+
     children = launch.children()
     launch.process.send_signal(signal.SIGINT)
     said, _ = launch.process.communicate(timeout=30)
+
     assert "[127.0.0.1-0] killing on exit\n" in said
     _, left = psutil.wait_procs(children, timeout=30)
     assert not left

@@ -56,9 +56,11 @@ def test_received_arrays_are_numpy_arrays(message: Any, path: str, dtype: str) -
     received = numpy_msg(type(message))().deserialize(wire(message))
     plain = type(message)().deserialize(wire(message))
     values, expected = received, plain
+
     for step in path.split("."):
         values = values[int(step)] if step.isdigit() else getattr(values, step)
         expected = expected[int(step)] if step.isdigit() else getattr(expected, step)
+
     assert isinstance(values, numpy.ndarray)
     assert values.dtype == dtype
     assert values.tolist() == list(expected)

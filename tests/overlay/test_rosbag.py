@@ -135,6 +135,7 @@ def test_two_types_on_a_topic_keep_their_types(tmp_path: Path) -> None:
 
 def test_info_is_what_rosbag_info_prints(path: str) -> None:
     start, end = (time.strftime("%b %d %Y %H:%M:%S.00", time.localtime(each)) for each in (100, 109))
+
     with rosbag.Bag(path) as bag:
         assert str(bag).splitlines() == [
             f"path:        {path}",

@@ -29,6 +29,7 @@ def test_the_graph_as_edges(master: str) -> None:
     rosgraph.Master("/listener").registerSubscriber("/chat", "std_msgs/Bool", "http://localhost:2")
     client.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
     graph = rosgraph.impl.graph.Graph()
+
     assert graph.update()
     assert not graph.update()
     assert [str(edge) for edge in graph.nn_edges] == ["/talker->/listener"]
@@ -38,12 +39,15 @@ def test_the_graph_as_edges(master: str) -> None:
     }  # fmt: skip
     assert (graph.nn_nodes, graph.srvs) == ({"/talker", "/listener"}, {"/serve"})
     assert {rosgraph.impl.graph.node_topic(each) for each in graph.nt_nodes} == {"/chat", "/alone"}
+
     graph.set_master_stale(0)
     assert not graph.update()
     rosgraph.Master("/listener").unregisterSubscriber("/chat", "http://localhost:2")
+
     assert graph.update()
     assert list(graph.nn_edges) == []
     below = rosgraph.impl.graph.Graph(topic_ns="/alone")
+
     assert below.update()
     assert below.nt_nodes == {" /alone"}
 

@@ -78,6 +78,7 @@ def make_bag(
     with path.open("wb") as stream:
         writer = BagWriter(stream)
         numbers: dict[str, int] = {}
+
         for topic, seconds, text in messages:
             if topic not in numbers:
                 header = {
@@ -90,11 +91,14 @@ def make_bag(
                     **changes,
                 }
                 numbers[topic] = writer.add_connection(topic, header)
+
             data = text.encode()
             writer.write(
                 numbers[topic], START + round(seconds * SECOND), len(data).to_bytes(4, "little") + data
             )
+
         writer.close()
+
     return path.name
 
 

@@ -328,11 +328,13 @@ def shown(value: Any) -> str:
 def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """(name, real's signature, state, note) of a module; of what it only passes on, just what is missing."""
     rows = []
+
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
         is_ours = ours.get(name)
         told_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND, *FRAMES)
         if is_ours is None and told_at_home and name not in REASONS:
             continue
+
         if is_ours is None:
             rows.append(
                 (
@@ -343,6 +345,7 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
                 )
             )
             continue
+
         if is_ours.get("refuses"):
             rows.append((name, shown(is_real["is"]), "left out", "refuses by name"))
             continue
@@ -355,6 +358,7 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
         rows.append(
             (name, shown(is_real["is"]), state, "" if state == "same" else f"ours: `{shown(is_ours['is'])}`")
         )
+
         for member, signature in is_real.get("members", {}).items():
             at = f"{name}.{member}"
             if member not in is_ours.get("members", {}):
@@ -364,6 +368,7 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
             theirs = is_ours["members"][member]
             state = compare(signature, theirs)
             rows.append((at, shown(signature), state, "" if state == "same" else f"ours: `{shown(theirs)}`"))
+
     return rows
 
 
@@ -429,6 +434,7 @@ def main() -> int:
         ),
     }
     status = 0
+
     for path, text in pages.items():
         if not options.check:
             path.write_text(text)
@@ -436,6 +442,7 @@ def main() -> int:
         elif not path.exists() or path.read_text() != text:
             print(f"{path} is not up to date: run {sys.executable} {__file__}", file=sys.stderr)
             status = 1
+
     return status
 
 

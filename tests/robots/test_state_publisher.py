@@ -105,6 +105,7 @@ def test_missing_description_is_one_line(
         set_param(master, "/robot_description", value)
     process = start(program, program)
     _, errors = process.communicate(timeout=SECONDS)
+
     assert process.returncode == 1
     assert words in errors
     assert "Traceback" not in errors

@@ -40,6 +40,7 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
     command = [sys.executable, "-c", code, "--package=p", f"--pkgdir={tmp_path}", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=50)
     output = done.stdout.split("[ROSTEST]---")[1]
+
     for line in (
         "[p.rosunit-advertised/test_advertise_topics][passed]",
         "[p.rosunit-advertised/test_advertise_services][passed]",
@@ -51,4 +52,5 @@ def test_what_they_find(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
         "bad parameter (topics): it is a list as [{name: /chatter, timeout: 5}]",
     ):
         assert line in output, line
+
     assert done.returncode == 2

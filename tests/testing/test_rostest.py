@@ -57,6 +57,7 @@ def test_each_outcome(tmp_path: Path) -> None:
     status, out, err = ran("rostest", "tested", "all.test", "limit:=1.0")
     assert (status, err) == (1, "")
     said = out.split("[ROSTEST]---")[0]
+
     for line in (
         "[Testcase: testgood] ... ok",
         "[Testcase: testbad] ... ok",
@@ -70,6 +71,7 @@ def test_each_outcome(tmp_path: Path) -> None:
         "FAILURE: Duplicate tests named [twice] in rostest suite",
     ):
         assert line in said
+
     output = out[len(said) :]
     assert "[tested.rosunit-bad/test_fail][FAILURE]" in output
     assert "1 != 2 : one is not two" in output

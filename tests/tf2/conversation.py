@@ -26,6 +26,7 @@ def questions(seed: int, count: int) -> list[Question]:
     statics = {child for child in names if rng.random() < 0.25}
     trees = rng.choice([1, 1, 1, 2])
     start = rng.choice([0, 5, 1000])
+
     for step in range(rng.randrange(2, 25)):
         for index, child in enumerate(names):
             if index < trees or (child in statics and step) or rng.random() < 0.2:
@@ -35,6 +36,7 @@ def questions(seed: int, count: int) -> list[Question]:
             asked.append(
                 ["set", above, child, nanoseconds(stamp), pose(rng), f"/node{index % 3}", child in statics]
             )
+
     for _ in range(count):
         target, source, fixed = (rng.choice([*names, *names, "nowhere"]) for _ in range(3))
         times = [rng.choice([0, nanoseconds(start + rng.uniform(-1, 14)), nanoseconds(start + rng.randrange(28) * 0.25)])
@@ -51,6 +53,7 @@ def questions(seed: int, count: int) -> list[Question]:
                 ]
             )
         )
+
     return [*asked, ["yaml"], ["string"], ["dot", 0], ["dot", nanoseconds(99.5)], ["frames"]]
 
 

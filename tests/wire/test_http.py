@@ -308,18 +308,22 @@ def test_reader_counts_what_it_holds() -> None:
     reader = HttpReader()
     assert (reader.is_idle, reader.held) == (True, 0)
     reader.feed(b"POST / HTTP/1.1\r\n")
+
     assert (reader.is_idle, reader.held) == (False, 17)
     reader.feed(b"Content-Length: 10\r\n\r\n")
     reader.feed(b"abc")
+
     assert (reader.is_idle, reader.held) == (False, 3)
     assert len(reader.feed(b"defghij")) == 1
     assert (reader.is_idle, reader.held) == (True, 0)
+
     # A head alone is not idle.
     reader.feed(b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\n")
     assert not reader.is_idle
     chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
     reader = HttpReader()
     reader.feed(chunked + b"3\r\nabc\r\n2\r\nd")
+
     assert (reader.is_idle, reader.held) == (False, 4)
     reader.feed(b"e\r\n0\r\n")
     assert reader.held == 5

@@ -189,12 +189,14 @@ def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
     data = b"<methodCall>" + body + b"</methodCall>"
     end = data.index(b"<", 1_000_000)
     reader = Reader()
+
     with Allocations() as memory:
         for at in range(0, end, 8192):
             reader.feed(data[at : min(at + 8192, end)])
         memory.mark()
         reader.feed(data[end:], is_last=True)
         assert memory.peak() < 1_000_000
+
     reader.close()
     value: Any = reader.params[0] if reader.params else reader.method
     assert value == {"base64": b"ABC" * 1_000_000, "name": {text: "1"}}.get(kind, text)
@@ -376,6 +378,7 @@ def test_values_are_written_like_this() -> None:
         "<?xml version='1.0'?>\n<methodResponse><params><param>",
         "</param></params></methodResponse>\n",
     )
+
     for value, xml in (
         (-1, "<value><int>-1</int></value>"),
         (-(2**31), "<value><int>-2147483648</int></value>"),
@@ -404,6 +407,7 @@ def test_values_are_written_like_this() -> None:
     ):
         assert serialize_response(value).decode() == head + xml + tail
         assert b"".join(finish(serialize_response_in_steps(value, MAX_BODY))).decode() == head + xml + tail
+
     assert serialize_fault(3, "x").decode() == (
         "<?xml version='1.0'?>\n<methodResponse><fault><value><struct>\n"
         "<member><name>faultCode</name><value><int>3</int></value></member>\n"

@@ -35,10 +35,12 @@ class Scene:
         (folder / "CMakeLists.txt").write_text(
             f"cmake_minimum_required(VERSION 3.0.2)\nproject({name})\n{cmake}\ncatkin_package()\n"
         )
+
         for path, text in (files or {}).items():
             file = folder / path
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text)
+
         return folder
 
     def messages(self, name: str, files: dict[str, str], depends: str = "std_msgs") -> Path:

@@ -52,6 +52,7 @@ def test_messages_services_and_actions(scene: Scene) -> None:
     )
     report = scene.build()["led_msgs"]
     assert (report.made, report.changed, report.warnings) == ("2 messages, 1 service, 1 action", True, ())
+
     said = python(
         scene,
         "from led_msgs.msg import *; from led_msgs.srv import Zone, ZoneResponse; import led_msgs\n"
@@ -208,10 +209,12 @@ def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
     scene.package("tools", "catkin_python_setup()", "", files)
     before = sys.modules.copy()
     scene.build()
+
     assert python(scene, "import tools; print(tools.VALUE)") == "3\n"
     if "exclude" in text:
         assert not (scene.modules / "tests").exists()
     changed = {name for name, module in sys.modules.items() if before.get(name) is not module}
+
     assert not {name for name in changed if name.split(".", 1)[0] in ("beside", "setuptools", "distutils")}
 
 
@@ -233,10 +236,12 @@ def test_programs_are_in_devel(scene: Scene) -> None:
         },
     )
     scene.build()
+
     for place, name in ((scene.devel / "bin", "lamp"), (scene.devel / "lib" / "tools", "run.py")):
         assert [path.name for path in place.iterdir()] == [name]
         said = subprocess.run([place / name, "a"], capture_output=True, text=True, check=True).stdout
         assert said == f"__main__ {folder / 'scripts' / name} 3 ['a']\n"
+
     (folder / "CMakeLists.txt").write_text("project(tools)")
     scene.build()
     assert not (scene.devel / "bin").exists()
@@ -420,6 +425,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     assert "[q] is named, but " in mistakes(scene).text
     (folder / "setup.py").write_text("x = (\n")
     assert mistakes(scene).line == 1
+
     for line, text in {
         "import sys; sys.exit('no numpy')": "setup() was not called: it ended with no numpy",
         "": "setup() was not called",
@@ -428,6 +434,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     }.items():
         (folder / "setup.py").write_text(line)
         assert mistakes(scene).text == text
+
     (folder / "CMakeLists.txt").unlink()
     assert mistakes(scene).text == "package [p] has no CMakeLists.txt"
     (folder / "package.xml").write_text("<package>\n<name>p</nam></package>")
@@ -570,6 +577,7 @@ def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
     }
     folder = scene.package("p", cmake.format(**parts), "", files)
     (warning,) = scene.build()["p"].warnings
+
     assert warning.startswith(f"{folder / 'CMakeLists.txt'}:{line}: real catkin refuses this: ")
     assert text in warning
     assert python(scene, "import p.msg; print(p.msg.A(a=1).a)") == "1\n"
@@ -630,9 +638,11 @@ def test_the_command(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
     assert find_workspace(scene.source / "cpp") == scene.root
     assert catkin_make(["-C", str(scene.root), "--pkg", "led_msgs"]) == 0
     assert "[100%] led_msgs: up to date" in capsys.readouterr().out
+
     for target in ("led_msgs_generate_messages", "led_msgs_generate_messages_py", "led_msgs"):
         assert catkin_make(["-C", str(scene.root), target, "VERBOSE=1", "-v"]) == 0
         assert capsys.readouterr().out.endswith("\n[100%] led_msgs: up to date\n")
+
     assert catkin_make(["-C", str(scene.root), "clean"]) == 0
     assert not scene.devel.exists()
 
@@ -685,6 +695,7 @@ def test_typed_wrong(
     monkeypatch.chdir(scene.root)
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     assert catkin_make(words) == status
+
     error = capsys.readouterr().err
     assert error.startswith("catkin_make: ERROR: ")
     assert text in error
@@ -763,9 +774,11 @@ def test_install(scene: Scene) -> None:
             "a.yaml": "{}",
         },
     )
+
     assert catkin_make(["-C", str(scene.root), "install"]) == 0
     installed = scene.root / "install"
     found = {path.relative_to(installed).as_posix() for path in installed.rglob("*") if path.is_file()}
+
     assert {name for name in found if "/" in name} == {
         "lib/python3/dist-packages/led_msgs/__init__.py",
         "lib/python3/dist-packages/led_msgs/msg/__init__.py",
@@ -787,6 +800,7 @@ def test_install(scene: Scene) -> None:
     for path in sorted(folder.rglob("*"), reverse=True):
         path.rmdir() if path.is_dir() else path.unlink()
     scene.modules = installed / "lib" / "python3" / "dist-packages"
+
     assert (
         python(scene, "import tools, led_msgs.msg; print(tools.VALUE, led_msgs.msg.Led().number)") == "3 0\n"
     )

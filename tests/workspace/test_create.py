@@ -75,6 +75,7 @@ def test_all_that_can_be_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         'Bob "B" <b@c.org>',
     ]
     assert catkin_create_pkg(words) == 0
+
     manifest = read_manifest(tmp_path / "x")
     assert manifest.problems == ()
     assert (manifest.version, manifest.description, manifest.licenses) == ("1.2.3", "a & b < c", ("MIT",))
@@ -115,6 +116,7 @@ def test_typed_wrong(
     monkeypatch.chdir(tmp_path)
     catkin_create_pkg(["there"])
     capsys.readouterr()
+
     assert catkin_create_pkg(words) == 2
     error = capsys.readouterr().err
     assert error.startswith("catkin_create_pkg: ERROR: ")
@@ -160,9 +162,11 @@ def test_catkin_config_is_kept(
     scene.package("lamp", "if(NOT LAMP)\ncatkin_python_setup()\nendif()")
     scene.package("wall", "catkin_python_setup()")
     monkeypatch.chdir(scene.root)
+
     assert catkin(["config", "--install", "--cmake-args", "-DLAMP=ON", "-DX=1"]) == 0
     assert catkin(["config", "--blacklist", "wall"]) == 0
     said = capsys.readouterr().out
+
     assert said.endswith(
         "Install:         yes\nBlacklist:       wall\nWhitelist:       none\nCmake args:      -DLAMP=ON -DX=1\n"
     )

@@ -92,6 +92,7 @@ def test_all_are_run(
     write(scene)
     assert catkin_make(["-C", str(scene.root), "run_tests_p"]) == 1
     out = capfd.readouterr().out
+
     for line in (
         "p: skipped, they need a C++ compiler: hardware_test",
         "p: rostest test/unit.test expected:=0\n",
@@ -101,6 +102,7 @@ def test_all_are_run(
         "Summary: 5 tests, 0 errors, 1 failures, 0 skipped",
     ):
         assert line in out
+
     assert "q: " not in out.split("p: pytest")[1]
     results = scene.root / "build" / "test_results"
     assert sorted(str(path.relative_to(results)) for path in results.rglob("*.xml")) == [
@@ -180,6 +182,7 @@ def test_slow():
         time.sleep(0.02)
     os.killpg(popen.pid, signal.SIGINT)
     _, err = popen.communicate(timeout=30)
+
     assert popen.returncode == 1
     assert err.endswith("catkin_make: ERROR: interrupted: the tests that were left have not run\n")
     assert ended.exists()

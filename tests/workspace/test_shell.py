@@ -86,8 +86,10 @@ def make_workspace(root: Path) -> None:
     )
     (root / "devel").mkdir()
     (root / "devel" / "setup.bash").touch()
+
     if not (BIN / "rospack").exists():
         (root / "bin").mkdir()
+
         for name, function in (("rospack", "main"), ("rosstack", "rosstack")):
             stand_in = root / "bin" / name
             stand_in.write_text(

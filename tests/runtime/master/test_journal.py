@@ -273,10 +273,12 @@ def test_rewrite_in_steps_keeps_what_is_appended_meanwhile(
     state += [["set", f"/{number}", number] for number in range(500)]
     old = path.stat().st_ino
     count = 0
+
     for count, _ in enumerate(steps[0], 1):
         stepping.append("set", "/meanwhile", count)
         # A crash now would lose nothing either.
         assert records(path)[-1] == ["set", "/meanwhile", count]
+
     assert path.stat().st_ino != old
     assert count > 3
     found = records(path)
@@ -682,15 +684,18 @@ def test_read_returns_the_changes_the_age_and_the_boot(
     journal.append("set", "/p", 1)
     os.utime(path, (1, time.time() - 100))
     left = journal.read()
+
     assert left
     assert left.recovered.records == [*state, ["set", "/p", 1]]
     assert 100 <= left.age < 100 + 60
     assert left.same_boot
     assert left.copy is None
+
     monkeypatch.setattr(journal_module, "boot_id", lambda: "another")
     left = journal.read()
     assert left
     assert not left.same_boot
+
     # A clock that was set back.
     os.utime(path, (1, time.time() + 100))
     left = journal.read()

@@ -279,11 +279,13 @@ def test_many_calls_in_one(proxy: ServerProxy) -> None:
 )
 def test_bad_requests_are_refused_and_do_no_harm(master: str, request_bytes: bytes, status: bytes) -> None:
     port = int(master.rsplit(":", 1)[1])
+
     with socket.create_connection(("127.0.0.1", port), 5) as sock:
         sock.sendall(request_bytes)
         answer = b""
         while more := sock.recv(4096):
             answer += more
+
     assert answer.split(b" ", 2)[1] == status
     with ServerProxy(master) as proxy:
         assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
@@ -297,6 +299,7 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
     async def scene() -> None:
         master = Master()
         master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+
         for number in range(2000):
             node, uri, topic = rng.choice(nodes), rng.choice(uris), rng.choice(topics)
             calls: tuple[tuple[str, ...], ...] = (
@@ -319,6 +322,7 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
             served = master.serve("getSystemState", ["/x"])
             written = served if isinstance(served, Serialized) else finish(served)
             assert serialize_response(written) == serialize_response(state)
+
             if number % 100 == 0:
                 successor = Master()
                 for record in master._snapshot():

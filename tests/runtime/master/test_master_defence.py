@@ -302,11 +302,13 @@ def test_networks() -> None:
         "nonsense",
         "fe80::1%eth0",
     ]
+
     assert [access.allows(peer) for peer in allowed] == [True] * len(allowed)
     assert [access.allows(peer) for peer in refused] == [False] * len(refused)
     # This machine reaches itself at any of its addresses.
     assert access.allows("172.16.0.5", "172.16.0.5")
     assert Access().allows("8.8.8.8")
+
     for wrong in ("192.168.65.0/33", "here", "http://x"):
         with pytest.raises(UsageError, match="is not a network"):
             Access.parse(wrong)
@@ -391,16 +393,20 @@ def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
         await master.start()
         ours, theirs = socket.socketpair()
         ours.setblocking(False)
+
         with theirs:
             theirs.setblocking(False)
             connection = connections.Connection(master._server, ours, asyncio.get_running_loop())
             master._server.connections[connection] = None
+
             for piece in pieces:
                 if connection._state is connections.State.OPEN:
                     connection.received(piece)
                 with contextlib.suppress(BlockingIOError):
                     theirs.recv(1 << 20)
+
             connection.end()
+
         assert master._server.held == 0
         assert master.dispatch("getSystemState", ["/x"])[0] == 1
         parse_response(serialize_response(master.dispatch("getParam", ["/x", "/"])))

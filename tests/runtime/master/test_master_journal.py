@@ -892,6 +892,7 @@ class Oracle(BackgroundClient):
             lambda: proxy.deleteParam(name, f"/oracle/{key}"),
         ]
         what = rng.choice([0, 0, 1, 2, 2, 3])
+
         if what == 0:
             after["publisher", topic, name] = None
         elif what == 1:
@@ -900,6 +901,7 @@ class Oracle(BackgroundClient):
             after["parameter", key] = number
         else:
             after.pop(("parameter", key), None)
+
         self.unsure = after
         calls[what]()
         self.state, self.unsure = after, None

@@ -55,10 +55,12 @@ def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, maste
         (short, 0),
     ]
     start_time = time.monotonic()
+
     for attack, port in attacks:
         row = bad_peers.measure(attack.__name__, node, attack, port, PEERS, ask)
         assert row.answered, row
         assert row.height - row.before < 40, row
+
     # Ten lines of each kind in ten seconds at most; each attack opens two hundred connections.
     most = 30 * (1 + (time.monotonic() - start_time) // 10)
     assert len(node.lines) < most, node.lines  # type: ignore[attr-defined]

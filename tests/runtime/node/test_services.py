@@ -122,16 +122,19 @@ def test_closing_hangs_up_on_those_that_wait_for_nothing(scene: Scene, service: 
     answers: list[bytes] = []
     calling = threading.Thread(target=lambda: answers.append(busy.call(b"wait")))
     calling.start()
+
     assert scene.called.wait(30)
     scene.run(scene.node.unserve(scene.node.services[service]))
     with pytest.raises((WireError, OSError)):
         idle.call(b"ab")
     scene.gate.set()
     calling.join(30)
+
     assert len(answers) == 1
     with pytest.raises((WireError, OSError)):
         busy.call(b"ab")
     assert busy.has_ended()
+
     busy.close()
     idle.close()
 

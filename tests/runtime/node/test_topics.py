@@ -697,12 +697,14 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             await eventually(lambda: len(box.bodies) == 1)
             restarted = Master(host="127.0.0.1", port=port)
             await restarted.start()
+
             try:
                 await eventually(lambda: restarted.registry.publishers().get("/t"))
                 await eventually(lambda: restarted.registry.subscribers().get("/t"))
                 await asyncio.get_running_loop().run_in_executor(None, again.wait, 30)
                 publication.publish(serialize_frame(b"after"))
                 await eventually(lambda: len(box.bodies) == 2)
+
                 assert subscription.links == (link,), "the connection outlived the master"
                 late = Box()
                 await listen(a, "/t", late)
@@ -766,11 +768,13 @@ def test_nodes_meet_over_ipv6() -> None:
             {"ROS_MASTER_URI": f"http://127.0.0.1:{master.port}", "ROS_IP": "::1", "ROS_IPV6": "on"}
         )
         node = Node("/six", settings)
+
         try:
             await node.start()
         except OSError:
             await master.close()
             pytest.skip("this machine has no IPv6 loopback")
+
         try:
             assert node.uri.startswith("http://[::1]:")
             rpc = AsyncRpcClient()

@@ -315,6 +315,7 @@ def test_a_node_on_the_loop_is_notified_without_a_call() -> None:
         await until(lambda: len(received) == 2)
         notifier.send(PublisherUpdate("http://127.0.0.1:9/", "/many"))
         await until(lambda: not notifier._nodes)
+
         assert [(topic, count) for _, topic, count in received] == [
             ("/many", 1000),
             ("/few", 1),
@@ -322,6 +323,7 @@ def test_a_node_on_the_loop_is_notified_without_a_call() -> None:
         ]
         assert received[2][0] - received[0][0] > 0.05
         assert not notifier._line.under_way
+
         await notifier.close()
 
     run(test)

@@ -170,6 +170,7 @@ print("subscribed")
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.stderr == ""
+
     first, second = done.stdout.splitlines()
     assert first.startswith("the system starts no more threads for this process, which has ")
     assert "ulimit -v: " in first

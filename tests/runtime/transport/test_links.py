@@ -88,12 +88,14 @@ def test_frames_of_several_threads_stay_whole(
     for thread in threads:
         thread.join()
     seen = []
+
     while data:
         (length,) = struct.unpack_from("<I", data)
         body = data[4 : 4 + length]
         assert set(body) == {body[0]}
         seen.append(body[0])
         data = data[4 + length :]
+
     assert sorted(seen) == sorted(list(range(8)) * 5)
     assert (link.sent, link.dropped, link.waiting) == (40, 0, 0)
 
@@ -294,12 +296,14 @@ def test_small_and_large_messages_in_turns(
     sent: list[bytes] = []
     frames: list[Frame] = []
     reader = read_in_thread(pair[1], frames)
+
     for number, frame in enumerate(large):
         link.send(frame)
         sent.append(joined(frame))
         for size in [0, 10, CHUNK - 4, CHUNK][: number % 5]:
             link.send(serialize_frame(bytes(size)))
             sent.append(bytes(size))
+
     loop.run(link.drain(30))
     loop.loop.call_soon_threadsafe(link.close)
     reader.join(30)

@@ -17,9 +17,11 @@ def test_a_flood_is_logged_as_its_first_line_and_a_count(
     monkeypatch.setattr(rate_limited_logger.time, "monotonic", lambda: now[0])
     logger = logging.getLogger("test-rate-limit")
     limited = RateLimitedLogger(logger)
+
     for number in range(1000):
         limited.warning("%s is bad", number)
         now[0] += 0.001
+
     now[0] += 10.0
     limited.error("%s is worse", "this")
     now[0] += 10.0

@@ -472,6 +472,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
             )
             loop = asyncio.get_running_loop()
             process = await loop.run_in_executor(None, start_listener, master.port)
+
             try:
                 await eventually(lambda: publication.links)
                 pieces = Pieces()
@@ -489,6 +490,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
             finally:
                 process.kill()
                 process.communicate()
+
             assert link.waiting == 0
             # Nobody else is the worse for it.
             subscription = b.make_subscription("/t", publication.type, box)
