@@ -1,0 +1,182 @@
+"""`python benchmarks/bag_nodes.py`: `rosbag record` and `play` beside the C++ ones of Debian's ROS 1, in one run.
+
+record: a publisher that waits for its subscriber sends images of 6 MB, then messages of 1 kB; measured are the bytes a second
+until the recorder has ended, with the messages that are missing in its bag, its CPU time and its peak memory.
+play: how much later than stored each message arrives, from the earliest one on, at one subscriber for all players.
+`--rounds 3` repeats all; `--folder` is where the bags go: the disk that is measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from minirospy.bag.reader import open_bag
+from minirospy.bag.writer import BagWriter
+from minirospy.environment import Environment
+from minirospy.introspect.streams import ToolNode
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.transport.loop import LoopThread
+from minirospy.wire.framing import LargeFrame
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
+
+CPP = Path("/usr/lib/rosbag")
+IMAGE = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+SECOND = 10**9
+
+
+def program(stack: str, verb: str) -> list[str]:
+    """Return the command of a recorder or player."""
+    code = f"import sys; from minirospy.cli.ros.rosbag_{verb} import main; sys.exit(main())"
+    return [sys.executable, "-c", code] if stack == "minirospy" else [str(CPP / verb)]
+
+
+def stacks() -> list[str]:
+    """Return the stacks that are here."""
+    return ["C++", "minirospy"] if (CPP / "record").exists() else ["minirospy"]
+
+
+def record(stack: str, size: int, count: int, folder: Path) -> str:
+    """Record ``count`` messages of ``size`` bytes; return what was measured."""
+    loop = LoopThread("publisher")
+    node = Node(f"/bench_{time.time_ns()}", Environment.read())
+    loop.run(node.start())
+    publication = Publication("/bench", IMAGE, queue_size=None)
+    loop.run(node.advertise(publication))
+    data = size.to_bytes(4, "little") + os.urandom(size)
+    frame: bytes | LargeFrame = (
+        LargeFrame((data,), len(data)) if size > 60_000 else len(data).to_bytes(4, "little") + data
+    )
+
+    bag = folder / f"{stack}.bag"
+    command = [*program(stack, "record"), "-l", str(count), "-O", str(bag), "/bench"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    while not publication.links:
+        time.sleep(0.01)
+    time.sleep(0.5)
+    start = time.perf_counter()
+    for _ in range(count):
+        publication.publish(frame)
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.perf_counter() - start
+    process.returncode = os.waitstatus_to_exitcode(status)
+
+    with bag.open("rb") as stream:
+        found = sum(sum(chunk.counts.values()) for chunk in open_bag(stream).chunks)
+    bag.unlink()
+    loop.run(node.close())
+    loop.close()
+    return (
+        f"record {size:>8} B x {count:<7} {stack:10} {size * count / seconds / 1e6:7.0f} MB/s "
+        f"{count / seconds:8.0f} messages/s  lost {count - found}  "
+        f"CPU {usage.ru_utime + usage.ru_stime:5.2f} s  peak {usage.ru_maxrss / 1024:5.0f} MB"
+    )
+
+
+def make_bag(path: Path, hz: float, seconds: float, size: int) -> list[int]:
+    """Write a bag of numbered messages at irregular times; return those."""
+    chance = random.Random(3)
+    times = []
+    with path.open("wb") as stream:
+        writer = BagWriter(stream)
+        header = {
+            "topic": "/bench",
+            "type": IMAGE.name,
+            "md5sum": IMAGE.md5sum,
+            "message_definition": IMAGE.definition,
+        }
+        number = writer.add_connection("/bench", header)
+        now = 10**18
+        for i in range(int(hz * seconds)):
+            now += int(chance.uniform(0.5, 1.5) * SECOND / hz)
+            data = b"%08d" % i + bytes(size - 8)
+            writer.write(number, now, len(data).to_bytes(4, "little") + data)
+            times.append(now)
+        writer.close()
+    return times
+
+
+def play(stack: str, path: Path, times: list[int], what: str) -> str:
+    """Play a bag; return how late its messages came."""
+    arrived: dict[int, int] = {}
+
+    def deliver(body: memoryview | bytes, _: Header) -> None:
+        now = time.monotonic_ns()
+        arrived[int(bytes(body[4:12]))] = now
+
+    with ToolNode(Environment.read(), "bench") as node:
+        node.listen("/bench", deliver)
+        command = [*program(stack, "play"), str(path), "-d", "2", "-q"]
+        subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=120)
+        node.wait(0.5)
+    late = sorted(arrived[i] - times[i] for i in arrived)
+    errors = [(each - late[0]) / 1000 for each in late]
+
+    def quantile(fraction: float) -> float:
+        return errors[int(fraction * (len(errors) - 1))]
+
+    return (
+        f"play {what:20} {stack:10} later than stored, us: median {quantile(0.5):6.0f}  90 % {quantile(0.9):6.0f}  "
+        f"99 % {quantile(0.99):6.0f}  most {errors[-1]:6.0f}  lost {len(times) - len(errors)}"
+    )
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> Iterator[str]:
+    """Yield a line of each case."""
+    for _ in range(arguments.rounds):
+        if "record" in arguments.cases:
+            for size, count in ((6_000_000, arguments.megabytes // 6), (1000, arguments.megabytes * 250)):
+                for stack in stacks():
+                    yield record(stack, size, count, folder)
+        if "play" in arguments.cases:
+            for hz, seconds, size in ((100, 5, 100), (1000, 5, 100), (30, 5, 1_000_000)):
+                path = folder / "play.bag"
+                times = make_bag(path, hz, seconds, size)
+                for stack in stacks():
+                    yield play(stack, path, times, f"{hz} Hz of {size} B")
+                path.unlink()
+
+
+def main() -> None:
+    """Run what the command line selects."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cases", default="record,play", help="record, play, or both")
+    parser.add_argument("--megabytes", type=int, default=600, help="what is recorded of each size")
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--folder", type=Path, default=None)
+    arguments = parser.parse_args()
+
+    loop = LoopThread("master")
+
+    async def start() -> Master:
+        master = Master()
+        await master.start()
+        return master
+
+    master = loop.run(start())
+    with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:
+        os.environ.update(
+            ROS_MASTER_URI=f"http://localhost:{master.port}", ROS_HOSTNAME="localhost", ROS_HOME=folder
+        )
+        for line in run(arguments, Path(folder)):
+            print(line, flush=True)
+    loop.run(master.close())
+    loop.close()
+    assert threading.active_count() < 20
+
+
+if __name__ == "__main__":
+    main()
