@@ -5,8 +5,7 @@ Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from minirospy.runtime.node.topics import InLink
@@ -15,8 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["Connection", "connection_to_publisher", "connection_to_subscriber"]
 
 
-@dataclass(frozen=True)
-class Connection:
+class Connection(NamedTuple):
     """One end of a link, as it was when it was looked at.
 
     ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` the topic; ``id`` is unique in the node.
