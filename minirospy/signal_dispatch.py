@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 from collections.abc import Iterator
-from contextvars import ContextVar
 
 __all__ = ["dispatching_signal", "is_dispatching_signal"]
 
-_is_dispatching = ContextVar("_is_dispatching", default=False)
+_this_thread = threading.local()
 
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
     """While a block runs, :func:`is_dispatching_signal` is true in this thread: it handles a signal."""
-    token = _is_dispatching.set(True)
+    _this_thread.is_dispatching = True
     try:
         yield
     finally:
-        _is_dispatching.reset(token)
+        _this_thread.is_dispatching = False
 
 
 def is_dispatching_signal() -> bool:
     """Return whether this thread handles a signal, in the middle of whatever else it does."""
-    return _is_dispatching.get()
+    return getattr(_this_thread, "is_dispatching", False)
