@@ -22,7 +22,7 @@ FRAMES = 20
 
 
 def stamped(parent, child, seconds, x=0.0):
-    """Return a transform with a turn of its own."""
+    """Return a transform that also turns."""
     import rospy
     from geometry_msgs.msg import TransformStamped
 

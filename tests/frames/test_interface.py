@@ -35,14 +35,14 @@ class OneTransform(BufferInterface):
     """A buffer that knows one answer."""
 
     def lookup_transform(self, *arguments: Any, **_: Any) -> TransformStamped:
-        """Return what was asked, as frame names."""
+        """Return the frames of the query."""
         found = TransformStamped()
         found.header.frame_id, found.child_frame_id = arguments[:2]
         found.transform.translation.x = 2.0
         return found
 
     def lookup_transform_full(self, *arguments: Any, **_: Any) -> TransformStamped:
-        """Return what was asked, as frame names."""
+        """Return the frames of the query."""
         return self.lookup_transform(arguments[0], arguments[2])
 
 

@@ -16,7 +16,7 @@ import pytest
 from minirospy.compat.tf import transformations
 from tests.frames import transformations_calls
 from tests.interop.conftest import HERE, REAL_PYTHON, compiled, start, stop
-from tests.tf2.conversation import ask_real, difference, edge_cases, questions, shortened
+from tests.tf2.conversation import difference, edge_cases, query_real, questions, shortened
 from tests.tf2.ours import our_answers
 
 RECORDED = HERE.parent / "tf2" / "recorded.json"
@@ -59,10 +59,10 @@ START = 1_700_000_000
 @pytest.mark.parametrize("lazily", [False, True], ids=["inserted", "as_bytes"])
 def test_ten_thousand_lookups_are_equal(lazily: bool) -> None:
     conversations = [questions(seed, 100) for seed in range(1000, 1110)]
-    real = ask_real(conversations)
+    real = query_real(conversations)
     lookups, different = 0, []
-    for asked, answers in zip(conversations, real, strict=True):
-        for question, was, is_ in zip(asked, answers, our_answers(asked, lazily=lazily), strict=True):
+    for queries, answers in zip(conversations, real, strict=True):
+        for question, was, is_ in zip(queries, answers, our_answers(queries, lazily=lazily), strict=True):
             lookups += question[0] not in {"set", "yaml", "string", "dot", "frames"}
             if text := difference(was, is_):
                 different.append(f"{question}: {text}")
@@ -72,9 +72,9 @@ def test_ten_thousand_lookups_are_equal(lazily: bool) -> None:
 
 def test_the_record_is_what_the_real_tf2_answers() -> None:
     recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
-    conversations = [asked for asked, _ in recorded]
+    conversations = [queries for queries, _ in recorded]
     assert conversations[: len(edge_cases())] == edge_cases()
-    for (_, kept), answers in zip(recorded, ask_real(conversations), strict=True):
+    for (_, kept), answers in zip(recorded, query_real(conversations), strict=True):
         assert not [
             text for was, is_ in zip(kept, answers, strict=True) if (text := difference(was, shortened(is_)))
         ]

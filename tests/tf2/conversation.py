@@ -22,7 +22,7 @@ def questions(seed: int, count: int) -> list[Question]:
     """Return a random tree, filled over some seconds, and ``count`` lookups in it, good ones and bad ones."""
     rng = random.Random(seed)
     names = [f"frame{n}" for n in range(rng.randrange(4, 14))]
-    asked: list[Question] = []
+    queries: list[Question] = []
     statics = {child for child in names if rng.random() < 0.25}
     trees = rng.choice([1, 1, 1, 2])
     start = rng.choice([0, 5, 1000])
@@ -33,7 +33,7 @@ def questions(seed: int, count: int) -> list[Question]:
                 continue
             above = names[(index * 7 + trees) % index] if rng.random() < 0.97 else rng.choice(names)
             stamp = start + step * 0.5 + rng.choice([0, 0, 0.25, -3])
-            asked.append(
+            queries.append(
                 ["set", above, child, nanoseconds(stamp), pose(rng), f"/node{index % 3}", child in statics]
             )
 
@@ -41,7 +41,7 @@ def questions(seed: int, count: int) -> list[Question]:
         target, source, fixed = (rng.choice([*names, *names, "nowhere"]) for _ in range(3))
         times = [rng.choice([0, nanoseconds(start + rng.uniform(-1, 14)), nanoseconds(start + rng.randrange(28) * 0.25)])
                  for _ in range(2)]  # fmt: skip
-        asked.append(
+        queries.append(
             rng.choice(
                 [
                     ["lookup", target, source, times[0]],
@@ -54,7 +54,7 @@ def questions(seed: int, count: int) -> list[Question]:
             )
         )
 
-    return [*asked, ["yaml"], ["string"], ["dot", 0], ["dot", nanoseconds(99.5)], ["frames"]]
+    return [*queries, ["yaml"], ["string"], ["dot", 0], ["dot", nanoseconds(99.5)], ["frames"]]
 
 
 def edge_cases() -> list[list[Question]]:
@@ -62,38 +62,43 @@ def edge_cases() -> list[list[Question]]:
     unit = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]
     second = 1_000_000_000
 
-    def tell(
+    def given(
         parent: str, child: str, stamp: int, numbers: list[float] = unit, is_static: bool = False
     ) -> Question:
         return ["set", parent, child, stamp, numbers, "/me", is_static]
 
     loop = [
-        tell("a", "b", second),
-        tell("l1", "l2", second),
-        tell("l2", "l1", second),
-        tell("l2", "l3", second),
+        given("a", "b", second),
+        given("l1", "l2", second),
+        given("l2", "l1", second),
+        given("l2", "l3", second),
     ]
     pairs = [("a", "l1"), ("l1", "a"), ("l2", "l1"), ("l1", "l2"), ("l3", "l1"), ("l1", "l3"), ("l3", "b")]
     for target, source in pairs:
         loop += [[verb, target, source, time] for verb in ("lookup", "can") for time in (0, second)]
         loop += [["common", target, source], ["chain", target, second, source, second, "l1"]]
 
-    deep = [tell(f"f{n}", f"f{n + 1}", second, [0.001, 0, 0, 0, 0, 0, 1.0]) for n in range(1003)]
+    deep = [given(f"f{n}", f"f{n + 1}", second, [0.001, 0, 0, 0, 0, 0, 1.0]) for n in range(1003)]
     for depth in (999, 1000, 1001, 1002):
         ends = [("f0", f"f{depth}"), (f"f{depth}", "f0")]
         deep += [["common", *each] for each in ends] + [
             ["can", *each, time] for each in ends for time in (0, second)
         ]
 
-    names = [tell("/map", "/odom", second), tell("odom", "//base", second), tell("odom", "Gerät", second)]
-    names += [tell("", "x", second), tell("x", "", second), tell("x", "x", second), tell("/y", "y", second)]
+    names = [given("/map", "/odom", second), given("odom", "//base", second), given("odom", "Gerät", second)]
     names += [
-        tell("x", "y", second, [math.inf, 0, 0, 0, 0, 0, 1.0]),
-        tell("x", "z", second, [0, 0, 0, 0, 0, 0, 1.1]),
+        given("", "x", second),
+        given("x", "", second),
+        given("x", "x", second),
+        given("/y", "y", second),
     ]
     names += [
-        tell("x", "z", second, [0, 0, 0, 0, 0, 0, 1.0049]),
-        tell("x", "w", second, [0, 0, 0, 0, 0, 0, 0.9949]),
+        given("x", "y", second, [math.inf, 0, 0, 0, 0, 0, 1.0]),
+        given("x", "z", second, [0, 0, 0, 0, 0, 0, 1.1]),
+    ]
+    names += [
+        given("x", "z", second, [0, 0, 0, 0, 0, 0, 1.0049]),
+        given("x", "w", second, [0, 0, 0, 0, 0, 0, 0.9949]),
     ]
     for name in ("map", "/map", "base", "/base", "Gerät", "", "x", "y", "z", "nowhere"):
         names += [["lookup", "map", name, 0], ["lookup", name, name, 5 * second], ["can", name, "map", 0]]
@@ -102,16 +107,16 @@ def edge_cases() -> list[list[Question]]:
     names += [["frames"], ["yaml"], ["string"], ["dot", 0]]
 
     static = [["yaml"], ["string"], ["dot", 0], ["dot", second]]
-    static += [tell("a", "b", 7 * second, is_static=True), tell("b", "c", 7 * second, is_static=True)]
+    static += [given("a", "b", 7 * second, is_static=True), given("b", "c", 7 * second, is_static=True)]
     static += [
         ["lookup", "a", "c", 0],
         ["common", "a", "c"],
         ["lookup", "a", "c", 99 * second],
         ["lookup", "c", "c", 0],
     ]
-    static += [tell("b", "c", 8 * second, [9.0, 0, 0, 0, 0, 0, 1.0]), ["lookup", "a", "c", 0]]
-    static += [tell("c", "d", stamp * second) for stamp in (30, 31, 15, 30, 20, 42)]
-    static += [tell("c", "d", 50 * second, is_static=True), tell("a", "e", 0), tell("a", "e", 3 * second)]
+    static += [given("b", "c", 8 * second, [9.0, 0, 0, 0, 0, 0, 1.0]), ["lookup", "a", "c", 0]]
+    static += [given("c", "d", stamp * second) for stamp in (30, 31, 15, 30, 20, 42)]
+    static += [given("c", "d", 50 * second, is_static=True), given("a", "e", 0), given("a", "e", 3 * second)]
     static += [["lookup", "a", "d", stamp * second] for stamp in (0, 30, 31, 32, 41, 42, 43, 50, 51)]
     static += [["lookup", "e", "d", stamp * second] for stamp in (0, 1, 3, 40, 50)]
     static += [["yaml"], ["clear"], ["yaml"], ["string"], ["dot", 0], ["dot", 50 * second], ["frames"]]
@@ -120,11 +125,11 @@ def edge_cases() -> list[list[Question]]:
     static += [
         ["common", "a", "d"],
         ["common", "a", "c"],
-        tell("c", "d", second),
+        given("c", "d", second),
         ["lookup", "a", "d", second],
     ]
 
-    chain = [tell(above, below, n * second) for n in (1, 2, 3)
+    chain = [given(above, below, n * second) for n in (1, 2, 3)
              for above, below in (("a", "b"), ("b", "c"), ("c", "d"), ("b", "e"), ("e", "f"), ("x", "y"))]  # fmt: skip
     for target, source, fixed in [
         *_triples("abdf"),
@@ -160,7 +165,7 @@ def nanoseconds(seconds: float) -> int:
     return max(0, int(round(seconds * 1024) * 9765625 // 10))
 
 
-def real_answers(asked: list[Question]) -> list[Answer]:
+def real_answers(queries: list[Question]) -> list[Answer]:
     """Return the answers of the tf2_py that this interpreter imports."""
     import rospy
     import tf2_py
@@ -202,7 +207,7 @@ def real_answers(asked: list[Question]) -> list[Answer]:
         "exists": lambda name: bool(core._frameExists(name)),
     }
     answers: list[Answer] = []
-    for verb, *arguments in asked:
+    for verb, *arguments in queries:
         try:
             answers.append(["ok", verbs[verb](*arguments)])
         except tf2_py.TransformException as error:
@@ -210,7 +215,7 @@ def real_answers(asked: list[Question]) -> list[Answer]:
     return answers
 
 
-def ask_real(conversations: list[list[Question]]) -> list[list[Answer]]:
+def query_real(conversations: list[list[Question]]) -> list[list[Answer]]:
     """Return the answers of the system's tf2_py, which /usr/bin/python3 imports."""
     done = subprocess.run(
         ["/usr/bin/python3", __file__],
@@ -244,4 +249,4 @@ def difference(real: Answer, ours: Answer, tolerance: float = 1e-12) -> str:
 
 
 if __name__ == "__main__":
-    json.dump([real_answers(asked) for asked in json.load(sys.stdin)], sys.stdout)
+    json.dump([real_answers(queries) for queries in json.load(sys.stdin)], sys.stdout)

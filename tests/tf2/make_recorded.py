@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from tests.tf2.conversation import ask_real, edge_cases, questions, shortened
+from tests.tf2.conversation import edge_cases, query_real, questions, shortened
 
 FOLDER = Path(__file__).parent
 
@@ -13,10 +13,10 @@ FOLDER = Path(__file__).parent
 def main() -> None:
     """Ask the real one, and write the file."""
     conversations = [*edge_cases(), *(questions(seed, 40) for seed in range(12))]
-    real = ask_real(conversations)
+    real = query_real(conversations)
     lines = [
-        json.dumps([asked, [shortened(answer) for answer in answers]])
-        for asked, answers in zip(conversations, real, strict=True)
+        json.dumps([queries, [shortened(answer) for answer in answers]])
+        for queries, answers in zip(conversations, real, strict=True)
     ]
     (FOLDER / "recorded.json").write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
 

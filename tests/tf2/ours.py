@@ -23,7 +23,7 @@ def tf_message(*transforms: tuple[str, str, int, list[float]]) -> bytes:
     return b"".join(pieces)
 
 
-def our_answers(asked: list[Question], *, lazily: bool = False) -> list[Answer]:
+def our_answers(queries: list[Question], *, lazily: bool = False) -> list[Answer]:
     """Return our answers; ``lazily``: what is not static comes as serialised messages."""
     buffer = TransformBuffer()
 
@@ -63,7 +63,7 @@ def our_answers(asked: list[Question], *, lazily: bool = False) -> list[Answer]:
         "exists": buffer.frame_exists,
     }
     answers: list[Answer] = []
-    for verb, *arguments in asked:
+    for verb, *arguments in queries:
         try:
             answers.append(["ok", verbs[verb](*arguments)])
         except TransformException as error:

@@ -18,11 +18,11 @@ RECORDED: list[tuple[list[Question], list[Answer]]] = json.loads(
 @pytest.mark.parametrize("lazily", [False, True], ids=["inserted", "as_bytes"])
 @pytest.mark.parametrize("number", range(len(RECORDED)))
 def test_answers_are_those_of_the_real_tf2(number: int, lazily: bool) -> None:
-    asked, real = RECORDED[number]
-    ours = our_answers(asked, lazily=lazily)
+    queries, real = RECORDED[number]
+    ours = our_answers(queries, lazily=lazily)
     differences = [
         f"{question}: {text}"
-        for question, was, is_ in zip(asked, real, ours, strict=True)
+        for question, was, is_ in zip(queries, real, ours, strict=True)
         if (text := difference(was, shortened(is_)))
     ]
     assert not differences
