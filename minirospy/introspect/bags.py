@@ -32,6 +32,7 @@ __all__ = [
     "class_of_connection",
     "compress",
     "convert12",
+    "copy_bag",
     "data_size",
     "filter_bag",
     "new_bag",
@@ -98,6 +99,17 @@ def compress(source: str, target: str, compression: str, progress: Progress) -> 
 
     Each connection is kept. Where the source is damaged, what was before the damage is in the target.
     """
+    copy_bag(source, target, lambda connection: connection, compression, progress)
+
+
+def copy_bag(
+    source: str,
+    target: str,
+    change: Callable[[Connection], Connection],
+    compression: str = compressions.NONE,
+    progress: Progress = lambda done: None,
+) -> None:
+    """Write a bag again, in the order of time, with its connections as ``change`` returns them. Raise BagError, OSError."""
     with open_reader(source) as reader, new_bag(target, compression) as writer:
         numbers: dict[int, int] = {}
         connections = list(reader.connections.values())
@@ -106,7 +118,7 @@ def compress(source: str, target: str, compression: str, progress: Progress) -> 
             for time, rank, _, body, after in found:
                 number = numbers.get(rank)
                 if number is None:
-                    number = numbers[rank] = _add(writer, connections[rank])
+                    number = numbers[rank] = _add(writer, change(connections[rank]))
                 writer.write(number, time, data[body:after])
                 done += after - body
             progress(done)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from minirospy.introspect.migration import MessageMigrator, Migration
     from minirospy.introspect.migration_rules import MessageUpdateRule
 
-__all__ = ["VERBS"]
+__all__ = ["VERBS", "make_migrator", "print_migrations", "write_rules"]
 
 _CHECK = "Determine whether a bag is playable in the current system, or if it can be migrated."
 _FIX = "Repair the messages in a bag file so that it can be played in the current system."
@@ -61,7 +61,9 @@ def _check(words: list[str], genrules: str | None, append: bool, noplugins: bool
     try:
         with bags.open_reader(path):
             pass
-        migrator = _migrator([*rule_files, *([genrules] if append and genrules else [])], noplugins)
+        migrator = make_migrator(
+            [*rule_files, *([genrules] if append and genrules else [])], noplugins=noplugins
+        )
         migrations = bag_migration.check_bag(migrator, path, report)
     except (BagError, OSError) as error:
         report(unreadable(path, error))
@@ -71,9 +73,9 @@ def _check(words: list[str], genrules: str | None, append: bool, noplugins: bool
         print("Bag file does not need any migrations.")
         return 0
     print("The following migrations need to occur:")
-    rules = _print_migrations(migrations)
+    rules = print_migrations(migrations)
     if genrules is not None:
-        return _write_rules(genrules, migrator, rules)
+        return write_rules(genrules, migrator, rules)
     if rules:
         print("\nTo generate rules, please run with -g <rulefile>")
     else:
@@ -91,7 +93,7 @@ def _check_rule_file(path: str, *, append: bool) -> None:
         raise Misuse(text, text)
 
 
-def _write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpdateRule]) -> int:
+def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpdateRule]) -> int:
     """Write the missing rules for a person to complete; where a type has moved, ask for the new name."""
     left = migrator.filter_rules_unique(rules)
     if not left:
@@ -181,7 +183,9 @@ def _fix(words: list[str], noplugins: bool, force: bool) -> int:
         report(f"Cannot open {target} for writing")
         return 1
     try:
-        missing = fix_bag(_migrator(rule_files, noplugins), source, temporary, report, force=force)
+        missing = fix_bag(
+            make_migrator(rule_files, noplugins=noplugins), source, temporary, report, force=force
+        )
         if not missing:
             os.replace(temporary, target)
     except (BagError, OSError) as error:
@@ -197,14 +201,14 @@ def _fix(words: list[str], noplugins: bool, force: bool) -> int:
         print("Bag migrated successfully.")
         return 0
     print("Bag could not be migrated.  The following migrations could not be performed:")
-    _print_migrations(missing)
+    print_migrations(missing)
     print(
         "Try running 'rosbag check' to create the necessary rule files or run 'rosbag fix' with the '--force' option."
     )
     return 1
 
 
-def _migrator(rule_files: Sequence[str], noplugins: bool) -> MessageMigrator:
+def make_migrator(rule_files: Sequence[str], *, noplugins: bool) -> MessageMigrator:
     from minirospy.introspect.migration import MessageMigrator
     from minirospy.introspect.migration_rules import BagMigrationException
 
@@ -214,7 +218,7 @@ def _migrator(rule_files: Sequence[str], noplugins: bool) -> MessageMigrator:
         raise MinirospyError(str(error)) from error
 
 
-def _print_migrations(migrations: Sequence[Migration]) -> list[MessageUpdateRule]:
+def print_migrations(migrations: Sequence[Migration]) -> list[MessageUpdateRule]:
     """Print what has to be migrated; return the rules that are missing."""
     rules = []
     for path, missing in migrations:

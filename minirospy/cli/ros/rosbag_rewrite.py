@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from collections.abc import Callable
 
 from minirospy.bag import compression
@@ -84,6 +83,8 @@ def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) 
 
 
 def _reindex_one(source: str, target: str, quiet: bool) -> None:
+    import shutil  # whose import takes longer than the commands
+
     from minirospy.cli.ros.rosbag_progress import showing_progress
     from minirospy.introspect import bags
 
