@@ -142,7 +142,7 @@ def test_unsubscribe() -> None:
     tree.subscribe("/b", "/n", "u")
     tree.subscribe("/b", "/m", "u")
     assert tree.unsubscribe("/a", "/n", "u")
-    assert not tree.unsubscribe("/a", "/n", "u")
+    assert tree.unsubscribe("/a", "/n", "u") is False
     assert not tree.unsubscribe("/b", "/n", "other")
     assert tree.subscribed_keys("u") == ["/b/"]
     tree.unsubscribe_node("/n", "u")
@@ -272,6 +272,19 @@ def test_room_shrinks_by_each_parameter_and_its_name() -> None:
     left = 1000 - 40 - 3 - 120
     assert tree.has_room(left)
     assert not tree.has_room(left + 1)
+
+
+def test_namespace_is_copied_once_after_it_was_returned() -> None:
+    # To copy a large one at each change would take long.
+    tree = tree_of(a={"x": 1})
+    for _ in range(2):
+        returned = tree.get("/a")
+        tree.set("/a/x", 2, "")
+        own = tree._find(["a"])
+        assert own is not returned
+        tree.set("/a/y", 3, "")
+        tree.delete("/a/y")
+        assert tree._find(["a"]) is own
 
 
 def test_small_tree_is_one_of_less_than_200_kb() -> None:
