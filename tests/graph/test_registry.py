@@ -120,12 +120,13 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
         try:
             registry.register_publisher(f"/n{registered}", f"/t{registered}", "a/B", "u")
         except RegistryFullError as error:
-            limit = error.limit
+            refused = error
             break
 
         registered += 1
 
-    assert limit == "0 MiB for all registrations"
+    assert refused.limit == "0 MiB for all registrations"
+    assert str(refused) == "the registration is beyond the limit of 0 MiB for all registrations"
     assert 40 < registered < 200
     # A long name takes more.
     for number in range(registered):
