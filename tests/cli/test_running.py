@@ -50,10 +50,15 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
     (folder / "wait.py").write_text(
         # One write a line: roslaunch writes to the same pipe at the same time.
+        "#!/usr/bin/env python3\n"
         "import sys, time\nsys.stdout.write(' '.join(['waiting', *sys.argv[1:]]) + '\\n')\nsys.stdout.flush()\n"
         "try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
     )
-    (folder / "stop.py").write_text("import sys\nprint('stopping')\nsys.exit(int(sys.argv[1]))\n")
+    (folder / "stop.py").write_text(
+        "#!/usr/bin/env python3\nimport sys\nprint('stopping')\nsys.exit(int(sys.argv[1]))\n"
+    )
+    for program in folder.glob("*.py"):
+        program.chmod(0o755)
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     return folder
 
