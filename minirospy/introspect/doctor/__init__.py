@@ -71,6 +71,7 @@ class Examination:
         self, environment: Environment, place: MasterPlace, own_addresses: list[str]
     ) -> Iterator[Finding]:
         from minirospy.introspect.doctor import graph as graph_checks
+        from minirospy.introspect.doctor.frames import check_frames
         from minirospy.introspect.doctor.listening import check_listeners, listen, listeners
         from minirospy.introspect.doctor.master import check_clock, check_master
         from minirospy.introspect.doctor.other_machine import check_listens, check_machine
@@ -114,6 +115,7 @@ class Examination:
             yield from graph_checks.check_topics(state, nodes)
             yield from graph_checks.check_connections(graph, state, nodes)
             yield from graph_checks.check_services(graph, state, nodes)
+            yield from check_frames(environment, state)
         except (MasterUnreachableError, RpcError) as error:
             yield problem("master", f"it answered, and then no more: {error}", "look at its terminal")
         else:
