@@ -39,7 +39,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT, source, ignore=left_out)
     shutil.copy(ROOT / ".gitignore", source)
     for generated in (source / "minirospy" / "overlay").glob("*_msgs"):
-        shutil.rmtree(generated)
+        if (ROOT / "msgs" / generated.name).exists():
+            shutil.rmtree(generated)
     target = tmp_path_factory.mktemp("wheel")
     command = [
         sys.executable,
@@ -70,6 +71,9 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/overlay/rospy/__init__.py",
         "minirospy/overlay/rospy/py.typed",
         "minirospy/overlay/std_msgs/py.typed",
+        "minirospy/overlay/tf2_geometry_msgs/__init__.py",
+        "minirospy/overlay/tf/transformations.py",
+        "minirospy/overlay/tf/msg/_tfMessage.py",
         "minirospy/overlay/std_msgs/msg/_Bool.py",
         "minirospy/overlay/sick_safetyscanners/srv/_FieldData.py",
         "minirospy/share/msgs/std_msgs/msg/Bool.msg",

@@ -35,14 +35,14 @@ def test_solvers_refuse_by_name(name: str) -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: PyKDL.Vector(1, 2),
+        lambda: PyKDL.Vector(1, 2),  # type: ignore[call-overload]
         lambda: PyKDL.Rotation(1, 2),
-        lambda: PyKDL.Frame(5),
-        lambda: PyKDL.Vector() + 1,
-        lambda: PyKDL.Frame() * 2,
+        lambda: PyKDL.Frame(5),  # type: ignore[arg-type]
+        lambda: PyKDL.Vector() + 1,  # type: ignore[operator]
+        lambda: PyKDL.Frame() * 2,  # type: ignore[operator]
         lambda: PyKDL.dot(PyKDL.Vector(), PyKDL.Twist()),
         lambda: PyKDL.Equal(PyKDL.Vector(), PyKDL.Twist()),
-        lambda: PyKDL.Frame().Inverse(5),
+        lambda: PyKDL.Frame().Inverse(5),  # type: ignore[call-overload]
         lambda: hash(PyKDL.Vector()),
     ],
 )

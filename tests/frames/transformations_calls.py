@@ -172,7 +172,7 @@ def is_near(real: Any, ours: Any) -> bool:
     if isinstance(real, list):
         return isinstance(ours, list) and len(real) == len(ours) and all(map(is_near, real, ours))
     if isinstance(real, float) or isinstance(ours, float):
-        return abs(real - ours) <= 1e-9 * max(1.0, abs(real))
+        return bool(abs(real - ours) <= 1e-9 * max(1.0, abs(real)))
     return bool(real == ours)
 
 

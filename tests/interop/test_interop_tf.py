@@ -161,7 +161,7 @@ def test_transforms_between_ours_and_roscpp(
                 send.ask(0, parent, child, START, n * 1_000_003, *pose())
 
         last = 19 * 1_000_003
-        questions = [("map", "hand", START, last, 30)]
+        questions: list[tuple[object, ...]] = [("map", "hand", START, last, 30)]
         for _ in range(60):
             frames = rng.sample(["map", "world", "base", "arm", "wrist", "hand", "nowhere"], 2)
             questions.append((*frames, START, rng.randrange(900_000, last + 100_000), 0))

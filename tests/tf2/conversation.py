@@ -106,7 +106,7 @@ def edge_cases() -> list[list[Question]]:
         names += [["lookup_full", "map", 0, "odom", 0, name], ["can_full", "odom", 0, "map", 0, name]]
     names += [["frames"], ["yaml"], ["string"], ["dot", 0]]
 
-    static = [["yaml"], ["string"], ["dot", 0], ["dot", second]]
+    static: list[Question] = [["yaml"], ["string"], ["dot", 0], ["dot", second]]
     static += [given("a", "b", 7 * second, is_static=True), given("b", "c", 7 * second, is_static=True)]
     static += [
         ["lookup", "a", "c", 0],
@@ -129,7 +129,7 @@ def edge_cases() -> list[list[Question]]:
         ["lookup", "a", "d", second],
     ]
 
-    chain = [given(above, below, n * second) for n in (1, 2, 3)
+    chain: list[Question] = [given(above, below, n * second) for n in (1, 2, 3)
              for above, below in (("a", "b"), ("b", "c"), ("c", "d"), ("b", "e"), ("e", "f"), ("x", "y"))]  # fmt: skip
     for target, source, fixed in [
         *_triples("abdf"),

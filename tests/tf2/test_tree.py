@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import tracemalloc
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from minirospy.errors import DeserializationError, ExtrapolationException, TransformException
 from minirospy.tf2.buffer import TransformBuffer
 from minirospy.tf2.insertion import Refusal, RefusalLog
-from minirospy.tf2.pending import Layout
+from minirospy.tf2.pending import Layout, TransformSample
 from tests.tf2.ours import tf_message
 
 SECOND = 1_000_000_000
@@ -199,7 +200,12 @@ def test_message_of_a_known_layout_is_not_decoded(monkeypatch: pytest.MonkeyPatc
     stream(buffer, 1)
     decoded: list[str] = []
     take = Layout.take
-    monkeypatch.setattr(Layout, "take", lambda self, child: decoded.append(child) or take(self, child))
+
+    def counted(self: Layout, child: str) -> Iterator[tuple[int, str, TransformSample]]:
+        decoded.append(child)
+        return take(self, child)
+
+    monkeypatch.setattr(Layout, "take", counted)
     stream(buffer, 50)
     assert kept(buffer) == 50
     assert decoded == []

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from minirospy.compat.PyKDL.vectors import EPSILON, Twist, Vector, Wrench
+
+if TYPE_CHECKING:
+    from std_msgs.msg import Header
 
 __all__ = ["Frame", "Rotation"]
 
@@ -265,6 +268,8 @@ class Frame:
     """A pose: the rotation ``M`` and the position ``p``."""
 
     __hash__ = None  # type: ignore[assignment]
+    header: Header
+    """Where tf2_ros.Stamped has set it."""
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
         """Make it of a Rotation and a Vector, of one of them, of another Frame, or of nothing."""

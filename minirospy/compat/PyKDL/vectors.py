@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TypeVar, overload
+from typing import TYPE_CHECKING, TypeVar, overload
+
+if TYPE_CHECKING:
+    from std_msgs.msg import Header
 
 __all__ = ["EPSILON", "Screw", "Twist", "Vector", "Wrench", "numbers_text"]
 
@@ -12,9 +15,11 @@ _S = TypeVar("_S", bound="Screw")
 
 
 class Vector:
-    """Three floats: a point, or a direction. Other attributes, such as a ``header``, may be set."""
+    """Three floats: a point, or a direction. Other attributes may be set."""
 
     __hash__ = None  # type: ignore[assignment]
+    header: Header
+    """Where tf2_ros.Stamped has set it."""
 
     @overload
     def __init__(self, x: float, y: float, z: float) -> None: ...
@@ -148,6 +153,8 @@ class Screw:
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]
+    header: Header
+    """Where tf2_ros.Stamped has set it."""
 
     def _parts(self) -> tuple[Vector, Vector]:
         first, second = (getattr(self, name) for name in self._NAMES)

@@ -89,7 +89,9 @@ def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, fl
     return _angles(rows, axes)
 
 
-def euler_from_quaternion(quaternion: Sequence[float], axes: Axes = "sxyz") -> tuple[float, float, float]:
+def euler_from_quaternion(
+    quaternion: Sequence[float] | NDArray[numpy.float64], axes: Axes = "sxyz"
+) -> tuple[float, float, float]:
     """Return the angles of a quaternion [x, y, z, w], of any length. Raise KeyError, ValueError."""
     return _angles(rotation_rows(quaternion), axes)
 
@@ -123,7 +125,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
     return quaternion
 
 
-def rotation_rows(quaternion: Sequence[float]) -> list[list[float]]:
+def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
     """Return the rows of the 3x3 matrix of a quaternion of any length; of a zero one, those of the identity."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
