@@ -48,6 +48,7 @@ PAGES = (
     "actions.md",
     "parameters.md",
     "logging.md",
+    "bags.md",
 )
 PATIENCE = 30.0
 """Seconds that a step may take; a busy machine needs its time."""
