@@ -20,6 +20,7 @@ from minirospy.idl.spec import MessageSpec
 from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import naming_warning
+from minirospy.workspace.options import make_options
 from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
@@ -220,8 +221,11 @@ class _Builder:
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
         # What generated code depends on: definitions, what CMakeLists.txt says of them, and the compiler.
-        compiler = (Path(__file__).parents[1] / "idl").glob("*.py")
-        made_of = [path for plan in plans for path in (*plan.definitions, plan.cmake_lists)]
+        ours = Path(__file__).parents[1]
+        compiler = [*(ours / "idl").glob("*.py"), *(ours / "compat" / "dynamic_reconfigure").glob("*.py")]
+        made_of = [
+            path for plan in plans for path in (*plan.definitions, *_option_files(plan), plan.cmake_lists)
+        ]
         self._key = _key([*made_of, *compiler])
 
     def package(self, plan: Plan) -> Report:
@@ -237,7 +241,7 @@ class _Builder:
                 path.chmod(0o755)
 
         outputs = list(relays)
-        if plan.definitions:
+        if plan.definitions or plan.options:
             before = _read_stamp(stamp)
             if (
                 before.get("key") == self._key
@@ -250,6 +254,11 @@ class _Builder:
             modules = self._compile(plan, bool(setup and plan.name in setup.packages))
             changed += [path for path, text in modules.items() if write_if_changed(path, text)]
             outputs += modules
+        if plan.options:
+            options, more = make_options(plan, self._workspace.devel)
+            outputs += options
+            changed += options
+            warnings += more
 
         outside = sorted(self._closure(plan.message_depends) - self._plans.keys())
         self._finish(stamp, outputs, outside)
@@ -401,6 +410,12 @@ class _Builder:
         return found
 
 
+def _option_files(plan: Plan) -> set[Path]:
+    """Return the .cfg files of a package, and the modules next to them that they may import."""
+    folders = {path.parent for path in plan.options}
+    return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
+
+
 def _key(files: Iterable[Path]) -> str:
     """Return a fingerprint of files: their names, times and sizes."""
     import hashlib
@@ -462,6 +477,8 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
         count = sum(path.suffix == suffix for path in plan.definitions)
         if count:
             words.append(f"{count} {word}{'' if count == 1 else 's'}")
+    if plan.options:
+        words.append(f"{len(plan.options)} configuration{'' if len(plan.options) == 1 else 's'}")
     if setup:
         words += [f"Python package {name}" for name in setup.packages]
         words += [f"Python module {name}" for name in setup.modules]

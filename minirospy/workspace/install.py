@@ -42,9 +42,14 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
         yield share / path.suffix[1:] / path.name, (path, False)
 
     built = workspace.devel / DIST_PACKAGES / plan.name
-    if plan.definitions:
+    if plan.definitions or plan.options:
         for path in _files(built):
             yield modules / plan.name / path.relative_to(built), (path, False)
+
+    for file in plan.options:
+        header = workspace.devel / "include" / plan.name / f"{file.stem}Config.h"
+        if header.is_file():
+            yield workspace.install / "include" / plan.name / header.name, (header, False)
 
     if plan.has_setup:
         setup = read_python_setup(plan.folder)

@@ -58,7 +58,8 @@ _TYPE_NAME = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*$", re.ASCII)
 _SYSTEMS = {"Windows": ("WIN32", "MSVC"), "Darwin": ("UNIX", "APPLE"), "Linux": ("UNIX",)}
 _BEFORE = {
     "generate_messages": ("catkin_package",),
-    "catkin_python_setup": ("generate_messages",),
+    "catkin_python_setup": ("generate_messages", "generate_dynamic_reconfigure_options"),
+    "generate_dynamic_reconfigure_options": ("catkin_package",),
 }
 """What catkin wants before what, though it makes no difference here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
@@ -111,7 +112,8 @@ class Plan(NamedTuple):
 
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages they may
     contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a
-    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions for this workspace alone.
+    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions for this workspace alone;
+    ``options``: the .cfg files of dynamic_reconfigure.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Plan(NamedTuple):
     installs: tuple[Install, ...]
     tests: tuple[Test, ...]
     warnings: tuple[str, ...]
+    options: tuple[Path, ...] = ()
 
     @property
     def cmake_lists(self) -> Path:
@@ -182,6 +185,7 @@ class _Collector:
         self._installs: list[Install] = []
         self._tests: list[Test] = []
         self._warnings: list[str] = []
+        self._option_files: list[Path] = []
 
         self._readers: dict[str, Callable[[Command], None]] = {
             "project": self._project,
@@ -243,6 +247,7 @@ class _Collector:
             installs=tuple(self._installs),
             tests=tuple(self._tests),
             warnings=tuple(self._warnings),
+            options=tuple(self._option_files),
         )
 
     def _path(self, command: Command, name: str) -> str:
@@ -322,9 +327,11 @@ class _Collector:
 
     def _options(self, command: Command) -> None:
         for name in command.arguments:
-            self.warn(
-                command.file, command.line, f"[{name}] is not built: minirospy has no dynamic_reconfigure yet"
-            )
+            file = command.folder / name
+            if not file.is_file():
+                near = did_you_mean(file.name, (each.name for each in file.parent.glob("*.cfg")), 1)
+                raise _error(command, f"{command.name}: [{name}] does not exist{near}")
+            self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
         """Check that package.xml names what is passed on to other packages, for the build and for the run."""

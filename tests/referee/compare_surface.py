@@ -80,6 +80,11 @@ AROUND = [
     "rosbag",
     "rosbag.bag",
     "rosbag.migration",
+    "dynamic_reconfigure",
+    "dynamic_reconfigure.client",
+    "dynamic_reconfigure.encoding",
+    "dynamic_reconfigure.server",
+    "dynamic_reconfigure.parameter_generator_catkin",
 ]
 """The modules of the second page."""
 FRAMES = [
@@ -114,6 +119,8 @@ OF_ROS = (
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "rosbag", "message_filters", "sensor_msgs",
     "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
     "PyKDL",
+    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
+    "sensor_msgs", "angles", "dynamic_reconfigure",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
@@ -188,6 +195,7 @@ REASONS = {
         ),
         "the inside of the commands rosmsg and rosmsg-proto",
     ),
+    **dict.fromkeys(("LINEDEBUG", "id"), "the generator's inside"),
     "ForkingXMLRPCServer": "a server that forks: not on every system",
     "isstring": "a leftover of Python 2",
     "SIOCGIFADDR": "Linux's own number of a call",
@@ -234,6 +242,21 @@ MEMBERS_INSIDE = {
             "set_times",
         ),
         "the inside of ROSTopicHz",
+    ),
+    **dict.fromkeys(
+        (
+            "appendgroup",
+            "appendline",
+            "crepr",
+            "generatecpp",
+            "generatedoc",
+            "generatepy",
+            "generateusage",
+            "generatewikidoc",
+            "mkdirabs",
+            "replace_infinity",
+        ),
+        "the generator's inside",
     ),
     "decode": "xmlrpc's own",
     "custom_strify_message": "the inside of CallbackEcho",

@@ -530,14 +530,6 @@ def test_warnings(scene: Scene) -> None:
     )
 
 
-def test_options_of_dynamic_reconfigure_are_left_out(scene: Scene) -> None:
-    folder = scene.package(
-        "p", "generate_dynamic_reconfigure_options(cfg/Lamp.cfg)", "", {"cfg/Lamp.cfg": ""}
-    )
-    (warning,) = scene.build()["p"].warnings
-    assert warning.startswith(f"{folder / 'CMakeLists.txt'}:3: [cfg/Lamp.cfg] is not built")
-
-
 def test_package_xml_that_catkin_would_refuse_is_a_warning(scene: Scene) -> None:
     folder = scene.package("p")
     (folder / "package.xml").write_text(
