@@ -24,6 +24,17 @@ STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "s
 ANY_TYPE = InterfaceType("*", "*")
 
 
+def test_type_of_a_message_and_of_a_service() -> None:
+    class Message:
+        _type, _md5sum, _full_text = BOOL
+
+    class Service:
+        _type, _md5sum = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
+
+    assert InterfaceType.of(Message) == BOOL
+    assert InterfaceType.of(Service) == (Service._type, Service._md5sum, "")
+
+
 @pytest.mark.parametrize(("mine", "theirs"), [(BOOL, BOOL), (BOOL, ANY_TYPE), (ANY_TYPE, BOOL)])
 def test_a_fitting_pair_accepts_each_other(mine: InterfaceType, theirs: InterfaceType) -> None:
     asked = subscriber_header("/t", theirs, "/sub")

@@ -19,6 +19,7 @@ from minirospy.wire.http import MAX_BODY
 from minirospy.wire.xmlrpc import (
     Call,
     DateTime,
+    Serialized,
     parse_call,
     parse_call_in_steps,
     parse_response,
@@ -470,6 +471,10 @@ def test_answer_may_be_as_long_as_the_limit(value: Any) -> None:
 def test_answer_beyond_a_mebibyte_is_written_alone() -> None:
     needs = list(serialize_response_in_steps("x" * 20 * 65536, MAX_BODY))
     assert needs == [None] * 14 + [ALONE] + [None] * 4
+
+
+def test_answer_that_is_written_already_is_joined() -> None:
+    assert serialize_response(Serialized([b"<a", b"/>"])) == b"<a/>"
 
 
 def test_each_step_is_short() -> None:
