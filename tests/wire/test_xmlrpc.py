@@ -64,6 +64,7 @@ def test_calls(args: list[Any]) -> None:
 
 
 def test_bytes_travel_as_base64() -> None:
+    assert parse_response(serialize_response(b"x" * 3000)) == b"x" * 3000
     assert parse_response(serialize_response(b"\x00\xff")) == b"\x00\xff"
     (read,), _ = xmlrpc.client.loads(serialize_response(b"\x00\xff"))
     assert isinstance(read, xmlrpc.client.Binary)
@@ -260,6 +261,15 @@ def test_64_levels_of_lists_are_written_and_read(levels: int) -> None:
             assert b"<int>1</int>" in write()
 
 
+def test_empty_list_at_the_65th_level_is_refused() -> None:
+    value: Any = []
+    for _ in range(65):
+        value = [value]
+    finish(serialize_response_in_steps(value[0], MAX_BODY))
+    with pytest.raises(RpcProtocolError, match="a value is nested deeper than 64 levels"):
+        finish(serialize_response_in_steps(value, MAX_BODY))
+
+
 @pytest.mark.parametrize("levels", [256, 257])
 def test_levels_of_tags_are_limited(levels: int) -> None:
     reader = Reader()
@@ -451,6 +461,7 @@ def test_steps_of_writing_are_of_one_size() -> None:
     numbers = sizes([1] * 900)
     assert len(numbers) == 4
     assert numbers[1:3] == [300 * len("<value><int>1</int></value>")] * 2
+    assert len(sizes([[1] * 900] * 3)) == 10
     # 240 entries of five parts each.
     assert len(sizes({str(number): number for number in range(1000)})) == 5
     for text in ("x" * 300_000, {"x" * 300_000: 1}):
