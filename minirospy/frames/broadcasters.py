@@ -5,7 +5,10 @@ Source: http://wiki.ros.org/tf2_ros.
 
 from __future__ import annotations
 
+import copy
+import threading
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
@@ -29,18 +32,29 @@ class TransformBroadcaster:
 class StaticTransformBroadcaster:
     """Publishes transforms that hold at every time on /tf_static, latched: listeners that come later get all of them.
 
-    A transform replaces the one that was sent before of the same child frame.
+    A transform replaces the one that was sent before of the same child frame. The broadcasters of a process share what they
+    have sent, since a node has one latched message a topic: with the real ones, that of the last broadcaster.
     """
+
+    _lock = threading.Lock()
+    _sent: WeakKeyDictionary[object, dict[str, TransformStamped]] = WeakKeyDictionary()
+    """By the topic that a node's broadcasters share: the transforms by child frame."""
 
     def __init__(self) -> None:
         self.pub_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=100, latch=True)
-        self.net_message = TFMessage()
+
+    @property
+    def net_message(self) -> TFMessage:
+        """All that was sent."""
+        return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:  # noqa: N802
         """Publish a transform, or several, together with all that were sent before."""
-        by_child = {each.child_frame_id: each for each in (*self.net_message.transforms, *_listed(transform))}
-        self.net_message = TFMessage(list(by_child.values()))
-        self.pub_tf.publish(self.net_message)
+        with self._lock:
+            sent = self._sent.setdefault(self.pub_tf.impl, {})
+            # Copies: a program may fill the same message again.
+            sent |= {each.child_frame_id: copy.deepcopy(each) for each in _listed(transform)}
+            self.pub_tf.publish(self.net_message)
 
 
 def _listed(transform: TransformStamped | Sequence[TransformStamped]) -> list[TransformStamped]:

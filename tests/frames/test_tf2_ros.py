@@ -79,6 +79,21 @@ for child in ("a", "b"):
 """)
         assert said == "2.0\n1.0\n"
 
+    def test_broadcasters_of_a_process_do_not_hide_each_others_static_transforms(self) -> None:
+        said = run("""
+first, second = tf2_ros.StaticTransformBroadcaster(), tf2_ros.StaticTransformBroadcaster()
+message = stamped("map", "a", 0, 1.0)
+first.sendTransform(message)
+message.child_frame_id = "b"
+second.sendTransform(message)
+buffer = tf2_ros.Buffer()
+listener = tf2_ros.TransformListener(buffer)
+for child in ("a", "b"):
+    print(buffer.lookup_transform("map", child, NOW, LONG).transform.translation.x)
+print([each.child_frame_id for each in first.net_message.transforms])
+""")
+        assert said == "1.0\n1.0\n['a', 'b']\n"
+
     def test_time_that_jumps_back_clears_the_buffer(self) -> None:
         said = run(
             """

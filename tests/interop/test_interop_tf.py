@@ -172,3 +172,62 @@ def test_transforms_between_ours_and_roscpp(
             else:
                 numbers, others = ([float(word) for word in answer.split()] for answer in (found, expected))
                 assert numbers == pytest.approx(others, rel=1e-12, abs=1e-12), question
+
+
+OUR_SERVER = """
+import rospy, tf2_ros
+rospy.init_node("our_server")
+buffer = tf2_ros.Buffer()
+listener = tf2_ros.TransformListener(buffer)
+server = tf2_ros.BufferServer(buffer, "tf2_buffer_server", True)
+rospy.spin()
+"""
+CLIENT = """
+import rospy, tf2_ros
+from geometry_msgs.msg import TransformStamped
+rospy.init_node("client", anonymous=True)
+static = tf2_ros.StaticTransformBroadcaster()
+pose = TransformStamped(child_frame_id="base")
+pose.header.frame_id = "map"
+pose.transform.translation.x, pose.transform.rotation.w = 2.5, 1.0
+static.sendTransform(pose)
+client = tf2_ros.BufferClient("tf2_buffer_server")
+print(client.wait_for_server(rospy.Duration(60)))
+found = client.lookup_transform("map", "base", rospy.Time(0), rospy.Duration(60))
+print(found.transform.translation.x, found.header.frame_id, found.child_frame_id)
+print(client.can_transform("map", "nowhere", rospy.Time(0)))
+for call in (
+    lambda: client.lookup_transform("map", "nowhere", rospy.Time(0)),
+    lambda: client.lookup_transform("/map", "base", rospy.Time(0)),
+    lambda: client.lookup_transform_full("base", rospy.Time(1), "base", rospy.Time(2), "nowhere"),
+):
+    try:
+        call()
+    except tf2_ros.TransformException as error:
+        print(type(error).__name__, error)
+print(client.lookup_transform_full("base", rospy.Time(1), "base", rospy.Time(2), "map").transform.translation.x)
+"""
+ANSWERED = """\
+True
+2.5 map base
+False
+LookupException "nowhere" passed to lookupTransform argument source_frame does not exist.
+InvalidArgumentException Invalid argument "/map" passed to lookupTransform argument target_frame in tf2 frame_ids cannot start \
+with a '/' like:
+LookupException "nowhere" passed to lookupTransform argument fixed_frame does not exist.
+0.0
+"""
+
+
+@pytest.mark.parametrize(("server", "client"), [("roscpp", "ours"), ("ours", "rospy"), ("roscpp", "rospy")])
+def test_buffer_servers_and_clients(server: str, client: str, real_master: str) -> None:
+    """The last pair is the reference."""
+    command = ["/usr/lib/tf2_ros/buffer_server"] if server == "roscpp" else [sys.executable, "-c", OUR_SERVER]
+    serving = start(command, real_master, server)
+    try:
+        python = sys.executable if client == "ours" else REAL_PYTHON
+        looking = start([python, "-c", CLIENT], real_master, client)
+        printed, errors = looking.communicate(timeout=100)
+        assert [line.rstrip() for line in printed.splitlines()] == ANSWERED.splitlines(), errors
+    finally:
+        stop(serving)
