@@ -238,7 +238,7 @@ def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -
     """Print an error on stderr, after all that was printed before: ROS's text, then ours. Return ``status``."""
     _flush()
     if ros_text:
-        print(escaped(ros_text, "\n"), file=sys.stderr)
+        print(escaped(ros_text, "\n\t"), file=sys.stderr)
     print(escaped(f"{name}: ERROR: {error}", "\n"), file=sys.stderr)
     return status
 

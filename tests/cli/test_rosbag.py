@@ -62,7 +62,7 @@ def test_unknown_verb_has_status_0_as_in_ros(capsys: pytest.CaptureFixture[str])
     assert rosbag.main(["inf"]) == 0
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith("Unknown command: 'inf'\nAvailable subcommands:\n")
+    assert err.startswith("Unknown command: 'inf'\nAvailable subcommands:\n   check  \tDetermine")
     assert "rosbag: ERROR: unknown command `rosbag inf`; did you mean info" in err
 
 
