@@ -13,7 +13,8 @@ from collections.abc import Container, Iterable
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple, Protocol
 
 from minirospy.bag import compression, records
-from minirospy.bag.records import Chunk, Connection
+from minirospy.bag.index import read_entries
+from minirospy.bag.records import Chunk, ChunkInfo, Connection
 from minirospy.errors import BagFormatError
 
 if TYPE_CHECKING:
@@ -39,6 +40,13 @@ Found = tuple[int, int, int, int, int]
 
 As plain tuples they sort as rosbag orders messages: by time, those of one time by connection, then by place.
 """
+
+
+class Ranks(Protocol):
+    """The rank of a connection among those whose messages are wanted, or None: a dict, for example."""
+
+    def get(self, number: int, /) -> int | None:
+        """Return the rank."""
 
 
 class ChunkStream:
@@ -75,6 +83,23 @@ class ChunkStream:
         except BagFormatError as error:
             raise BagFormatError(error.why, position) from error
 
+    def pick(self, info: ChunkInfo, ranks: Ranks) -> tuple[bytes, list[Found]] | None:
+        """Return bodies and places of the few messages that are wanted of a chunk, without reading the rest of it.
+
+        None if that does not pay, or if the chunk's index is damaged: then the chunk is to be scanned.
+        """
+        chunk, data_position = header = self.header(info.position)
+        wanted = sum(count for number, count in info.counts.items() if ranks.get(number) is not None)
+        if chunk.compression != compression.NONE or wanted * PICK_SIZE > chunk.size:
+            return None
+        try:
+            entries = self._entries(header, info, ranks)
+            if len(entries) != wanted:
+                return None
+            return self._picked(data_position, chunk.size, entries)
+        except BagFormatError:
+            return None
+
     def prepare(self, positions: Iterable[int]) -> None:
         """Start to decompress the chunks at these positions; forget others that were started."""
         wanted = [
@@ -109,6 +134,44 @@ class ChunkStream:
             )
         return data
 
+    def _entries(self, header: StoredChunk, info: ChunkInfo, ranks: Ranks) -> list[tuple[int, int, int, int]]:
+        """Return offset, time, rank and connection of the messages that are wanted, from a chunk's index records."""
+        limit = size_of(self.stream)
+        self.stream.seek(header.end)
+        found: list[tuple[int, int, int, int]] = []
+        for _ in info.counts:
+            record = records.read_record(self.stream, limit)
+            times, offsets = read_entries(self.stream, record)
+            number = record.uint32("conn")
+            rank = ranks.get(number)
+            if rank is not None:
+                found += [(at, time, rank, number) for time, at in zip(times, offsets, strict=True)]
+        return sorted(found)
+
+    def _picked(
+        self, start: int, size: int, entries: list[tuple[int, int, int, int]]
+    ) -> tuple[bytes, list[Found]]:
+        """Return the bodies of messages one behind the other. Raise BagFormatError where the index is wrong."""
+        prefixes = {number: records.message_prefixes(number) for *_, number in entries}
+        bodies: list[bytes] = []
+        found: list[Found] = []
+        end = 0
+        for at, time, rank, number in entries:
+            self.stream.seek(start + at)
+            head = self.stream.read(_HEAD)
+            if len(head) < _HEAD or not head.startswith(prefixes[number]):
+                raise BagFormatError("an index entry does not point to its message", start + at)
+            *stamp, length = _STAMP_AND_SIZE.unpack_from(head, _HEAD - _STAMP_AND_SIZE.size)
+            if records.to_nanoseconds(*stamp) != time or at + _HEAD + length > size:
+                raise BagFormatError("an index entry has another time than its message", start + at)
+            bodies.append(self.stream.read(length))
+            found.append((time, rank, at, end, end + length))
+            end += length
+        data = b"".join(bodies)
+        if len(data) != end:
+            raise BagFormatError(f"expecting {end} bytes, read {len(data)}", start)
+        return data, found
+
     def _start(self) -> Executor:
         if self._executor is None:
             from concurrent.futures import ThreadPoolExecutor
@@ -119,6 +182,10 @@ class ChunkStream:
 
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
 """Threads that decompress ahead, and chunks that they are ahead: the reader's own thread needs a core, too."""
+
+
+PICK_SIZE = 32 * 1024
+"""Bytes of a chunk for each message that is wanted of it, above which only those messages are read."""
 
 
 def size_of(stream: BinaryIO) -> int:
@@ -140,13 +207,7 @@ _TIME = b"\x0d\0\0\0time="
 _PYTHON = _Layout(struct.Struct("<21sI9sIII"), b"\x26\0\0\0" + _OP + _CONN, _TIME)
 _CPP = _Layout(struct.Struct("<13sI17sIII"), b"\x26\0\0\0" + _CONN, _OP + _TIME)
 _HEAD = 46
-
-
-class Ranks(Protocol):
-    """The rank of a connection among those whose messages are wanted, or None: a dict, for example."""
-
-    def get(self, number: int, /) -> int | None:
-        """Return the rank."""
+_STAMP_AND_SIZE = struct.Struct("<III")
 
 
 def scan(data: bytes, ranks: Ranks, known: Container[int]) -> list[Found]:

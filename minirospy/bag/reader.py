@@ -261,10 +261,14 @@ class _Merge:
             self._loaded.move_to_end(run.position)
             return self._loaded[run.position]
 
-        data = self._stream.data(run.position)
-        found = scan(data, self._ranks, self._known)
-        first, last = self._times
         info = self._chunks[run.number]
+        picked = self._stream.pick(info, self._ranks)
+        if picked:
+            data, found = picked
+        else:
+            data = self._stream.data(run.position)
+            found = scan(data, self._ranks, self._known)
+        first, last = self._times
         if info.start_time < first or info.end_time > last:
             found = [each for each in found if first <= each[0] <= last]
         found.sort()

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag1 import Reader as Oracle
 
+from minirospy.bag import chunks as reading_chunks
 from minirospy.bag import info
 from minirospy.bag import reader as reading
 from minirospy.bag.base import BagReader, StoredMessage
@@ -31,6 +32,17 @@ bags = st.lists(st.lists(messages, min_size=1, max_size=8), max_size=6)
 
 def opened(data: bytes) -> BagReader:
     return open_bag(io.BytesIO(data))
+
+
+class Counting(io.BytesIO):
+    """A stream that counts the bytes that are read."""
+
+    count = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        self.count += len(data)
+        return data
 
 
 def plain(stored: StoredMessage) -> Given:
@@ -80,6 +92,45 @@ def test_every_message_is_found_again_by_position_and_by_index(chunks: list[list
         ]
 
 
+@given(bags, st.sets(st.integers(0, 2)), st.integers(0, 1))
+@settings(deadline=None)
+def test_few_messages_are_picked_as_they_are_scanned(
+    chunks: list[list[Given]], wanted: set[int], layout: int
+) -> None:
+    data = make_bag(chunks, layout=layout)
+    with pytest.MonkeyPatch.context() as patch:
+        scanned = opened(data)
+        numbers = [number for number in scanned.connections if number in wanted]
+        expected = list(scanned.messages(numbers, 1, 4))
+        patch.setattr(reading_chunks, "PICK_SIZE", 0)
+        picking = opened(data)
+        assert list(picking.messages(numbers, 1, 4)) == expected
+
+
+def test_few_messages_of_a_large_bag_are_read_alone() -> None:
+    stream = Counting(
+        make_bag(
+            [
+                [Given(each % 2, 9 * chunk + each, bytes(10**6 * (each % 2))) for each in range(8)]
+                for chunk in range(4)
+            ]
+        )
+    )
+    reader = open_bag(stream)
+    assert len(list(reader.messages([0]))) == 16
+    assert stream.count < 30_000
+
+
+@pytest.mark.parametrize("place", ["time", "offset", "count"])
+def test_damaged_index_is_not_believed(place: str) -> None:
+    data = make_bag([[Given(each % 2, each, bytes(10**6 * (each % 2))) for each in range(8)]])
+    index = data.index(b"\x04\0\0\0op=\x04", data.index(b"op=\x05"))
+    at = index + {"time": 47, "offset": 55, "count": 41}[place]
+    damaged = data[:at] + bytes((data[at] ^ 1,)) + data[at + 1 :]
+
+    assert len(list(opened(damaged).messages([0]))) == 4
+
+
 def test_overlapping_chunks_need_no_more_memory_than_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reading, "_CACHE_SIZE", 1)
     chunks = [
@@ -108,14 +159,6 @@ def test_rosbags_reads_the_same(tmp_path: Path, compression: str) -> None:
 
 
 def test_opening_reads_neither_chunks_nor_indexes() -> None:
-    class Counting(io.BytesIO):
-        count = 0
-
-        def read(self, size: int | None = -1, /) -> bytes:
-            data = super().read(size)
-            self.count += len(data)
-            return data
-
     stream = Counting(make_bag([[Given(0, time, bytes(10_000))] for time in range(100)]))
     open_bag(stream)
     assert stream.count < 20_000

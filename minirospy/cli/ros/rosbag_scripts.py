@@ -150,9 +150,7 @@ def _savemsg(words: list[str]) -> int:
     from minirospy.idl.load import get_message_class
     from minirospy.introspect.bags import open_reader
 
-    parser = Parser(
-        "savemsg.py", "", "usage: savemsg.py [-b <bagfile] type", missing="Message type not specified."
-    )
+    parser = Parser("savemsg.py", "", "savemsg.py [-b <bagfile] type", missing="Message type not specified.")
     parser.add_argument("type")
     parser.add_argument(
         "-b",
@@ -184,7 +182,7 @@ def _makerule(words: list[str]) -> int:
     from minirospy.idl.load import class_from_text
     from minirospy.introspect.bag_migration import check_classes
 
-    usage = "usage: makerule.py msg.saved [-a] output_rulefile [rulefile1, rulefile2, ...] [-n]"
+    usage = "makerule.py msg.saved [-a] output_rulefile [rulefile1, rulefile2, ...] [-n]"
     parser = Parser("makerule.py", "", usage, missing="Incorrect number of arguments")
     parser.add_argument("saved")
     parser.add_argument("rulefile")
