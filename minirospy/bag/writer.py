@@ -2,8 +2,8 @@
 
 A chunk is gathered in memory and written whole, its index behind it: a file whose writer was killed ends with at most one
 chunk that is cut off, and :mod:`minirospy.bag.repair` saves all that are before it. A small message is copied once, into
-the chunk; a large one that comes as ``bytes`` is written from where it is. Memory: the chunk, and some 400 bytes for
-each chunk that has been written. Source: http://wiki.ros.org/Bags/Format/2.0.
+the chunk; a large one that comes as ``bytes`` is written from where it is. Memory: the chunk, and some 200 bytes for
+each connection of each chunk that has been written. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations

@@ -17,6 +17,8 @@ __all__ = ["BagFile", "FileWriter"]
 
 _UNLIMITED = 2**31
 _KNOWN_HEADERS = 10_000
+_DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
+"""What a bag needs, and third-party publishers may leave out of their connection headers."""
 
 
 class FileWriter(Protocol):
@@ -105,7 +107,7 @@ class BagFile:
         number = self._by_content.get(key)
         if number is None:
             number = self._by_content[key] = self._writer.add_connection(
-                topic, {**dict(sorted(header.items())), "topic": topic}
+                topic, {**_DEFAULTS, **dict(sorted(header.items())), "topic": topic}
             )
         if len(self._by_identity) > _KNOWN_HEADERS:
             self._by_identity.clear()

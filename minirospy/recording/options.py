@@ -16,6 +16,7 @@ __all__ = ["MEGABYTE", "RecordOptions", "parse_duration", "parse_size", "topic_f
 KILOBYTE = 1024
 MEGABYTE = 1024 * 1024
 _SECOND = 10**9
+_FOREVER = 1e12
 _UNITS = {"s": 1, "m": 60, "h": 3600}
 _MULTIPLIERS = {"k": 10**3, "M": 10**6, "G": 10**9}
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -67,10 +68,10 @@ def parse_duration(text: str) -> int:
     unit = text[number.end() :] or "s"
     if unit not in _UNITS:
         raise UsageError("Duration unit must be s, m, or h")
-    nanoseconds = int(float(number[0]) * _UNITS[unit] * _SECOND)
-    if nanoseconds <= 0:
+    seconds = float(number[0]) * _UNITS[unit]
+    if not 0 < seconds < _FOREVER:
         raise UsageError("Duration must be positive.")
-    return nanoseconds
+    return int(seconds * _SECOND)
 
 
 def parse_size(text: str) -> int:

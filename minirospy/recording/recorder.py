@@ -314,7 +314,8 @@ class Recorder:
     def _disk_failed(self, file: BagFile, error: OSError, lost: int) -> None:
         why = error.strerror or str(error)
         if lost < 0:
-            client.logerr("Error writing: %s: %s. `rosbag reindex` may save it", file.active_name, why)
+            tool = "mcap recover" if self.options.mcap else "rosbag reindex"
+            client.logerr("Error writing: %s: %s. `%s` may save it", file.active_name, why, tool)
         else:
             client.logerr(
                 "Error writing: %s: %s. Recording ends; %d messages are lost, the bag has those before",

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from minirospy.bag.base import BagReader, StoredMessage
 from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.records import Connection
-from minirospy.errors import BagError, NotFoundError
+from minirospy.errors import BagError, BagUnindexedError, NotFoundError
 
 __all__ = ["Bags", "Selection", "open_reader", "read_ahead"]
 
@@ -49,6 +49,8 @@ class Bags:
                     self.readers.append(open_reader(Path(path), opened))
                 except FileNotFoundError as error:
                     raise NotFoundError("bag", path) from error
+                except BagUnindexedError as error:
+                    raise BagError(f"{path}: {error}. Run `rosbag reindex {path}`") from error
                 except BagError as error:
                     raise BagError(f"{path}: {error}") from error
             self._files = opened.pop_all()

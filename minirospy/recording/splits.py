@@ -10,6 +10,10 @@ from minirospy.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
+_MOST_EMPTY = 100
+"""Files without a message that a silence may leave, as in ROS."""
+
+
 class Next(enum.Enum):
     """What to do before a message is recorded."""
 
@@ -35,6 +39,9 @@ class Splits:
         if options.max_size and size > options.max_size:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
+            if now - self._start > _MOST_EMPTY * options.max_duration:
+                # The clock has jumped: a simulator's, or that of a machine without one of its own.
+                self._start = now - options.max_duration
             self._start += options.max_duration
             return self._full()
         return Next.CONTINUE

@@ -32,6 +32,7 @@ def test_durations(text: str, nanoseconds: int) -> None:
         ("", "Duration must start with a floating point number."),
         ("-3s", "Duration must be positive."),
         ("0", "Duration must be positive."),
+        ("1e400", "Duration must be positive."),
     ],
 )
 def test_bad_durations_are_refused_in_the_words_of_ros(text: str, why: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import struct
 import subprocess
@@ -279,6 +280,10 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
         ([], 2, "You must specify at least 1 bag file to play back."),
         (["missing.bag"], 1, "bag [missing.bag] not found"),
         (["-r", "0", "b.bag"], 2, "--rate must be above 0"),
+        (["-r", "1e-300", "b.bag"], 2, "--rate must be above 0"),
+        (["--hz", "inf", "b.bag"], 2, "--hz must be above 0"),
+        (["-s", "inf", "b.bag"], 2, "--start must be 0 or positive"),
+        (["-u", "nan", "b.bag"], 2, "--duration must be 0 or positive"),
         (["-d", "-1", "b.bag"], 2, "--delay must be 0 or positive"),
         (["empty"], 1, "empty: "),
         (["."], 1, ".: "),
@@ -292,6 +297,41 @@ def test_wrong_words(words: list[str], status: int, text: str, start: Start, tmp
     assert process.returncode == status
     assert text in errors
     assert "Traceback" not in errors
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+def test_keys_of_a_terminal(ear: Ear, start: Start, tmp_path: Path) -> None:
+    import pty
+    import termios
+
+    name = make_bag(tmp_path / "b.bag", [("/a", i, str(i)) for i in range(3)])
+    ear.listen("/a")
+    ours, theirs = pty.openpty()
+    before = termios.tcgetattr(theirs)
+    # With a session of its own, whose terminal this is.
+    take = "import os, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)"
+    process = start("play", name, "--pause", "--wait-for-subscribers", stdin=theirs, prelude=take)
+    read_until(process, "Finished waiting")
+    os.write(ours, b"s")
+    wait_until(lambda: ear.texts == ["0"])
+    os.write(ours, b"s")
+    wait_until(lambda: ear.texts == ["0", "1"])
+    os.write(ours, b"\x03")
+    _, errors = process.communicate(timeout=GUARD)
+    after = termios.tcgetattr(theirs)
+    os.close(ours)
+    os.close(theirs)
+
+    assert (process.returncode, errors) == (0, "")
+    assert after == before
+
+
+def test_an_unindexed_bag_is_named(master: str, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "b.bag", [("/a", 0, "1")])
+    os.truncate(tmp_path / name, (tmp_path / name).stat().st_size - 10)
+    _, errors = start("play", name).communicate(timeout=GUARD)
+
+    assert "b.bag: Unindexed bag. Run `rosbag reindex b.bag`" in errors
 
 
 def test_no_messages(master: str, start: Start, tmp_path: Path) -> None:

@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from minirospy.bag import records
+from minirospy.bag.writer import BagWriter
 from tests.recording.conftest import (
     GUARD,
+    STRING,
     Start,
     Talker,
     connected,
@@ -363,3 +365,40 @@ def test_a_missing_extra_is_named(start: Start) -> None:
 
     assert process.returncode == 1
     assert "pip install 'minirospy[mcap]'" in errors
+
+
+def test_launch_files_start_both_programs(talker: Talker, tmp_path: Path) -> None:
+    chatter = talker.advertise("/chatter")
+    (tmp_path / "bags.launch").write_text(
+        f"""<launch>
+          <node pkg="rosbag" type="record" name="recorder" output="screen" args="-l 1 -O {tmp_path}/out heard">
+            <remap from="heard" to="/chatter"/>
+          </node>
+          <node pkg="rosbag" type="play" name="player" output="screen" args="--wait-for-subscribers -k {tmp_path}/in.bag"/>
+        </launch>""",
+        encoding="utf-8",
+    )
+    with (tmp_path / "in.bag").open("wb") as stream:
+        writer = BagWriter(stream)
+        header = {"type": STRING.name, "md5sum": STRING.md5sum, "message_definition": STRING.definition}
+        writer.write(writer.add_connection("/played", header), 1, b"\x02\0\0\0ok")
+        writer.close()
+    heard: list[bytes] = []
+    subscription = talker.node.make_subscription("/played", STRING, lambda body, _: heard.append(bytes(body)))
+    talker._loop.run(talker.node.subscribe(subscription))
+
+    code = "import sys; from minirospy.cli.ros.roslaunch import main; sys.exit(main())"
+    launch = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path / "bags.launch")], stdout=subprocess.DEVNULL
+    )
+    try:
+        connected(chatter)
+        say(chatter, "one")
+        wait_until((tmp_path / "out.bag").exists)
+        wait_until(lambda: heard)
+    finally:
+        launch.send_signal(signal.SIGINT)
+        launch.wait(GUARD)
+
+    assert [said(one.body) for one in messages(tmp_path / "out.bag")] == ["one"]
+    assert said(heard[0]) == "ok"

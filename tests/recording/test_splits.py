@@ -36,6 +36,13 @@ def test_a_long_silence_ends_several_files() -> None:
     assert answers == [Next.SPLIT] * 3 + [Next.CONTINUE]
 
 
+def test_a_jump_of_the_clock_makes_one_file() -> None:
+    splits = Splits(RecordOptions(split=True, max_duration=SECOND), 0)
+
+    assert splits.check(0, 10**9 * SECOND) is Next.SPLIT
+    assert splits.check(0, 10**9 * SECOND) is Next.CONTINUE
+
+
 def test_duration_ends_a_recording_that_is_not_split() -> None:
     assert Splits(RecordOptions(max_duration=SECOND), 0).check(0, 2 * SECOND) is Next.END
 

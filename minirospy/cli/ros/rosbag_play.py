@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMAND", "VERB", "main"]
 
-_SECOND = 1e9
+_MOST_RATE = 1e6
+_MOST_HZ = 1e4
+_FOREVER = 1e12
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -107,12 +109,9 @@ def _play(
     if not paths:
         text = "You must specify at least 1 bag file to play back."
         raise Misuse(text, text)
-    for name, value in (("--rate", rate), ("--hz", hz)):
-        if not value > 0:
-            raise UsageError(f"{name} must be above 0")
-    for name, value in (("--delay", delay), ("--start", start), ("--duration", duration)):
-        if not value >= 0:
-            raise UsageError(f"{name} must be 0 or positive")
+    for name, value, most in (("--rate", rate, _MOST_RATE), ("--hz", hz, _MOST_HZ)):
+        if not 1 / _MOST_RATE <= value <= most:
+            raise UsageError(f"{name} must be above 0, and at most {most:g}")
 
     options = PlayOptions(
         prefix=prefix,
@@ -121,21 +120,27 @@ def _play(
         queue_size=max(0, queue),
         clock=clock,
         clock_hz=hz,
-        delay=round(delay * _SECOND),
+        delay=_nanoseconds("--delay", delay),
         rate=rate,
-        start=round(start * _SECOND),
-        duration=round(duration * _SECOND),
-        skip_empty=None if skip_empty is None else round(skip_empty * _SECOND),
+        start=_nanoseconds("--start", start),
+        duration=_nanoseconds("--duration", duration),
+        skip_empty=None if skip_empty is None else _nanoseconds("--skip-empty", skip_empty),
         loop=loop,
         keep_alive=keep_alive,
         topics=frozenset(parse_arguments(topics).plain),
         pause_topics=frozenset(parse_arguments(pause_topics).plain),
         wait_for_subscribers=wait_for_subscribers,
         rate_control_topic=rate_control_topic,
-        rate_control_max_delay=round(rate_control_max_delay * _SECOND),
+        rate_control_max_delay=_nanoseconds("--rate-control-max-delay", rate_control_max_delay),
         quiet=quiet,
     )
     return _run(paths, options)
+
+
+def _nanoseconds(name: str, seconds: float) -> int:
+    if not 0 <= seconds < _FOREVER:
+        raise UsageError(f"{name} must be 0 or positive")
+    return round(seconds * 1e9)
 
 
 def _run(paths: list[str], options: PlayOptions) -> int:
