@@ -21,7 +21,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.cli.parser import CommandLineError
 from minirospy.errors import (
@@ -50,7 +50,6 @@ __all__ = [
     "Wording",
     "complain",
     "hint_near",
-    "refuse_bag",
     "ros_words",
     "run",
     "tool_node",
@@ -61,14 +60,6 @@ __all__ = [
 
 INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
-
-
-def refuse_bag(command: str, bag: str) -> NoReturn:
-    """Refuse an option that reads a bag file. Raises MinirospyError: exit status 1."""
-    if not os.path.exists(bag):
-        ros = RosText(f"ERROR: bag file [{bag}] does not exist")
-        raise WordedError(NotFoundError("bag file", bag), ros)
-    raise MinirospyError(f"`{command} -b`: bag files cannot be read yet, they come with a later version")
 
 
 class RosText(NamedTuple):

@@ -47,7 +47,7 @@ class Echo:
 
     ``plot``: comma-separated values with a header line before the first. ``strings`` and ``arrays``: whether
     such fields are shown. ``width``: of numbers. ``offset``: times as differences from ``now()``, which is
-    the time in nanoseconds.
+    the time in nanoseconds. ``header_times``: a plot has the time in a message's header, if it has one, not of its reception.
     """
 
     def __init__(
@@ -60,6 +60,7 @@ class Echo:
         width: int | None = None,
         offset: bool = False,
         now: Callable[[], int] = time.time_ns,
+        header_times: bool = True,
     ) -> None:
         self._path = field.path
         self._steps = parse_path(field.path)
@@ -69,6 +70,7 @@ class Echo:
         self._width = width
         self._offset = offset
         self._now = now
+        self._header_times = header_times
 
         self._type = ""
         self._classes = MessageClasses()
@@ -93,12 +95,14 @@ class Echo:
 
     def _row(self, value: object, received: Received) -> str:
         origin = self._now() if self._offset else 0
-        nanoseconds = (value.header.stamp.to_nsec() if is_stamped(value) else received.nanoseconds) - origin
+        stamp = received.nanoseconds
+        if self._header_times and is_stamped(value):
+            stamp = value.header.stamp.to_nsec()
         header = ""
         if not self._header_written:
             self._header_written = True
             header = plot_header(value, strings=self._strings, arrays=self._arrays) + "\n"
-        row = plot_row(value, nanoseconds, strings=self._strings, arrays=self._arrays, origin=origin)
+        row = plot_row(value, stamp - origin, strings=self._strings, arrays=self._arrays, origin=origin)
         return header + row + "\n"
 
     def _block(self, value: object) -> str:

@@ -21,14 +21,6 @@ def test_errors(command: Any) -> None:
     assert command("rosmsg_proto", "-s", "msg", "std_msgs/Bol") == (0, "", "")
 
 
-def test_bags_are_refused(command: Any) -> None:
-    result = command("rosmsg", "show", "-b", __file__, "std_msgs/Bool")
-    assert (result.status, result.out) == (1, "")
-    assert result.err == (
-        "rosmsg: ERROR: `rosmsg show -b`: bag files cannot be read yet, they come with a later version\n"
-    )
-
-
 def test_fields_left_out_and_empty_arrays(command: Any) -> None:
     pose = command("rosmsg_proto", "msg", "geometry_msgs/PoseStamped", "-H", "-x", "header,orientation").out
     assert pose == "pose:\n  position:\n    x: 0.0\n    y: 0.0\n    z: 0.0\n"

@@ -338,14 +338,6 @@ def test_echo_options_that_cannot_be(master: str, command: Any) -> None:
     assert command("rostopic", "echo", "-n", "0", "/t") == (0, "", "")
 
 
-def test_bags_come_later(command: Any) -> None:
-    for words in (["list", "-b", __file__], ["echo", "-b", __file__, "/t"], ["echo", "-b", __file__]):
-        assert command("rostopic", *words) == (
-            1, "", f"rostopic: ERROR: `rostopic {words[0]} -b`: bag files cannot be read yet, "
-            "they come with a later version\n",
-        )  # fmt: skip
-
-
 def test_pub_options_that_exclude_each_other(master: str, command: Any) -> None:
     for words in (["-1", "-r", "5", "/t", "std_msgs/Bool", "1"], ["-f", "x", "/t", "std_msgs/Bool", "1"]):
         result = command("rostopic", "pub", *words)

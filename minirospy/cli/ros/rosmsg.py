@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from minirospy.cli.command import RosText, WordedError, refuse_bag
+from minirospy.cli.command import RosText, WordedError
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError
@@ -45,13 +45,17 @@ class _Verbs:
             "-r", "--raw", action="store_true", help="show raw message text, including comments"
         )
         parser.add_argument(
-            "-b", "--bag", metavar="BAGFILE", help="show message from .bag file", completer="files"
+            "-b", "--bag", metavar="BAGFILE", help="show message from .bag file", completer="bag_files"
         )
         return parser
 
     def show(self, type: str | None, raw: bool, bag: str | None) -> None:
         if bag:
-            refuse_bag(f"{self.command} show", bag)
+            from minirospy.cli.ros.bag_options import show_bag
+
+            for name in _names(type):
+                show_bag(bag, name, raw=raw)
+            return
         interfaces = self._interfaces()
         for name in _names(type):
             try:

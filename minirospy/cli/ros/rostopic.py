@@ -10,7 +10,7 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
-from minirospy.cli.command import RosText, WordedError, refuse_bag, tool_node, warn_unpublished
+from minirospy.cli.command import RosText, WordedError, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError
@@ -65,7 +65,17 @@ def _list(
     arguments: Arguments | None = None,
 ) -> None:
     if bag:
-        refuse_bag("rostopic list", bag)
+        for option, given in (("-s", subscribers), ("-p", publishers), ("--host", host)):
+            if given:
+                raise Misuse(
+                    f"{option} needs a master: it does not go with -b",
+                    f"{option} option is not valid with bags",
+                )
+        from minirospy.cli.ros.bag_options import list_bag
+
+        with Graph.open("rostopic", arguments=arguments) as graph:
+            list_bag(bag, graph.resolve(namespace) if namespace else None)
+        return
     if publishers and subscribers:
         raise Misuse("argument -s: not allowed with argument -p", "you may only specify one of -p, -s")
     show = partial(_print_topics, publishers=not subscribers, subscribers=not publishers, verbose=verbose)
@@ -232,11 +242,11 @@ def _echo(
     offset: bool,
     arguments: Arguments | None = None,
 ) -> None:
-    if bag:
-        refuse_bag("rostopic echo", bag)
-    if topic is None:
+    if all and bag:
+        topic = None
+    elif topic is None:
         raise Misuse("a topic is missing", "topic must be specified")
-    if all:
+    if all and not bag:
         raise Misuse(
             "-a displays all messages of a bag: it needs -b",
             "Display all option is only valid when echoing from bag files",
@@ -251,6 +261,18 @@ def _echo(
     from minirospy.introspect.streams import wait_for_topic
 
     keep = Filter(filter) if filter else None
+    make = partial(Echo, plot=plot, strings=not nostr, arrays=not noarr, width=width, offset=offset)
+    prefix = _CLEAR_SCREEN if clear and not plot else ""
+    if bag:
+        if offset:
+            raise Misuse("--offset does not go with -b", "offset time option is not valid with bag files")
+        from minirospy.cli.ros.bag_options import EchoOptions, echo_bag
+
+        with Graph.open("rostopic", arguments=arguments) as graph:
+            make = partial(make, header_times=False)
+            echo_bag(bag, graph.resolve(topic) if topic else None, EchoOptions(make, keep, count, prefix))
+        return
+    assert topic is not None
     with Graph.open("rostopic", arguments=arguments) as graph:
         name = graph.resolve(topic)
         if count is not None and count <= 0:
@@ -259,15 +281,7 @@ def _echo(
 
     printed = 0
     with tool_node("rostopic", arguments, ros_time=True) as node:
-        echo = Echo(
-            field,
-            plot=plot,
-            strings=not nostr,
-            arrays=not noarr,
-            width=width,
-            offset=offset,
-            now=node.clock.now,
-        )
+        echo = make(field, now=node.clock.now)
         for received in node.inbox(field.topic):
             message = echo.message(received)
             if keep and not keep(message, field.topic):
@@ -278,7 +292,7 @@ def _echo(
                 print(f"rostopic: {error}", file=sys.stderr)
                 continue
 
-            sys.stdout.write(_CLEAR_SCREEN + text if clear and not plot else text)
+            sys.stdout.write(prefix + text)
             sys.stdout.flush()
             printed += 1
             if printed == count:
@@ -582,7 +596,7 @@ def _add_tcp_nodelay(parser: Parser) -> None:
 
 
 def _add_bag(parser: Parser, help: str) -> None:
-    parser.add_argument("-b", "--bag", metavar="BAGFILE", help=help, completer="files")
+    parser.add_argument("-b", "--bag", metavar="BAGFILE", help=help, completer="bag_files")
 
 
 FAMILY = Family(

@@ -1,0 +1,160 @@
+"""The option -b of `rostopic list`, `rostopic echo` and `rosmsg show`: a bag file instead of the graph.
+
+Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints; no master is needed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+from minirospy.cli.command import RosText, WordedError
+from minirospy.errors import BagError, MinirospyError, NotFoundError
+from minirospy.introspect.bags import open_reader
+
+if TYPE_CHECKING:
+    from minirospy.bag.base import BagReader
+    from minirospy.introspect.echo import Echo, Filter
+    from minirospy.introspect.topics import TopicField
+
+__all__ = ["echo_bag", "list_bag", "show_bag"]
+
+
+@contextmanager
+def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
+    """Yield a reader of a bag. Raise MinirospyError, in ROS's words where the file does not exist."""
+    if not os.path.exists(path):
+        text = f"bag file [{path}] does not exist"
+        raise WordedError(NotFoundError("bag file", path), RosText(f"{ros_error}{text}"))
+    try:
+        with open_reader(path) as reader:
+            yield reader
+    except BagError as error:
+        raise MinirospyError(f"{path}: {error}") from error
+
+
+def list_bag(path: str, topic: str | None) -> None:
+    """Print the topics of a bag in the order of their first messages; with ``topic``, how many messages are on and below it."""
+    with _opened(path, "ERROR: ") as reader:
+        if topic is None:
+            for name in _topics_in_order(reader):
+                print(name)
+            return
+
+        below = topic.rstrip("/") + "/"
+        wanted = [
+            number
+            for number, each in reader.connections.items()
+            if each.topic == topic or each.topic.startswith(below)
+        ]
+        times = sorted(each for part in reader.times(wanted) for each in (min(part), max(part)) if part)
+        count = sum(map(len, reader.times(wanted)))
+        if not times:
+            print("0 message(s)")
+            return
+        first, last = (
+            time.strftime("%d %b %Y %H:%M:%S", time.localtime(each / 1e9)) for each in (times[0], times[-1])
+        )
+        print(f"{count} message(s) from {first} to {last}")
+
+
+def _topics_in_order(reader: BagReader) -> list[str]:
+    reader.prepare()
+    connections = list(reader.connections.values())
+    topics = {each.topic for each in connections}
+    found: dict[str, None] = {}
+    for _, _, messages in reader.blocks([each.id for each in connections]):
+        found.update(dict.fromkeys(connections[each[1]].topic for each in messages))
+        if len(found) == len(topics):
+            break
+    return list(found)
+
+
+class EchoOptions(NamedTuple):
+    """How messages of a bag are shown.
+
+    ``make`` returns the Echo of a topic or field; ``keep`` selects messages; at most ``limit`` are printed, each behind
+    ``prefix``.
+    """
+
+    make: Callable[[TopicField], Echo]
+    keep: Filter | None
+    limit: int | None
+    prefix: str
+
+
+def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
+    """Print the messages of a bag on a topic, or a field of them; of all topics where ``name`` is None."""
+    from minirospy.introspect.streams import Received
+    from minirospy.introspect.topics import TopicField
+
+    with _opened(path, "ERROR: ") as reader:
+        reader.prepare()
+        paths = _paths(reader, name)
+        echoes: dict[str, Echo] = {}
+        printed = 0
+        for message in reader.messages(paths) if options.limit != 0 else ():
+            connection = message.connection
+            field = paths[connection.id]
+            # One for all topics: what -p prints starts with one line of names.
+            if field not in echoes:
+                echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
+            echo = echoes[field]
+            header = {key: value.decode("utf-8", "replace") for key, value in connection.header.items()}
+            received = Received(message.body, header, message.time)
+            value = echo.message(received)
+            if options.keep and not options.keep(value, connection.topic):
+                continue
+            try:
+                text = echo.text(value, received)
+            except IndexError as error:
+                print(f"rostopic: {error}", file=sys.stderr)
+                continue
+
+            sys.stdout.write(options.prefix + text)
+            sys.stdout.flush()
+            printed += 1
+            if printed == options.limit:
+                return
+
+
+def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
+    """Return the connections whose messages are shown, and the path of the field of each: "" for whole messages."""
+    topics = {number: _global(each.topic) for number, each in reader.connections.items()}
+    if name is None:
+        return dict.fromkeys(topics, "")
+    # A topic of the whole name comes before a field of a shorter one.
+    holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
+    topic = max(holders, key=len, default="")
+    return {
+        number: name[len(topic) + 1 :].rstrip("/")
+        for number, each in topics.items()
+        if holders and each == topic
+    }
+
+
+def _global(topic: str) -> str:
+    """Return a topic as the graph would have it: bags may have relative names."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
+def show_bag(path: str, type_: str, *, raw: bool) -> None:
+    """Print the definition of a type as a bag has it: unfolded, or as it is stored."""
+    from minirospy.idl.load import specs_of_text
+    from minirospy.introspect.interfaces import describe
+
+    with _opened(path, "ERROR: ") as reader:
+        reader.prepare()
+        text = next((each.definition for each in reader.connections.values() if each.type == type_), None)
+        if text is None:
+            types = [each.type for each in reader.connections.values()]
+            raise NotFoundError("message type", type_, types, f"the bag {path} has no such message")
+        if raw:
+            print(text)
+            return
+        specs = specs_of_text(type_, text)
+        print(describe(specs[type_], specs.__getitem__))
