@@ -72,18 +72,18 @@ class Layout:
         """How many messages came before the first of the list."""
         self._decoded = [0] * len(places)
         """Of each transform: how many messages, counted from the first that ever came, have been decoded."""
+        self._newest = [0] * len(places)
+        """Of each transform: the stamp when expired messages were dropped last."""
 
     @property
     def children(self) -> list[str]:
         """The child frames, in the order of the messages."""
         return [place.child for place in self._places]
 
-    def keep(self, arrival: Arrival, span: int) -> bool:
-        """Keep a message; return False where so many are kept that they have to be decoded."""
+    def keep(self, arrival: Arrival, span: int) -> list[str]:
+        """Keep a message, and drop what has expired; return the frames that the caller has to decode now."""
         self._arrivals.append(arrival)
-        if len(self._arrivals) % _BLOCK:
-            return True
-        return self._drop_expired(span) and len(self._arrivals) < _MOST_MESSAGES
+        return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
     def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
         """Decode what has come of a frame since the last time: (number of the arrival, authority, sample)."""
@@ -99,27 +99,39 @@ class Layout:
         self._dropped += len(self._arrivals)
         self._arrivals.clear()
 
-    def _drop_expired(self, span: int) -> bool:
-        """Drop the oldest blocks that every cache would have forgotten; False where that cannot be said unread.
+    def _drop_expired(self, span: int) -> list[str]:
+        """Drop the oldest blocks that nobody needs any more; return the frames to decode.
 
-        The newest message has moved each cache on only if each of its transforms is a valid one.
+        A frame needs no message that it has decoded, and none that its cache would have forgotten. The cache forgets what is
+        older than the newest message, if that is one that it takes: a valid one, later than those before. A frame of which it
+        is not has to be decoded; then its messages can go, too.
         """
         newest = [_sample(self._arrivals[-1].data, place) for place in self._places]
-        if not all(_is_valid(sample) for sample in newest):
-            return False
+        moves_on = [
+            _is_valid(sample) and sample.stamp > before
+            for sample, before in zip(newest, self._newest, strict=True)
+        ]
+        self._newest = [sample.stamp for sample in newest]
 
         count = 0
         while count + _BLOCK < len(self._arrivals):
             last = self._arrivals[count + _BLOCK - 1].data
+            needed = self._dropped + count + _BLOCK
             if any(
-                _stamp(last, place) >= sample.stamp - span
-                for place, sample in zip(self._places, newest, strict=True)
+                decoded < needed and (not moves or _stamp(last, place) >= sample.stamp - span)
+                for decoded, moves, place, sample in zip(
+                    self._decoded, moves_on, self._places, newest, strict=True
+                )
             ):
                 break
             count += _BLOCK
         del self._arrivals[:count]
         self._dropped += count
-        return True
+
+        is_full = len(self._arrivals) >= _MOST_MESSAGES
+        return [
+            place.child for place, moves in zip(self._places, moves_on, strict=True) if is_full or not moves
+        ]
 
 
 class Layouts:

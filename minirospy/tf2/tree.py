@@ -71,8 +71,8 @@ class FrameTree:
             layout = self._layouts.find(data)
             if layout is not None:
                 self._arrived += 1
-                if not layout.keep(Arrival(self._arrived, authority, data), self.cache_time):
-                    self._settle_all(layout)
+                for child in layout.keep(Arrival(self._arrived, authority, data), self.cache_time):
+                    self._settle(self._frames[child])
                 return
 
         is_regular = not is_static

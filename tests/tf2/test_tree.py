@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
 import tracemalloc
 from collections.abc import Iterator
@@ -180,6 +181,38 @@ def test_messages_kept_as_bytes_are_as_good_as_inserted_ones(steps: list[tuple[o
             )
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_long_streams_kept_as_bytes_are_as_good_as_inserted_ones(seed: int) -> None:
+    """With expiry, blocks that are dropped, frames that stand still, and samples that are late, repeated or wrong."""
+    rng = random.Random(seed)
+    span = rng.choice([SECOND, 5 * SECOND])
+    lazy, eager = TransformBuffer(span), TransformBuffer(span)
+    stuck = rng.random() < 0.5
+    for n in range(1, 800):
+        transforms = []
+        for parent, child in (("a", "b"), ("b", "c"), ("b", "d")):
+            late = rng.choice([0, 0, 0, 1, 3]) if rng.random() < 0.3 else 0
+            stamp = SECOND if child == "d" and stuck else max(1, n - late) * SECOND // 50
+            values = numbers(float(n)) if rng.random() < 0.98 else [math.nan, *STILL[1:]]
+            transforms.append((parent, child, stamp, values))
+        lazy.insert_message(tf_message(*transforms), "/me")
+        for parent, child, stamp, (x, y, z, *rest) in transforms:
+            qx, qy, qz, qw = rest
+            eager.insert(parent, child, stamp, (x, y, z), (qx, qy, qz, qw), "/me")
+        if rng.random() < 0.05:
+            target, source = rng.sample(["a", "b", "c", "d"], 2)
+            time = rng.choice([0, rng.randrange(1, 17 * SECOND)])
+            answers = []
+            for buffer in (lazy, eager):
+                try:
+                    answers.append(str(buffer.lookup(target, source, time)))
+                except TransformException as error:
+                    answers.append(str(error))
+            assert answers[0] == answers[1]
+    assert kept(lazy) < 300 + 3 * 64
+    assert lazy.frames_as_string() == eager.frames_as_string()
+
+
 def stream(buffer: TransformBuffer, count: int, step: int = SECOND // 100) -> None:
     for n in range(1, count + 1):
         stamp = n * step
@@ -225,10 +258,36 @@ def test_kept_messages_are_bounded_by_the_cache_time() -> None:
 def test_messages_whose_stamps_stand_still_do_not_fill_the_memory() -> None:
     refused: list[Refusal] = []
     buffer = TransformBuffer(on_refused=refused.append)
-    for _ in range(40_000):
+    for _ in range(1000):
         buffer.insert_message(tf_message(("a", "b", SECOND, STILL), ("b", "c", SECOND, STILL)), "/me")
-    assert kept(buffer) < 16_384
-    assert refused[0].kind == "TF_REPEATED_DATA"
+    assert kept(buffer) <= 2 * 64
+    assert {refusal.kind for refusal in refused} == {"TF_REPEATED_DATA"}
+
+
+def test_a_frame_whose_stamp_stands_still_does_not_keep_the_others() -> None:
+    buffer = TransformBuffer()
+    for n in range(1, 5000):
+        stamp = n * SECOND // 100
+        buffer.insert_message(tf_message(("a", "b", stamp, numbers(n)), ("b", "fixed", SECOND, STILL)))
+    assert 900 <= kept(buffer) <= 1000 + 2 * 64
+    assert buffer.lookup("a", "b", 40 * SECOND).translation == (4000.0, 0.0, 0.0)
+    assert buffer.lookup("b", "fixed", 0).stamp == SECOND
+
+
+def test_what_all_frames_have_decoded_is_not_kept() -> None:
+    buffer = TransformBuffer(cache_time=1000 * SECOND)
+    for _ in range(10):
+        stream(buffer, 64)
+        buffer.frames_as_string()
+    assert kept(buffer) <= 2 * 64
+
+
+def test_more_messages_than_any_use_are_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.tf2.pending._MOST_MESSAGES", 256)
+    buffer = TransformBuffer(cache_time=1000 * SECOND)
+    stream(buffer, 1000)
+    assert kept(buffer) <= 256 + 64
+    assert buffer.lookup("a", "c", SECOND // 100).translation == (2.0, 0.0, 0.0)
 
 
 def test_kept_messages_do_not_expire_by_a_message_that_is_refused() -> None:
