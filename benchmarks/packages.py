@@ -7,9 +7,15 @@ counts. Real ROS is what /usr/bin/python3 imports.
 from __future__ import annotations
 
 import argparse
+import atexit
+import contextlib
+import functools
 import os
+import socket
 import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +30,7 @@ class Measurement(NamedTuple):
     code: str
     ours: str = ""
     """The program with ours, where that offers a better way."""
+    needs_master: bool = False
 
 
 SYNCHRONIZER = """
@@ -95,7 +102,54 @@ def cloud(body: str, instead: str = "") -> Measurement:
     )
 
 
+IMAGE = """
+import time
+from cv_bridge import CvBridge
+from sensor_msgs.msg import Image
+import numpy
+bridge = CvBridge()
+image = Image(height=1080, width=1920, encoding="bgr8", step=5760, data=bytes(1080 * 5760))
+rounds = 100
+start = time.perf_counter()
+for _ in range(rounds):
+    bridge.imgmsg_to_cv2(image, "WANTED")
+print((time.perf_counter() - start) / rounds * 1e6)
+"""
+
+RECONFIGURE = """
+import sys, time
+from types import SimpleNamespace
+import rospy
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.server import Server
+names = [f"p{number}" for number in range(10)]
+parameters = [
+    {"name": n, "type": "int", "default": 0, "min": 0, "max": 10**6, "level": 1, "description": "", "edit_method": ""}
+    for n in names
+]
+kind = SimpleNamespace(
+    defaults=dict.fromkeys(names, 0), min=dict.fromkeys(names, 0), max=dict.fromkeys(names, 10**6),
+    config_description={
+        "name": "Default", "type": "", "state": True, "id": 0, "parent": 0, "parameters": parameters, "groups": []
+    },
+)
+rospy.init_node("server", argv=[])
+server = Server(kind, lambda config, level: config)
+client = Client("server", timeout=30)
+client.get_configuration(timeout=30)
+times = []
+for number in range(50):
+    start = time.perf_counter()
+    client.update_configuration({"p3": number + 1})
+    times.append(time.perf_counter() - start)
+print(sorted(times)[len(times) // 2] * 1e3)
+"""
+
+
 MEASUREMENTS = {
+    "image": Measurement("us a 6 MB image", IMAGE.replace("WANTED", "passthrough")),
+    "image-rgb": Measurement("us a 6 MB image", IMAGE.replace("WANTED", "rgb8")),
+    "reconfigure": Measurement("ms a change of 1 of 10 parameters", RECONFIGURE, needs_master=True),
     "cloud": cloud('sum(1 for _ in point_cloud2.read_points(cloud, ("x", "y", "z")))'),
     "cloud-no-nans": cloud(
         'sum(1 for _ in point_cloud2.read_points(cloud, ("x", "y", "z"), skip_nans=True))'
@@ -111,10 +165,33 @@ MEASUREMENTS = {
 }
 
 
+@functools.cache
+def our_master() -> int:
+    """Start a master of ours for this run; return its port."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+    folder = tempfile.mkdtemp()
+    master = subprocess.Popen(
+        [str(Path(sys.executable).with_name("roscore")), "-p", str(port)],
+        env={**os.environ, "ROS_HOME": folder, "ROS_HOSTNAME": "localhost"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    atexit.register(master.terminate)
+    for _ in range(100):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 5):
+            return port
+        time.sleep(0.1)
+    sys.exit("the master does not answer")
+
+
 def measure(python: str, measurement: Measurement) -> float:
     """Run a program; return the number that it prints."""
     code = measurement.code if python == REAL else measurement.ours or measurement.code
     environment = {**os.environ, "ROS_HOSTNAME": "localhost"}
+    if measurement.needs_master:
+        environment["ROS_MASTER_URI"] = f"http://localhost:{our_master()}"
     done = subprocess.run([python, "-c", code], env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{python}: {done.stderr}")

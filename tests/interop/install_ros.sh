@@ -8,7 +8,7 @@ ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-actionlib-msgs ros-geometry-msgs
 ros-nav-msgs ros-roscpp-msg ros-shape-msgs ros-stereo-msgs ros-trajectory-msgs ros-visualization-msgs
 ros-map-msgs ros-move-base-msgs ros-pcl-msgs ros-tf2-msgs ros-topic-tools-srvs
 python3-shape-msgs python3-stereo-msgs python3-trajectory-msgs python3-visualization-msgs python3-map-msgs
-python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure python3-message-filters python3-angles libdynamic-reconfigure-config-init-mutex-dev python3-rostest python3-topic-tools topic-tools libtopic-tools-dev libroslib-dev
+python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure python3-message-filters python3-angles python3-cv-bridge libdynamic-reconfigure-config-init-mutex-dev python3-rostest python3-topic-tools topic-tools libtopic-tools-dev libroslib-dev
 python3-tf2-ros python3-tf python3-tf2-geometry-msgs python3-tf2-sensor-msgs python3-tf2-kdl python3-tf-conversions python3-pykdl
 tf2-tools tf-tools libtf2-dev libtf2-ros-dev
 catkin cmake ros-message-generation

@@ -10,6 +10,8 @@ import pytest
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 COMPAT = OVERLAY.with_name("compat")
 SHARED = {
+    "cv_bridge/compressed.py",
+    "cv_bridge/encodings.py",
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",
     "message_filters/stamps.py",

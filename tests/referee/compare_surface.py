@@ -77,6 +77,8 @@ AROUND = [
     "message_filters",
     "sensor_msgs.point_cloud2",
     "angles",
+    "cv_bridge",
+    "cv_bridge.core",
     "rosbag",
     "rosbag.bag",
     "rosbag.migration",
@@ -120,7 +122,7 @@ OF_ROS = (
     "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
     "PyKDL",
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
-    "sensor_msgs", "angles", "dynamic_reconfigure",
+    "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
@@ -195,6 +197,7 @@ REASONS = {
         ),
         "the inside of the commands rosmsg and rosmsg-proto",
     ),
+    "cvtColorForDisplay": "for the window of image_view",
     **dict.fromkeys(("LINEDEBUG", "id"), "the generator's inside"),
     "ForkingXMLRPCServer": "a server that forks: not on every system",
     "isstring": "a leftover of Python 2",

@@ -1,0 +1,16 @@
+"""cv_bridge: images of messages as numpy arrays, and back. Source: http://wiki.ros.org/cv_bridge."""
+
+from __future__ import annotations
+
+from minirospy.compat.cv_bridge.core import CvBridge, CvBridgeError
+from minirospy.compat.cv_bridge.encodings import type_of_encoding
+
+__all__ = ["CvBridge", "CvBridgeError", "getCvType"]
+
+
+def getCvType(encoding: str) -> int:
+    """Return OpenCV's number of an encoding's type, as CV_8UC3 = 16. Raises RuntimeError where it is unknown."""
+    try:
+        return type_of_encoding(encoding)
+    except ValueError as error:
+        raise RuntimeError(str(error)) from error

@@ -1,0 +1,110 @@
+"""Compressed images: by OpenCV where it is installed, else by Pillow (`pip install 'minirospy[images]'`)."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["decode", "encode", "opencv"]
+
+_FORMATS = {
+    **dict.fromkeys(("jpg", "jpeg", "jpe"), "JPEG"),
+    **dict.fromkeys(("bmp", "dib"), "BMP"),
+    **dict.fromkeys(("tif", "tiff"), "TIFF"),
+    **dict.fromkeys(("pbm", "pgm", "ppm"), "PPM"),
+    "png": "PNG",
+    "webp": "WEBP",
+    "jp2": "JPEG2000",
+}
+_QUALITY = 95
+"""Of JPEG, as OpenCV has it."""
+
+
+def opencv() -> Any:
+    """Return the module cv2; None where it is not installed."""
+    try:
+        import cv2  # type: ignore[import-not-found]
+    except ImportError:
+        return None
+    return cv2
+
+
+def decode(data: bytes) -> NDArray[Any]:
+    """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA. Raises ValueError."""
+    import numpy as np
+
+    cv2 = opencv()
+    if cv2:
+        image: NDArray[Any] | None = (
+            cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        )
+        if image is None:
+            raise ValueError(f"{len(data)} bytes are not an image that OpenCV can read")
+        return image
+
+    pillow = _pillow()
+    try:
+        with pillow.open(BytesIO(data)) as picture:
+            if picture.mode.startswith("I;16"):
+                return np.asarray(picture).astype(np.uint16)
+            if picture.mode not in ("L", "RGB", "RGBA"):
+                has_alpha = "A" in picture.mode or "transparency" in picture.info
+                mode = "L" if picture.mode == "1" else "RGBA" if has_alpha else "RGB"
+                return _swapped(np.asarray(picture.convert(mode)))
+            return _swapped(np.asarray(picture))
+    except (OSError, ValueError, SyntaxError, pillow.DecompressionBombError) as error:
+        raise ValueError(f"{len(data)} bytes are not an image that Pillow can read: {error}") from error
+
+
+def encode(image: NDArray[Any], format: str) -> bytes:
+    """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raises ValueError."""
+    import numpy as np
+
+    cv2 = opencv()
+    if cv2:
+        try:
+            data: bytes = np.asarray(cv2.imencode(f".{format}", image)[1]).tobytes()
+        except cv2.error as error:
+            raise ValueError(str(error)) from error
+        return data
+
+    name = _FORMATS.get(format.lower())
+    if name is None:
+        raise ValueError(f"{format!r} is not a format: there is {', '.join(_FORMATS)}")
+    if image.ndim == 3 and image.shape[2] == 1:
+        image = image[..., 0]
+    deep = image.dtype == np.uint16 and image.ndim == 2 and name in ("PNG", "TIFF", "JPEG2000")
+    if not deep and (image.dtype != np.uint8 or (image.ndim == 3 and image.shape[2] not in (3, 4))):
+        raise ValueError(f"an image of {image.dtype} and shape {image.shape} cannot be {format}")
+    if name in ("JPEG", "PPM") and image.ndim == 3:
+        image = image[..., :3]
+
+    buffer, pillow = BytesIO(), _pillow()
+    try:
+        pillow.fromarray(_swapped(image)).save(buffer, name, quality=_QUALITY)
+    except (OSError, ValueError, KeyError) as error:
+        raise ValueError(f"the image cannot be {format}: {error}") from error
+    return buffer.getvalue()
+
+
+def _swapped(image: NDArray[Any]) -> NDArray[Any]:
+    """Return an image with red and blue exchanged: BGR is OpenCV's order, RGB that of Pillow."""
+    import numpy as np
+
+    if image.ndim == 2:
+        return image
+    order = [2, 1, 0, 3][: image.shape[2]]
+    return np.ascontiguousarray(image[..., order])
+
+
+def _pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise ValueError(
+            "compressed images need OpenCV or Pillow: pip install 'minirospy[images]'"
+        ) from error
+    return Image

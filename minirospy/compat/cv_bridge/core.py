@@ -1,0 +1,190 @@
+"""cv_bridge.core: CvBridge. It needs numpy alone; OpenCV for colors of Bayer patterns and YUV."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+from minirospy.compat.cv_bridge.compressed import decode, encode, opencv
+from minirospy.compat.cv_bridge.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
+
+if TYPE_CHECKING:
+    import numpy
+    from numpy.typing import NDArray
+
+__all__ = ["CvBridge", "CvBridgeError"]
+
+
+class CvBridgeError(TypeError):
+    """An image that cannot be converted."""
+
+
+class CvBridge:
+    """Converts between messages and the arrays that OpenCV works with: (height, width) or (height, width, channels)."""
+
+    def __init__(self) -> None:
+        self.cvdepth_to_numpy_depth: dict[int, str] = dict(enumerate(DEPTHS.values()))
+        self.cvtype_to_name: dict[int, str] = {
+            type_of_encoding(f"{depth}C{channels}"): f"{depth}C{channels}"
+            for depth in DEPTHS
+            for channels in range(1, 5)
+        }
+        self.numpy_type_to_cvtype: dict[str, str] = {
+            **{dtype: depth for depth, dtype in DEPTHS.items()},
+            **DEPTHS,
+        }
+
+    def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[Any], n_channels: int) -> str:
+        """Return the name of an array's type, such as 8UC3. Raises CvBridgeError where OpenCV has none."""
+        if dtype.name not in self.numpy_type_to_cvtype:
+            raise CvBridgeError(
+                f"images of {dtype.name} have no encoding: there is {', '.join(DEPTHS.values())}"
+            )
+        return f"{self.numpy_type_to_cvtype[dtype.name]}C{n_channels}"
+
+    def cvtype2_to_dtype_with_channels(self, cvtype: int) -> tuple[str, int]:
+        """Return numpy's type and the number of channels of OpenCV's number of a type."""
+        return self.cvdepth_to_numpy_depth[cvtype % 8], cvtype // 8 + 1
+
+    def encoding_to_cvtype2(self, encoding: str) -> int:
+        """Return OpenCV's number of an encoding's type. Raises CvBridgeError."""
+        try:
+            return type_of_encoding(encoding)
+        except ValueError as error:
+            raise CvBridgeError(error) from error
+
+    def encoding_to_dtype_with_channels(self, encoding: str) -> tuple[str, int]:
+        """Return numpy's type and the number of channels of an encoding. Raises CvBridgeError."""
+        return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
+
+    def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> NDArray[Any]:
+        """Return the image of a message.
+
+        It is a read-only view of the message's data, without a copy, unless the encoding or the order of bytes has to
+        change. Bytes between the rows (``step``) are left out. Raises CvBridgeError (an unknown encoding, no such
+        conversion, less data than the size needs).
+        """
+        import numpy as np
+
+        name, channels = self.encoding_to_dtype_with_channels(img_msg.encoding)
+        dtype = np.dtype(name).newbyteorder(">" if img_msg.is_bigendian else "<")
+        row = img_msg.width * channels * dtype.itemsize
+        # Some drivers leave the step empty.
+        step = img_msg.step if img_msg.step >= row else row
+        needed = max(img_msg.height - 1, 0) * step + (row if img_msg.height else 0)
+        data = img_msg.data
+        if isinstance(data, str):
+            data = data.encode()
+        if len(data) < needed:
+            raise CvBridgeError(
+                f"the image of {img_msg.width}x{img_msg.height} [{img_msg.encoding}] needs {needed} bytes, "
+                f"its data has {len(data)}"
+            )
+
+        shape, strides = (
+            (img_msg.height, img_msg.width, channels),
+            (step, channels * dtype.itemsize, dtype.itemsize),
+        )
+        dimensions = 2 if channels == 1 else 3
+        image: NDArray[Any] = np.ndarray(
+            shape[:dimensions], dtype, data if needed else bytes(1), 0, strides[:dimensions]
+        )
+        if dtype.itemsize > 1 and bool(img_msg.is_bigendian) == (sys.byteorder == "little"):
+            image = image.astype(dtype.newbyteorder("="))
+        if desired_encoding == "passthrough":
+            return image
+        return _converted(image, img_msg.encoding, desired_encoding)
+
+    def cv2_to_imgmsg(
+        self, cvim: NDArray[Any], encoding: str = "passthrough", header: Header | None = None
+    ) -> Image:
+        """Return the message of an image.
+
+        Raises CvBridgeError where its type is not that of the encoding, TypeError where it is not an array.
+        """
+        _check_array(cvim)
+        message = Image()
+        message.height, message.width = cvim.shape[:2]
+        if header is not None:
+            message.header = header
+        name = self.dtype_with_channels_to_cvtype2(cvim.dtype, 1 if cvim.ndim < 3 else cvim.shape[2])
+        message.encoding = name if encoding == "passthrough" else encoding
+        if encoding != "passthrough" and self.cvtype_to_name.get(self.encoding_to_cvtype2(encoding)) != name:
+            raise CvBridgeError(f"encoding specified as {encoding}, but image has incompatible type {name}")
+        if cvim.dtype.byteorder == ">" or (cvim.dtype.byteorder == "=" and sys.byteorder == "big"):
+            message.is_bigendian = True
+        message.data = cvim.tobytes()
+        message.step = len(message.data) // message.height if message.height else 0
+        return message
+
+    def compressed_imgmsg_to_cv2(
+        self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
+    ) -> NDArray[Any]:
+        """Return the image of a compressed message. Raises CvBridgeError where it is not one, or there is no such conversion."""
+        try:
+            image = decode(bytes(cmprs_img_msg.data))
+        except ValueError as error:
+            raise CvBridgeError(error) from error
+        if desired_encoding == "passthrough":
+            return image
+        channels = 1 if image.ndim == 2 else image.shape[2]
+        kind = {1: "mono", 3: "bgr", 4: "bgra"}[channels]
+        return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
+
+    def cv2_to_compressed_imgmsg(self, cvim: NDArray[Any], dst_format: str = "jpg") -> CompressedImage:
+        """Return the compressed message of an image: jpg, png, bmp, tiff, webp, ...
+
+        Raises CvBridgeError where the format cannot hold it, TypeError where it is not an array.
+        """
+        _check_array(cvim)
+        try:
+            return CompressedImage(format=dst_format, data=encode(cvim, dst_format))
+        except ValueError as error:
+            raise CvBridgeError(error) from error
+
+
+def _check_array(image: object) -> None:
+    import numpy as np
+
+    if not isinstance(image, np.ndarray):
+        raise TypeError("Your input type is not a numpy array")
+    if image.ndim not in (2, 3):
+        raise CvBridgeError(f"an image has two or three dimensions, not {image.ndim}")
+
+
+def _converted(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
+    """Return an image in another encoding. Raises CvBridgeError."""
+    try:
+        if is_converted_by_opencv(source, wanted):
+            image, source = _by_opencv(image, source, wanted)
+        return converted(image, source, wanted)
+    except ValueError as error:
+        raise CvBridgeError(error) from error
+
+
+def _by_opencv(image: NDArray[Any], source: str, wanted: str) -> tuple[NDArray[Any], str]:
+    """Return an image of a Bayer pattern or YUV in colors of the same depth, and its encoding then. Raises ValueError."""
+    cv2 = opencv()
+    if cv2 is None:
+        raise ValueError(
+            f"converting [{source}] to [{wanted}] needs OpenCV: pip install opencv-python-headless"
+        )
+    # OpenCV names a pattern by the pixels of the second row and column.
+    patterns = {
+        "bayer_rggb": "BayerBG",
+        "bayer_bggr": "BayerRG",
+        "bayer_gbrg": "BayerGR",
+        "bayer_grbg": "BayerGB",
+    }
+    name = source.rstrip("0123456789")
+    bits = "16" if source.endswith("16") else "8"
+    color = wanted.rstrip("0123456789")
+    if name in patterns and color in ("bgra", "rgba"):
+        raise ValueError(f"Unsupported conversion from [{source}] to [{wanted}]")
+    code = f"COLOR_{patterns.get(name, 'YUV')}2{'GRAY' if color == 'mono' else color.upper()}"
+    if name not in patterns:
+        code += "_UYVY"
+    return cv2.cvtColor(image, getattr(cv2, code)), f"{color}{bits if name in patterns else 8}"
