@@ -10,13 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, BinaryIO, cast
 
-from minirospy.bag.writer import CHUNK_THRESHOLD, Buffer
+from minirospy.bag.writer import Buffer
 from minirospy.errors import BagCompressionError, BagError, BagFormatError
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-__all__ = ["COMPRESSIONS", "SCHEMA_FIELDS", "McapWriter", "check_mcap"]
+__all__ = ["CHUNK_SIZE", "COMPRESSIONS", "SCHEMA_FIELDS", "McapWriter", "check_mcap"]
+
+CHUNK_SIZE = 4 * 1024 * 1024
+"""Bytes of a chunk before compression, as the MCAP tools have it: the summary that `rosbag info` reads has a record of each."""
 
 COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
 """The names of the compressions of chunks, and those that the library gives them."""
@@ -43,9 +46,7 @@ class McapWriter:
     ``compression``: none, lz4 or zstd. Raise BagCompressionError for another, BagError if the extra is missing.
     """
 
-    def __init__(
-        self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_THRESHOLD
-    ) -> None:
+    def __init__(self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_SIZE) -> None:
         if compression not in COMPRESSIONS:
             raise BagCompressionError(compression, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
         check_mcap()

@@ -145,6 +145,8 @@ class BagWriter:
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
+        self._waiting = 0
+        """Bytes of the complete chunks, before compression."""
         self._closed = False
         self._small = bytearray()
         self._pieces: list[Buffer] = []
@@ -187,7 +189,7 @@ class BagWriter:
     @property
     def gathered(self) -> int:
         """Bytes in memory that the stream has not been given yet."""
-        return self._size + sum(one.size for one in self._complete)
+        return self._size + self._waiting
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Return the number of a new connection for :meth:`write`; ``header`` is the publisher's connection header.
@@ -269,6 +271,7 @@ class BagWriter:
         complete = _Complete(*self._data(pieces), self._size, start, end, counts, b"".join(indexes))
         self._start_chunk()
         self._complete.append(complete)
+        self._waiting += complete.size
         self._write_complete(self._most_waiting)
 
     def flush(self) -> None:
@@ -296,6 +299,7 @@ class BagWriter:
         lost = sum(len(one.entries) // _ENTRY.size for one in self._used)
         lost += sum(sum(one.counts.values()) for one in self._complete)
         self._complete.clear()
+        self._waiting = 0
         self._start_chunk()
         end = self._position if written is None else min(written, self._position)
         self._closed = True
@@ -389,6 +393,7 @@ class BagWriter:
             self.chunks.append(ChunkInfo(self._position, chunk.start, chunk.end, chunk.counts))
             self._position += len(header) + stored + len(chunk.indexes)
             self._complete.popleft()
+            self._waiting -= chunk.size
 
     def _write_index(self) -> None:
         connections = self.connections

@@ -54,7 +54,7 @@ def _parser() -> Parser:
         help="record a bag of maximum duration DURATION in seconds, unless 'm', or 'h' is appended.")  # fmt: skip
     add("-b", "--buffsize", type=int, default=256, metavar="SIZE",
         help="use an internal buffer of SIZE MB (Default: 256, 0 = infinite)")  # fmt: skip
-    add("--chunksize", type=int, default=768, metavar="SIZE",
+    add("--chunksize", type=int, default=None, metavar="SIZE",
         help="Advanced. Record to chunks of SIZE KB (Default: 768)")  # fmt: skip
     add("-l", "--limit", type=int, default=0, metavar="NUM",
         help="only record NUM messages on each topic")  # fmt: skip
@@ -102,7 +102,7 @@ def _record(
     size: int | None,
     duration: str,
     buffsize: int,
-    chunksize: int,
+    chunksize: int | None,
     limit: int,
     node: str,
     bz2: bool,
@@ -126,7 +126,12 @@ def _record(
         text = "Split specified without giving a maximum duration or size"
         raise Misuse(text, text)
     _check_range("Buffer size", buffsize)
-    _check_range("Chunk size", chunksize)
+    if chunksize is not None:
+        _check_range("Chunk size", chunksize)
+    elif mcap:
+        chunksize = 4096
+    else:
+        chunksize = 768
     if size is not None and size < 0:
         raise UsageError("Split size must be 0 or positive")
     if limit > 0 and not names:
