@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/rosbag/Commandline#play.
 from __future__ import annotations
 
 import contextlib
+import gc
 import struct
 import sys
 import threading
@@ -122,6 +123,8 @@ class Player:
         last = min(times[1], end or times[1])
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
+        # A collection that visits all that was imported takes milliseconds.
+        gc.freeze()
         try:
             # Before the keys are read: the first ones count.
             self._schedule = Schedule(options, first[1].time, last, time.monotonic_ns())

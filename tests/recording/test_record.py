@@ -145,6 +145,21 @@ def test_split_by_size_repeats_the_latest_latched_message(
     assert numbers == list(range(numbers[0], 45))
 
 
+@pytest.mark.parametrize("words", [("--split=1",), ("--split", "1")])
+def test_split_with_a_size_is_deprecated(
+    words: tuple[str, ...], talker: Talker, start: Start, tmp_path: Path
+) -> None:
+    chatter = talker.advertise("/chatter")
+    process = start("record", *words, "-l", "15", "-O", "s", "/chatter")
+    connected(chatter)
+    for _ in range(15):
+        say(chatter, "x" * 100_000)
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert errors.startswith('Use of "--split <MAX_SIZE>" has been deprecated.')
+    assert sorted(path.name for path in tmp_path.glob("*.bag")) == ["s_0.bag", "s_1.bag"]
+
+
 def test_split_by_duration(talker: Talker, start: Start, tmp_path: Path) -> None:
     process = start("record", "--split", "--duration", "0.3", "-O", "d", "/chatter")
     read_until(process, "Recording to 'd_2.bag'")

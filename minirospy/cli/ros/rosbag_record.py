@@ -5,7 +5,8 @@ Source: http://wiki.ros.org/rosbag/Commandline#record. Options and errors are th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.cli.parser import Misuse, Parser, attach_completer
@@ -20,7 +21,23 @@ __all__ = ["COMMAND", "VERB", "main"]
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `rosrun rosbag record`; return its exit status."""
-    return COMMAND.main(argv)
+    return COMMAND.main(list(_without_split_size(sys.argv[1:] if argv is None else argv)))
+
+
+def _without_split_size(words: Sequence[str]) -> Iterator[str]:
+    """Yield the words with ``--split --size N`` for the ``--split=N`` and ``--split N`` of old launch files."""
+    for number, word in enumerate(words):
+        size = word.removeprefix("--split=")
+        is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
+        if is_value or (size != word and size):
+            print(
+                'Use of "--split <MAX_SIZE>" has been deprecated.  Please use --split --size <MAX_SIZE> or '
+                "--split --duration <MAX_DURATION>",
+                file=sys.stderr,
+            )
+            yield from ("--size", size) if is_value else ("--split", "--size", size)
+        else:
+            yield word
 
 
 def _parser() -> Parser:
