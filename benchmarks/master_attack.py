@@ -5,8 +5,9 @@
     python benchmarks/master_attack.py --only "huge tag"
 
 A client in a separate process calls getPid fifty times a second, each time by a new connection. Its waits hold what
-the machine itself adds, so the same calls go to a server that nobody attacks (column "control"). Memory is the resident
-memory of the master. Exit status 1 where a call of the good client failed or a registration was refused.
+the machine itself adds, so the same calls go to a server that nobody attacks (column "control"); and the longest
+turn of the master's loop, in CPU time, is a column too (``benchmarks/master_turns.py``). Memory is the resident memory of
+the master. Exit status 1 where a call of the good client failed or a registration was refused.
 """
 
 from __future__ import annotations
@@ -153,10 +154,17 @@ class Row(NamedTuple):
     p99: float
     worst: float
     control: float
+    turn: float
     peak: float
     after: float
     calls: int
     failed: int
+
+
+def longest_turn(turns: Path, begin: float, end: float) -> float:
+    """Return the CPU seconds of the master's longest turn between two moments."""
+    lines = [line.split() for line in turns.read_text(encoding="ascii").splitlines()]
+    return max((float(taken) for moment, taken in lines if begin <= float(moment) <= end), default=0.0)
 
 
 @contextlib.contextmanager
@@ -190,9 +198,9 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
     """Attack a new master, and watch the good client; and how the nodes fared."""
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
-        master, port = stack.enter_context(
-            started_master(folder, [sys.executable, "-m", "minirospy", "master"])
-        )
+        turns = Path(folder) / "turns"
+        program = str(Path(__file__).with_name("master_turns.py"))
+        master, port = stack.enter_context(started_master(folder, [sys.executable, program, str(turns)]))
         control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
         stack.callback(control.wait)
         stack.callback(control.kill)
@@ -244,7 +252,8 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         else:
             said = ""
 
-        return Row(label, median, p99, worst, idle.since(begin)[2], peak, after, calls, failed), said
+        control_wait, turn = idle.since(begin)[2], longest_turn(turns, begin, end)
+        return Row(label, median, p99, worst, control_wait, turn, peak, after, calls, failed), said
 
 
 @contextlib.contextmanager
@@ -315,7 +324,9 @@ def main() -> int:
     options = parser.parse_args()
     names = [each.__name__ for each in ATTACKS if options.only.replace(" ", "_") in each.__name__]
     if not options.json:
-        print(f"{'attack':24} median ms    p99 ms  worst ms  control ms  peak MiB  after MiB  calls  failed")
+        print(
+            f"{'attack':24} median ms    p99 ms  worst ms  control ms  turn ms  peak MiB  after MiB  calls  failed"
+        )
     failed = 0
     runs = [("mixed", names)] if options.mixed else [(name, [name]) for name in names]
 
@@ -330,7 +341,8 @@ def main() -> int:
         else:
             print(
                 f"{row.attack:24} {row.median * 1e3:9.2f} {row.p99 * 1e3:9.2f} {row.worst * 1e3:9.1f} "
-                f"{row.control * 1e3:11.1f} {row.peak:9.0f} {row.after:10.0f} {row.calls:6} {row.failed:7}",
+                f"{row.control * 1e3:11.1f} {row.turn * 1e3:8.1f} {row.peak:9.0f} {row.after:10.0f} "
+                f"{row.calls:6} {row.failed:7}",
                 flush=True,
             )
 
