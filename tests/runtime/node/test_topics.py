@@ -360,7 +360,7 @@ def test_a_publisher_with_an_invalid_address_is_reported(caplog: pytest.LogCaptu
         async with graph("/a") as (_, (node,)):
             subscription = await listen(node, "/t", Box())
             subscription.publishers_changed(["nonsense"])
-            await eventually(lambda: "no address of a node" in caplog.text)
+            await eventually(lambda: "not the address of a node" in caplog.text)
 
     run(scene)
 
