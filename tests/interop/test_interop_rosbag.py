@@ -146,6 +146,56 @@ def test_commands_print_the_same(bags: Path, words: str) -> None:
     assert rosbag("ours", bags, *words.split()) == rosbag("real", bags, *words.split())
 
 
+@pytest.mark.parametrize("words", [[], ["-h"], ["help"], ["bogus"]])
+def test_verbs_are_listed_the_same(tmp_path: Path, words: list[str]) -> None:
+    (status, *ours), real = rosbag("ours", tmp_path, *words), rosbag("real", tmp_path, *words)
+    own = "   convert  "
+    assert (
+        status,
+        *("".join(line for line in text.splitlines(True) if not line.startswith(own)) for text in ours),
+    ) == real
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "rostopic list -b none.bag",
+        "rostopic list -b none.bag /chatter",
+        "rostopic list -b none.bag /camera",
+        "rostopic list -b none.bag -p",
+        "rostopic list -b missing.bag",
+        "rostopic echo -b lz4.bag /chatter -n 3",
+        "rostopic echo -b lz4.bag /count/data -n 3",
+        "rostopic echo -b bz2.bag -p /joint_states",
+        "rostopic echo -b bz2.bag -p /pose/pose --nostr",
+        "rostopic echo -b none.bag /camera/image_raw --noarr -n 2",
+        "rostopic echo -b none.bag -a -n 12",
+        "rostopic echo -b none.bag",
+        "rostopic echo -b none.bag --offset /count",
+        "rosmsg show -b none.bag sensor_msgs/Image",
+        "rosmsg show -r -b none.bag sensor_msgs/JointState",
+        "rosmsg show -b missing.bag sensor_msgs/Image",
+    ],
+)
+@pytest.mark.parametrize("bags", ["real"], indirect=True)
+def test_bags_in_other_commands_print_the_same(bags: Path, words: str) -> None:
+    command, *others = words.split()
+    found = {
+        stack: subprocess.run(
+            [str(folder / command), *others],
+            cwd=bags,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        for stack, folder in BINS.items()
+    }
+    ours, real = found["ours"], found["real"]
+    assert (ours.returncode, ours.stdout) == (real.returncode, real.stdout)
+    assert ours.stderr.startswith(real.stderr)
+
+
 @pytest.mark.parametrize(
     ("words", "target"),
     [
