@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from minirospy.bag import records
-from minirospy.bag.compression import BZ2, NONE, decompress
+from minirospy.bag.compression import BZ2, COMPRESSIONS, NONE, decompress
 from minirospy.bag.writer import BagWriter, Buffer, Continued
 from minirospy.errors import BagFormatError
 
@@ -324,3 +326,39 @@ def fill(writer: BagWriter) -> None:
     for time in range(MESSAGES):
         writer.write(numbers[time % 2], time, b"x" * 50)
     writer.close()
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 3),
+            st.integers(0, 5 * SECOND),
+            st.one_of(st.binary(max_size=40), st.just(b"x" * 70_000)),
+        ),
+        max_size=30,
+    ),
+    st.integers(0, 200_000),
+    st.sampled_from(COMPRESSIONS),
+)
+def test_any_messages_come_back(
+    messages: list[tuple[int, int, bytes]], threshold: int, compression: str
+) -> None:
+    stream = io.BytesIO()
+    writer = BagWriter(stream, chunk_threshold=threshold, compression=compression)
+    numbers = [writer.add_connection(f"/t{i}", header(f"/t{i}")) for i in range(4)]
+    for i, time, body in messages:
+        cut = len(body) // 2
+        writer.write(numbers[i], time, memoryview(body)[:cut], body[cut:])
+    assert writer.size >= len(stream.getvalue())
+    writer.close()
+
+    bag = Parsed(stream.getvalue())
+    assert bag.messages == messages
+    assert sum(len(index.entries) for index in bag.indexes) == len(messages)
+    for index in bag.indexes:
+        assert index.entries == sorted(index.entries)
+    for number in numbers:
+        assert sum(chunk.counts.get(number, 0) for chunk in bag.chunks) == sum(
+            number == one for one, _, _ in messages
+        )
+    assert writer.chunks == bag.chunks
