@@ -18,7 +18,7 @@ from minirospy.robots.joints import Dependent, JointError, JointOptions, read_jo
 
 __all__ = ["JointPublisher", "main", "param", "run_node"]
 
-_CONNECT_SECONDS = 0.2
+_CONNECT_SECONDS = 0.5
 
 
 def main() -> int:

@@ -27,7 +27,7 @@ _AHEAD = rospy.Duration(0, 500_000_000)
 """How far ahead fixed frames on /tf are stamped: they hold until the next ones."""
 
 _OLD = rospy.Duration(30)
-_CONNECT_SECONDS = 0.2
+_CONNECT_SECONDS = 0.5
 _PREFIX_SECONDS = 1.0
 """How long a value of tf_prefix is used: ROS looks it up for each message, which costs a call of the master's each."""
 
