@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import random
 import re
 import signal
 import subprocess
@@ -92,7 +93,7 @@ def poses(message: TFMessage) -> dict[tuple[str, str], Numbers]:
     return found
 
 
-STATES = [
+STATES: list[dict[str, float]] = [
     {"shoulder": 0.5, "elbow": 1.0, "left": 0.02},
     {"shoulder": -1.2, "elbow": 3.0, "left": 0.01, "right": 0.04},
     {"elbow": -100.0},
@@ -100,7 +101,31 @@ STATES = [
 ]
 
 
-def published(programs: Programs, stack: str, *words: str) -> list[dict[tuple[str, str], Numbers]]:
+def random_robot(seed: int) -> tuple[str, list[dict[str, float]]]:
+    """Return a description of 30 joints, and states of them."""
+    chance = random.Random(seed)
+    kinds = ["revolute", "continuous", "prismatic", "fixed", "planar"]
+
+    def vector(size: float) -> str:
+        return " ".join(f"{chance.uniform(-size, size):.6f}" for _ in range(3))
+
+    parts = ['<link name="l0"/>']
+    names = []
+    for number in range(1, 31):
+        kind = chance.choice(kinds)
+        names += [f"j{number}"] if kind in kinds[:3] else []
+        parts.append(
+            f'<link name="l{number}"/><joint name="j{number}" type="{kind}"><parent link="l{chance.randrange(number)}"/>'
+            f'<child link="l{number}"/><origin xyz="{vector(2)}" rpy="{vector(4)}"/><axis xyz="{vector(1)}"/>'
+            '<limit lower="-9" upper="9" effort="1" velocity="1"/></joint>'
+        )
+    states = [{name: chance.uniform(-7, 7) for name in names} for _ in range(5)]
+    return f'<robot name="r">{"".join(parts)}</robot>', states
+
+
+def published(
+    programs: Programs, stack: str, *words: str, states: list[dict[str, float]] = STATES
+) -> list[dict[tuple[str, str], Numbers]]:
     """Return what a robot_state_publisher makes of STATES, the fixed frames first."""
     process = programs.start(
         stack, "robot_state_publisher/robot_state_publisher", *words, f"__name:=rsp_{stack}"
@@ -113,15 +138,15 @@ def published(programs: Programs, stack: str, *words: str) -> list[dict[tuple[st
             if fixed.transforms:
                 found.append(poses(fixed))
                 break
-        states = node.advertise("joint_states", JointState)
+        sender = node.advertise("joint_states", JointState)
         moving = node.subscribe("/tf", TFMessage, queue_size=100)
-        await states.wait_for_subscribers()
+        await sender.wait_for_subscribers()
         await moving.wait_for_publishers()
-        for positions in STATES:
+        for positions in states:
             state = JointState(name=[*positions], position=[*positions.values()])
             await node.sleep(0.1)
             state.header.stamp = node.now()
-            await states.publish(state)
+            await sender.publish(state)
             async for message in moving:
                 if message.transforms and message.transforms[0].header.stamp == state.header.stamp:
                     found.append(poses(message))
@@ -140,6 +165,17 @@ def test_robot_state_publishers_publish_the_same(programs: Programs, words: tupl
     real, ours = (published(programs, stack, *words) for stack in STACKS)
     assert [sorted(message) for message in ours] == [sorted(message) for message in real]
     for mine, theirs in zip(ours, real, strict=True):
+        for frame, numbers in theirs.items():
+            assert mine[frame] == pytest.approx(numbers, abs=1e-12), frame
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_robots_move_the_same(programs: Programs, seed: int) -> None:
+    description, states = random_robot(seed)
+    programs.set("/robot_description", description)
+    real, ours = (published(programs, stack, states=states) for stack in STACKS)
+    for mine, theirs in zip(ours, real, strict=True):
+        assert mine.keys() == theirs.keys()
         for frame, numbers in theirs.items():
             assert mine[frame] == pytest.approx(numbers, abs=1e-12), frame
 
