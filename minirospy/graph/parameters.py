@@ -82,7 +82,7 @@ class ParameterTree:
         # No less than what all values take in memory.
         self._bytes = 0
 
-    def get(self, key: str) -> Any:
+    def get(self, key: str) -> object:
         """Return the value, or the dictionary of a namespace. Raises KeyError."""
         value = self._find(_split(key))
         if value is _UNSET:
@@ -164,7 +164,7 @@ class ParameterTree:
         found: list[str] = []
         left = [_STEP_ITEMS]
 
-        def walk(table: dict[str, Any], prefix: str) -> Steps[None]:
+        def walk(table: dict[str, object], prefix: str) -> Steps[None]:
             for name, value in table.items():
                 if isinstance(value, dict):
                     yield from walk(value, f"{prefix}{name}/")
@@ -175,10 +175,12 @@ class ParameterTree:
                     left[0] = _STEP_ITEMS
                     yield None
 
-        yield from walk(self.get("/"), "/")
+        root = self.get("/")
+        assert isinstance(root, dict)
+        yield from walk(root, "/")
         return found
 
-    def subscribe(self, key: str, caller_id: str, uri: str) -> Any:
+    def subscribe(self, key: str, caller_id: str, uri: str) -> object:
         """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
 
         Raises ParametersFullError.
@@ -226,24 +228,25 @@ class ParameterTree:
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
 
-    def _find(self, path: list[str]) -> Any:
-        value: Any = self._root
+    def _find(self, path: list[str]) -> object:
+        value: object = self._root
         for name in path:
             value = value.get(name, _UNSET) if isinstance(value, dict) else _UNSET
             if value is _UNSET:
                 break
         return value
 
-    def _enter(self, path: list[str]) -> dict[str, Any]:
+    def _enter(self, path: list[str]) -> dict[str, object]:
         """Return the dictionary at ``path``, which is made where it is not there, to be changed."""
         table = self._root = self._owned(self._root)
         for name in path:
             inner = table.get(name)
-            table[name] = self._owned(inner if isinstance(inner, dict) else {})
-            table = table[name]
+            owned = self._owned(inner if isinstance(inner, dict) else {})
+            table[name] = owned
+            table = owned
         return table
 
-    def _owned(self, table: dict[str, Any]) -> dict[str, Any]:
+    def _owned(self, table: dict[str, object]) -> dict[str, object]:
         if id(table) not in self._own:
             table = dict(table)
             self._own.add(id(table))
@@ -281,7 +284,7 @@ class ParameterTree:
             at = bisect_right(self._keys, key)
 
 
-_UNSET: Any = object()
+_UNSET = object()
 
 
 def weigh_in_steps(key: str, value: object) -> Steps[int]:

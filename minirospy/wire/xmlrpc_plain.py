@@ -54,10 +54,10 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
         # The token of what was not expected is always the last one.
         return None
 
-    params: list[Any] = []
-    add: Callable[[Any], None] = params.append
+    params: list[object] = []
+    add: Callable[[object], None] = params.append
     # What is open: the first letters of its end, how the values around it are added, and what it holds.
-    opened: list[tuple[str, Callable[[Any], None], Any]] = []
+    opened: list[tuple[str, Callable[[object], None], Any]] = []
 
     for text, param_text, bare, param_bare, other in tokens:
         if not other:
@@ -65,7 +65,7 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
             continue
         start = other[:10]
         if start == "<value><ar":
-            items: list[Any] = []
+            items: list[object] = []
             add(items)
             opened.append(("</da", add, items))
             add = items.append
@@ -81,7 +81,7 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
             at = other.index(">", 8) + 1
             add(_NUMBERS[start](other[at : other.index("<", at)]))
         elif start == "<value><st":
-            table: dict[str, Any] = {}
+            table: dict[str, object] = {}
             add(table)
             opened.append(("</st", add, table))
             add = _refuse

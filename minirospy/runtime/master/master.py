@@ -178,7 +178,7 @@ class Master(MasterApi):
         """``node``, which has started, is on this loop: it is notified of publishers without a call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
-    def serve(self, method: str, args: Sequence[object]) -> Any:
+    def serve(self, method: str, args: Sequence[object]) -> object:
         """Return the answer to one call of a client, perhaps as XML already. Raises RpcFault as :meth:`dispatch`."""
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
@@ -209,7 +209,7 @@ class Master(MasterApi):
         """Return the URIs of a topic's publishers."""
         return self.registry.publisher_uris(topic)
 
-    def parameter(self, key: str) -> Any:
+    def parameter(self, key: str) -> object:
         """Return a parameter's value, {} where it is not set."""
         return self.parameters.get(key) if self.parameters.has(key) else {}
 
@@ -378,7 +378,7 @@ class Master(MasterApi):
             if isinstance(action, NodeShutdown):
                 parameters.unsubscribe_node(action.name, action.uri)
 
-    def _snapshot(self) -> Iterator[list[Any]]:
+    def _snapshot(self) -> Iterator[list[object]]:
         """Return the changes that lead from nothing to the present state, with the order of every table.
 
         The state is copied here and now: the changes may be read while it goes on changing.
@@ -445,7 +445,7 @@ class Master(MasterApi):
             await rpc.close()
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))
 
-    def _forget(self, name: str, uri: str) -> list[Any]:
+    def _forget(self, name: str, uri: str) -> list[Notice]:
         self.parameters.unsubscribe_node(name, uri)
         return list(self.registry.forget(name, uri))
 
