@@ -229,13 +229,24 @@ class TransformBuffer(FrameTree):
         if target is source:
             return self._newest_of(target.name)
 
+        # As :meth:`_ancestors`, written out: of most lookups this is all.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
-        for stamp, parent in self._ancestors(source):
-            common = min(common, stamp or _FOREVER)
-            if parent is target:
+        frame, arrived = source, self._arrived
+        while (cache := frame.cache) is not None:
+            if frame.settled != arrived:
+                self._settle(frame)
+            latest = cache.latest()
+            if latest is None:
+                break
+            stamp, frame = latest
+            if 0 < stamp < common:
+                common = stamp
+            if frame is target:
                 return common % _FOREVER
-            above_source.append((stamp, parent))
+            above_source.append(latest)
+            if len(above_source) > _MOST_HOPS:
+                raise self._loop()
 
         known = {id(parent) for _, parent in above_source}
         common = _FOREVER
