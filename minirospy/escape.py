@@ -57,6 +57,10 @@ class SafeTerminal(io.TextIOWrapper):
             text = "".join([*parts, escaped(text[end:], "\n\t")])
         return super().write(text)
 
+    def write_own(self, text: str) -> int:
+        """Write a text of the command's own, whose control characters the terminal is to obey: a status line."""
+        return super().write(text)
+
     def close(self) -> None:
         """Write what waits; the terminal itself stays open for the interpreter's own stream."""
         # ValueError: it has been closed before.

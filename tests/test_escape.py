@@ -52,6 +52,11 @@ def written(write: Callable[[SafeTerminal], object]) -> str:
     return raw.getvalue().decode()
 
 
+def test_own_text_of_a_command_moves_the_cursor() -> None:
+    assert written(lambda terminal: terminal.write_own("\r [RUNNING]\r")) == "\r [RUNNING]\r"
+    assert written(lambda terminal: terminal.write("\r [RUNNING]\r")) == "\\r [RUNNING]\\r"
+
+
 @pytest.mark.parametrize(
     "text",
     [

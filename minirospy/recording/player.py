@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from minirospy import client
 from minirospy.bag.base import StoredMessage
 from minirospy.bag.records import Connection
+from minirospy.escape import SafeTerminal
 from minirospy.recording.frames import ReceivedFrame, frame_class
 from minirospy.recording.keys import read_keys
 from minirospy.recording.precise import PreciseWait
@@ -309,6 +310,10 @@ class Player:
 
     def _say(self, text: str, end: str = "\n") -> None:
         with contextlib.suppress(OSError, ValueError):
+            if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
+                # The status line, written again and again in its place.
+                sys.stdout.write_own(text)
+                text = ""
             print(text, end=end, flush=True)
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -270,3 +274,27 @@ def test_copies_are_equal(command: Command, bag: Path) -> None:
     shutil.copy(bag, "b.bag")
     assert command("rosbag", "reindex", "-q", "b.bag").status == 0
     assert Path("b.bag").read_bytes() == bag.read_bytes()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
+def test_terminal_shows_a_bar(bag: Path) -> None:
+    import pty
+
+    controller, terminal = pty.openpty()
+    command = Path(sys.executable).with_name("rosbag")
+    environment = {**os.environ, "TERM": "xterm"}
+    with subprocess.Popen(
+        [str(command), "compress", "a.bag"], stdout=terminal, stderr=terminal, env=environment
+    ) as process:
+        os.close(terminal)
+        shown = b""
+        with contextlib.suppress(OSError):  # Linux: EIO when the other end is closed
+            while data := os.read(controller, 4096):
+                shown += data
+    os.close(controller)
+
+    assert process.returncode == 0
+    assert b"a.bag" in shown
+    assert b"\x1b[" in shown
+    assert b"\\x1b" not in shown
+    assert compressions(bag) == {"bz2"}

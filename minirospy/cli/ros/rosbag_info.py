@@ -144,7 +144,8 @@ def _filter(words: list[str], print: str | None) -> int:
         return 0 if isinstance(error, BagEncryptedError) else 1
 
     try:
-        with showing_progress(target, total, quiet=False) as progress:
+        # A bar and lines would overwrite each other on a terminal.
+        with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:
         sys.stdout.write("\n")

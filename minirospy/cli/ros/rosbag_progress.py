@@ -8,6 +8,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
+from minirospy.escape import escaped
+
 __all__ = ["showing_progress"]
 
 _REFRESH = 1.0
@@ -31,6 +33,7 @@ def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable
 
 @contextlib.contextmanager
 def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
+    from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -39,8 +42,10 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    with Progress(*columns) as progress:
-        task = progress.add_task(path, total=max(total, 1))
+    # The bar moves the cursor, which the commands' own stream does not let pass; what is printed goes through that.
+    console = Console(file=sys.__stdout__)
+    with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
+        task = progress.add_task(escaped(path), total=max(total, 1))
         yield lambda done: progress.update(task, completed=done)
         progress.update(task, completed=max(total, 1))
 
