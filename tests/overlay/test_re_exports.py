@@ -19,6 +19,7 @@ SHARED = {
     "__init__.py",
     "rosbag/exceptions.py",
     "rosbag/internals.py",
+    "rosbag/opening.py",
     "rosbag/private.py",
     "rpi.py",
     "rospy/live.py",

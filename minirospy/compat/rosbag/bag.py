@@ -6,23 +6,19 @@ messages come in the order of time whatever the order in the file. Two types on 
 
 from __future__ import annotations
 
-import io
 import os
 import sys
 import time
 from collections import namedtuple
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from minirospy.bag import compression as compressions
 from minirospy.bag import info
-from minirospy.bag.base import BagReader
-from minirospy.bag.reader import ChunkedReader, open_bag
-from minirospy.bag.reader12 import Reader12, unindexed_bag12
-from minirospy.bag.records import read_version
+from minirospy.bag.reader import ChunkedReader
+from minirospy.bag.reader12 import Reader12
 from minirospy.bag.repair import Repair
-from minirospy.bag.writer import BagWriter, Continued
 from minirospy.compat.rosbag.exceptions import (
     ROSBagEncryptException,
     ROSBagEncryptNotSupportedException,
@@ -33,14 +29,14 @@ from minirospy.compat.rosbag.exceptions import (
     raise_as_ros,
 )
 from minirospy.compat.rosbag.internals import _ConnectionInfo, _get_message_type
+from minirospy.compat.rosbag.opening import CLOSED, OpenedBag
 from minirospy.compat.rosbag.private import (
     BagMessage,
     BagMessageWithConnectionHeader,
     ConnectionFilter,
-    PrivateBag,
     nanoseconds_of,
 )
-from minirospy.errors import BagCompressionError, BagError, BagUnindexedError
+from minirospy.errors import BagCompressionError, BagError
 
 if TYPE_CHECKING:
     from minirospy.idl.protocols import Message
@@ -61,8 +57,6 @@ __all__ = [
 
 found_lz4 = True
 """That LZ4 can be read and written, for programs that look."""
-
-_CLOSED = "I/O operation on closed bag"
 
 
 class Compression:
@@ -85,7 +79,7 @@ class _Pieces(list[Any]):
     write = list.append
 
 
-class Bag(PrivateBag):
+class Bag(OpenedBag):
     """A bag that is read, written or appended to.
 
     ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` in bytes.
@@ -108,19 +102,11 @@ class Bag(PrivateBag):
                 raise ValueError("options must be of type dict")
             compression = options.get("compression", compression)
             chunk_threshold = options.get("chunk_threshold", chunk_threshold)
-        self._compression = _checked_compression(compression)
-        self._chunk_threshold = _checked_threshold(chunk_threshold)
+        super().__init__(mode, _checked_compression(compression), _checked_threshold(chunk_threshold))
         self._skip_index = skip_index
-        self._file: BinaryIO | None = None
-        self._filename: str | os.PathLike[str] | None = None
-        self._version: int | None = None
-        self._mode = mode
-        self._reader: BagReader | None = None
-        self._writer: BagWriter | None = None
         self._written: dict[tuple[str, str], int] = {}
         """The connections of this program's messages, by topic and md5sum."""
         self._pieces = _Pieces()
-        self._is_read = False
 
         if not f:
             raise ValueError("filename (or stream) is invalid")
@@ -245,7 +231,7 @@ class Bag(PrivateBag):
         with the first message of a topic and type. Raise ValueError, ROSBagException, OSError.
         """
         if self._file is None:
-            raise ValueError(_CLOSED)
+            raise ValueError(CLOSED)
         if not topic:
             raise ValueError("topic is invalid")
         if not msg:
@@ -424,91 +410,6 @@ class Bag(PrivateBag):
         if summary.start is None or summary.end is None:
             raise ROSBagException("Bag contains no message")
         return summary.start, summary.end
-
-    def _current(self) -> BagReader:
-        """Return the reader, which also knows what has been written so far."""
-        stream = self._open_file()
-        reader = self._reader
-        if reader is None:
-            reader = self._reader = ChunkedReader(stream, {}, self._writer.chunks if self._writer else [])
-        if self._writer:
-            self._is_read = True
-            for connection in self._writer.connections:
-                reader.connections.setdefault(connection.id, connection)
-        return reader
-
-    def _open_read(self, f: Any, allow_unindexed: bool) -> None:
-        stream = self._file = self._take(f, "rb")
-        position = stream.tell()
-        self._version = read_version(stream)
-        stream.seek(position)
-        try:
-            self._reader = open_bag(stream)
-        except BagUnindexedError:
-            if not allow_unindexed:
-                raise
-            if self._version < 200:
-                stream.seek(position)
-                self._reader = unindexed_bag12(stream)
-
-    def _open_write(self, f: Any, allow_unindexed: bool) -> None:
-        self._file = self._take(f, "w+b")
-        self._version = 200
-        self._writer = BagWriter(
-            self._file, compression=self._compression, chunk_threshold=self._chunk_threshold
-        )
-
-    def _open_append(self, f: Any, allow_unindexed: bool) -> None:
-        if isinstance(f, (str, os.PathLike)) and not os.path.exists(f):
-            self._open_write(f, allow_unindexed)
-            return
-        stream = self._file = self._take(f, "r+b")
-        position = stream.tell()
-        self._version = read_version(stream)
-        if self._version != 200:
-            raise ROSBagException(f"bag version {self._version} is unsupported for appending")
-        stream.seek(position)
-        try:
-            reader = open_bag(stream)
-        except BagUnindexedError:
-            if not allow_unindexed:
-                raise
-            return
-        assert isinstance(reader, ChunkedReader)
-        self._start_appending(reader.connections, reader.chunks, reader.index_position)
-
-    def _start_appending(self, connections: Mapping[int, Any], chunks: Iterable[Any], position: int) -> None:
-        self._writer = BagWriter(
-            self._open_file(),
-            compression=self._compression,
-            chunk_threshold=self._chunk_threshold,
-            continued=Continued(connections.values(), chunks, position),
-        )
-        self._reader = None
-
-    def _take(self, f: Any, mode: str) -> BinaryIO:
-        """Return the open file, or open a path."""
-        if not isinstance(f, io.IOBase):
-            self._filename = f
-            return cast("BinaryIO", open(f, mode))
-        if isinstance(f, io.TextIOBase):
-            raise ROSBagException("In Python 3 the bag file must be opened in binary mode")
-        return cast("BinaryIO", f)
-
-    def _open_file(self) -> BinaryIO:
-        if self._file is None:
-            raise ValueError(_CLOSED)
-        return self._file
-
-    def _not_writable(self) -> Exception:
-        return io.UnsupportedOperation("write") if self._mode == "r" else ROSBagUnindexedException()
-
-    def _close_file(self) -> None:
-        if self._reader:
-            self._reader.close()
-        if self._file is not None:
-            self._file.close()
-            self._file = None
 
 
 def _checked_compression(compression: str) -> str:
