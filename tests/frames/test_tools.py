@@ -6,12 +6,13 @@ import math
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from minirospy.frames.tools import view
+from minirospy.frames.tools import echo, monitor, static_publisher, view
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.frames.tools.monitor import Delays
 from minirospy.urdf.poses import quaternion_from_rpy
@@ -53,39 +54,39 @@ def lines_until(process: subprocess.Popen[str], pattern: str) -> str:
 @pytest.mark.usefixtures("frames")
 class TestEcho:
     def test_transform_is_printed_as_by_ros(self, start: Start) -> None:
-        echo = start("tf", "tf_echo", "a", "/c", "20")
-        lines_until(echo, "At time")
-        read = lines_until(echo, ".*degree")
+        program = start("tf", "tf_echo", "a", "/c", "20")
+        lines_until(program, "At time")
+        read = lines_until(program, ".*degree")
         assert read == POSE
 
     def test_failure_names_the_frames(self, start: Start) -> None:
-        echo = start("tf", "tf_echo", "a", "nothing", "20")
-        lines_until(echo, r"Failure at \d+\.\d{9}\n")
-        read = lines_until(echo, "Frame b")
+        program = start("tf", "tf_echo", "a", "nothing", "20")
+        lines_until(program, r"Failure at \d+\.\d{9}\n")
+        read = lines_until(program, "Frame b")
         assert read.startswith(
             'Exception thrown:"nothing" passed to lookupTransform argument source_frame does not exist. \n'
             "The current list of frames is:\nFrame "
         )
 
     def test_precision_and_rate_are_parameters(self, start: Start) -> None:
-        echo = start("tf", "tf_echo", "b", "c", "_precision:=1", "_rate:=20.0")
-        read = lines_until(echo, ".*degree")
+        program = start("tf", "tf_echo", "b", "c", "_precision:=1", "_rate:=20.0")
+        read = lines_until(program, ".*degree")
         assert read.startswith("Precision default value was overriden, new value: 1\n")
-        read = lines_until(echo, ".*degree")
+        read = lines_until(program, ".*degree")
         assert "- Translation: [0.5, 0.0, 0.0]\n- Rotation: in Quaternion [0.0, 0.0, 0.0, 1.0]\n" in read
 
     def test_echo_of_tf2_tools_ends_after_its_limit(self, start: Start) -> None:
-        echo = start("tf2_tools", "echo.py", *words("a c -r 5 -l 3 -p 3"))
-        output, errors = echo.communicate(timeout=SECONDS)
-        assert echo.returncode == 0
+        program = start("tf2_tools", "echo.py", *words("a c -r 5 -l 3 -p 3"))
+        output, errors = program.communicate(timeout=SECONDS)
+        assert program.returncode == 0
         assert POSE in output
         assert "Traceback" not in errors
 
     def test_frames_without_a_connection_do_not_end_it(self, start: Start) -> None:
         start(*STATIC, *words("0 0 0 0 0 0 p q"), "__name:=other")
-        echo = start("tf2_tools", "echo.py", *words("a q -r 5 -l 5"))
-        _, errors = echo.communicate(timeout=SECONDS)
-        assert echo.returncode == 0
+        program = start("tf2_tools", "echo.py", *words("a q -r 5 -l 5"))
+        _, errors = program.communicate(timeout=SECONDS)
+        assert program.returncode == 0
         assert "not part of the same tree" in errors
         assert "Traceback" not in errors
 
@@ -93,17 +94,17 @@ class TestEcho:
 @pytest.mark.usefixtures("frames")
 class TestMonitor:
     def test_frames_and_nodes_are_listed(self, start: Start) -> None:
-        monitor = start("tf", "tf_monitor")
-        read = lines_until(monitor, r"Node: /moving [\d.]+ Hz")
+        program = start("tf", "tf_monitor")
+        read = lines_until(program, r"Node: /moving [\d.]+ Hz")
         assert "\n\n\nRESULTS: for all Frames\n\nFrames:\n" in read
         assert re.search(r"^Frame: b published by /moving Average Delay: -0.09\d+ Max Delay: 0$", read, re.M)
         assert "Frame: c published by /fixed(static) Average Delay: 0 Max Delay: 0" in lines_until(
-            monitor, "Frame: c"
+            program, "Frame: c"
         )
 
     def test_chain_between_two_frames_is_followed(self, start: Start) -> None:
-        monitor = start("tf", "tf_monitor", "/a", "c")
-        read = lines_until(monitor, r"Net delay     avg = \S+: max = \S+\n")
+        program = start("tf", "tf_monitor", "/a", "c")
+        read = lines_until(program, r"Net delay     avg = \S+: max = \S+\n")
         assert read.startswith("Waiting for transform chain to become available between a and c ")
         assert "\n\n\nRESULTS: for a to c\nChain is: a -> b -> c\n" in read
 
@@ -126,8 +127,10 @@ def test_delays_are_of_each_frame_and_node() -> None:
 
 
 @pytest.mark.usefixtures("frames")
-@pytest.mark.parametrize("has_dot", [True, False])
-@pytest.mark.parametrize("tool", [("tf", "view_frames"), ("tf2_tools", "view_frames.py")])
+@pytest.mark.parametrize(
+    ("tool", "has_dot"),
+    [(("tf", "view_frames"), True), (("tf", "view_frames"), False), (("tf2_tools", "view_frames.py"), False)],
+)
 def test_frames_are_drawn(
     tool: tuple[str, str], has_dot: bool, start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,36 +186,57 @@ def test_names_of_frames_stay_names() -> None:
     assert edge.label[:2] == ("Broadcaster: /n", "Average rate: 1.0")
 
 
+@pytest.mark.parametrize(
+    ("main", "typed", "status", "text"),
+    [
+        (static_publisher.main_tf, "", 255, "not having the right number of arguments"),
+        (static_publisher.main_tf, "1 2 3", 255, "not having the right number of arguments"),
+        (static_publisher.main_tf2, "1 2 3 0 0 0 1 a b 100", 255, "not having the right number of arguments"),
+        (static_publisher.main_tf, "1 2 x 0 0 0 a b 100", 255, "z is [x], which is not a number"),
+        (static_publisher.main_tf2, "1 2 3 0 0 nan a b", 255, "roll is [nan], which is not a number"),
+        (
+            static_publisher.main_tf,
+            "1 2 3 0 0 0 /a a 100",
+            1,
+            "source frame are the same (a, a) this cannot work",
+        ),
+        (
+            static_publisher.main_tf2,
+            "1 2 3 0 0 0 a a",
+            1,
+            "source frame are the same (a, a) this cannot work",
+        ),
+        (static_publisher.main_tf2, "1 2 3 0 0 0 2 a b", 1, "the quaternion (0 0 0 2) is not of length 1"),
+        (echo.main_tf, "a", 255, "Usage: tf_echo source_frame target_frame [echo_rate]"),
+        (echo.main_tf, "a b x", 255, "Echo rate must be > 0.0"),
+        (monitor.main, "a", 255, "TF_Monitor: usage: tf_monitor framea frameb"),
+    ],
+)
+def test_usage_errors_are_those_of_ros(
+    main: Callable[[list[str]], int],
+    typed: str,
+    status: int,
+    text: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(words(typed)) == status
+    output, errors = capsys.readouterr()
+    assert text in output + errors
+
+
 @pytest.mark.usefixtures("master")
 @pytest.mark.parametrize(
     ("tool", "typed", "status", "text"),
     [
-        (OLD_STATIC, "", 255, "not having the right number of arguments"),
-        (OLD_STATIC, "1 2 3", 255, "not having the right number of arguments"),
-        (STATIC, "1 2 3 0 0 0 1 a b 100", 255, "not having the right number of arguments"),
-        (OLD_STATIC, "1 2 x 0 0 0 a b 100", 255, "z is [x], which is not a number"),
-        (STATIC, "1 2 3 0 0 nan a b", 255, "roll is [nan], which is not a number"),
-        (
-            OLD_STATIC,
-            "1 2 3 0 0 0 /a a 100",
-            1,
-            "target_frame and source frame are the same (a, a) this cannot work",
-        ),
-        (STATIC, "1 2 3 0 0 0 a a", 1, "target_frame and source frame are the same (a, a) this cannot work"),
-        (STATIC, "1 2 3 0 0 0 2 a b", 1, "the quaternion (0 0 0 2) is not of length 1"),
         (STATIC, "nothing", 255, "Could not read TF from parameter server: nothing"),
-        (("tf", "tf_echo"), "a", 255, "Usage: tf_echo source_frame target_frame [echo_rate]"),
-        (("tf", "tf_echo"), "a b x", 255, "Echo rate must be > 0.0"),
         (("tf", "tf_echo"), "a b _precision:=0", 255, "Precision must be > 0"),
         (("tf", "tf_echo"), "a b _precision:=many", 255, "~precision is [many]"),
-        (("tf", "tf_monitor"), "a", 255, "TF_Monitor: usage: tf_monitor framea frameb"),
-        (("tf2_tools", "echo.py"), "", 2, "the following arguments are required: source_frame, target_frame"),
         (("tf2_tools", "echo.py"), "a b -r 0", 2, "argument -r/--rate: 0.0 must be > 0.0"),
         (("tf2_ros", "buffer_server"), "_buffer_size:=long", 1, "~buffer_size is [long]"),
         (("tf", "tf_remap"), "_mappings:=5", 1, "~mappings is [5]"),
     ],
 )
-def test_usage_errors_are_those_of_ros(
+def test_wrong_parameters_are_one_line(
     tool: tuple[str, str], typed: str, status: int, text: str, start: Start
 ) -> None:
     program = start(*tool, *typed.split())
@@ -228,8 +252,8 @@ def test_parameter_is_broadcast(start: Start) -> None:
     value = f"{{header: {{frame_id: p}}, child_frame_id: q, transform: {pose}}}"
     # Set by the program's own words: a private parameter, by its full name.
     start(*STATIC, "/fixed/here", f"_here:={value}", "__name:=fixed")
-    echo = start("tf", "tf_echo", "p", "q", "20")
-    read = lines_until(echo, "- Translation: ")
+    program = start("tf", "tf_echo", "p", "q", "20")
+    read = lines_until(program, "- Translation: ")
     assert read.endswith("- Translation: [1.000, 2.500, 0.000]\n")
 
 
@@ -237,8 +261,8 @@ def test_parameter_is_broadcast(start: Start) -> None:
 def test_frames_are_renamed(start: Start) -> None:
     start(*OLD_STATIC, *words("7 0 0 0 0 0 x y 50"), "/tf:=/tf_old")
     start("tf", "tf_remap", "_mappings:=[{old: y, new: new_y}]")
-    echo = start("tf", "tf_echo", "x", "new_y", "20")
-    assert "[7.000, 0.000, 0.000]" in lines_until(echo, "- Translation: ")
+    program = start("tf", "tf_echo", "x", "new_y", "20")
+    assert "[7.000, 0.000, 0.000]" in lines_until(program, "- Translation: ")
 
 
 @pytest.mark.parametrize("angles", [(0.1, 0.2, 0.3), (3, -1.5, -3), (0, 0, 0), (0, math.pi / 2, 0.5)])
