@@ -16,7 +16,7 @@ LAYERS = [
     {"testing"},
     {"launch"},
     {"frames"},
-    {"introspect", "actionlib", "robots", "recording"},
+    {"introspect", "actionlib", "robots", "recording", "topic_tools"},
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},

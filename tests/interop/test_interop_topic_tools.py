@@ -1,0 +1,27 @@
+"""topic_tools: what the real programs pass on is what ours pass on (tests/topic_tools/drive.txt)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+from tests.interop.conftest import REAL_PYTHON, environment
+
+DRIVE = Path(__file__).parents[1] / "topic_tools" / "drive.py"
+
+
+def test_real_programs_pass_on_what_is_recorded(real_master: str) -> None:
+    done = subprocess.run(
+        [REAL_PYTHON, str(DRIVE), "/usr/lib/topic_tools"],
+        env=environment(real_master, "rospy"),
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    recorded = DRIVE.with_suffix(".txt")
+    if os.environ.get("RECORD"):
+        recorded.write_text(done.stdout, encoding="utf-8")
+    assert done.stdout == recorded.read_text(encoding="utf-8")

@@ -1,0 +1,162 @@
+"""What a user sees of topic_tools' programs, ours or the real ones: ``sys.argv[1]`` is their folder, the rest starts one."""
+
+import queue
+import subprocess
+import sys
+import threading
+
+import rospy
+import rostopic
+from geometry_msgs.msg import PointStamped
+from std_msgs.msg import String
+from topic_tools.srv import MuxAdd, MuxDelete, MuxList, MuxSelect
+
+FOLDER, *STARTER = sys.argv[1:]
+rospy.init_node("drive", argv=[])
+
+
+def say(*words):
+    print(*words, flush=True)
+
+
+def wait_for(condition):
+    waiting = threading.Event()
+    for _ in range(1000):
+        if condition():
+            return True
+        waiting.wait(0.02)
+    say("waited too long")
+    return False
+
+
+class Program:
+    def __init__(self, name, *words):
+        command = [*STARTER, f"{FOLDER}/{name}", *words]
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL
+        )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.communicate()
+
+
+class Heard:
+    """The messages of a topic, in order, as (text, latched)."""
+
+    def __init__(self, topic):
+        self.messages = queue.Queue()
+        self.subscriber = rospy.Subscriber(topic, String, self.messages.put)
+        wait_for(self.subscriber.get_num_connections)
+
+    def next(self, after=""):
+        """Return the next message; roscpp may send a latched one twice to a subscriber that has just come."""
+        message = self.messages.get(timeout=20)
+        while message.data == after:
+            message = self.messages.get(timeout=20)
+        return (
+            message.data,
+            message._connection_header["type"],
+            message._connection_header.get("latching", "0"),
+        )
+
+    def texts(self, count):
+        return [self.messages.get(timeout=20).data for _ in range(count)]
+
+
+def text(number):
+    return f"{number} ".ljust(36, "x")
+
+
+def connected(topic, latch=True, cls=String):
+    """Return a publisher of a topic that one subscriber is connected to."""
+    publisher = rospy.Publisher(topic, cls, queue_size=50, latch=latch)
+    wait_for(publisher.get_num_connections)
+    return publisher
+
+
+for latch in (True, False):
+    with Program("relay", f"/in_{latch}"):
+        publisher = connected(f"/in_{latch}", latch)
+        publisher.publish("first")
+        heard = Heard(f"/in_{latch}_relay")
+        if latch:
+            say("relay", heard.next())
+        publisher.publish("second")
+        say("relay", heard.next("first"), rostopic.get_topic_type(f"/in_{latch}_relay")[0])
+
+with Program("relay", "points", "/points_out"):
+    publisher = connected("points", True, PointStamped)
+    message = PointStamped()
+    message.header.stamp, message.header.frame_id, message.point.z = rospy.Time(5, 6), "a", 7.5
+    publisher.publish(message)
+    found = rospy.wait_for_message("/points_out", PointStamped, 20)
+    say("relay", found.header.stamp.to_nsec(), found.header.frame_id, found.point.z)
+
+with Program("drop", "/d", "1", "3"):
+    publisher = connected("/d", latch=False)
+    publisher.publish("0")
+    heard = Heard("/d_drop")
+    for number in range(1, 9):
+        publisher.publish(str(number))
+    say("drop", heard.texts(6))
+
+with Program("throttle", "messages", "/t", "0.001", "/slow"):
+    publisher = connected("/t")
+    for number in range(5):
+        publisher.publish(text(number))
+    heard = Heard("/slow")
+    say("throttle", heard.texts(1))
+
+with Program("throttle", "bytes", "/b", "100", "1000"):
+    publisher = connected("/b")
+    publisher.publish(text(1))
+    heard = Heard("/b_throttle")
+    found = heard.texts(1)
+    for number in range(2, 9):
+        publisher.publish(text(number))
+    while found[-1] != text(3):
+        found += heard.texts(1)
+    say("throttle", [each.split()[0] for each in dict.fromkeys(found)], heard.messages.qsize())
+
+with Program("mux", "/chosen", "/left", "/right"):
+    select, add, delete, names = (
+        rospy.ServiceProxy(f"/mux/{name}", cls)
+        for name, cls in (("select", MuxSelect), ("add", MuxAdd), ("delete", MuxDelete), ("list", MuxList))
+    )
+    names.wait_for_service(20)
+
+    def attempt(call, *arguments):
+        try:
+            return str(call(*arguments)).strip() or "done"
+        except rospy.ServiceException:
+            return "refused"
+
+    selected = Heard("/mux/selected")
+    say("mux", selected.texts(1), names().topics)
+    left, right = connected("/left", False), connected("/right", False)
+    right.publish("advertise")
+    heard = Heard("/chosen")
+    for choice in ("/right", "right", "__none", "/left", "/nothing"):
+        say("mux select", choice, attempt(select, choice))
+    say("mux", selected.texts(4))
+    right.publish("not this")
+    left.publish("from the left")
+    say("mux", heard.texts(1))
+    for call in (
+        (add, "third"),
+        (add, "/third"),
+        (add, "__none"),
+        (delete, "/left"),
+        (delete, "/right"),
+        (delete, "/right"),
+    ):
+        say("mux", call[0].resolved_name, call[1], attempt(*call))
+    say("mux", names().topics)
+    say("mux", attempt(rospy.ServiceProxy("/chosen_select", MuxSelect), "/third"))
+    third = connected("/third", False)
+    third.publish("from the third")
+    say("mux", heard.texts(1))

@@ -1,0 +1,89 @@
+"""The programs of topic_tools: what they pass on, and what they refuse. drive.py runs under real ROS, too (tests/interop)."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from minirospy.topic_tools.passing import base_name
+from minirospy.topic_tools.throttle import ByteLimit, MessageLimit, every
+
+HERE = Path(__file__).parent
+PROGRAMS = HERE.parents[1] / "msgs" / "topic_tools" / "scripts"
+
+
+def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "drive.py"), str(PROGRAMS), sys.executable],
+        capture_output=True,
+        text=True,
+        timeout=110,
+        check=False,
+    )
+    assert done.stdout == (HERE / "drive.txt").read_text(encoding="utf-8"), done.stderr
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["relay"], "usage: relay IN_TOPIC [OUT_TOPIC]"),
+        (["relay", "a", "b", "c"], "usage: relay IN_TOPIC [OUT_TOPIC]"),
+        (["relay", "/"], "[/] is not the name of a topic"),
+        (["throttle", "messages"], "throttle messages IN_TOPIC MSGS_PER_SEC"),
+        (["drop", "a", "1"], "usage: drop IN_TOPIC X Y [OUT_TOPIC]"),
+        (["mux", "a"], "usage: mux OUT_TOPIC IN_TOPIC1"),
+    ],
+)
+def test_wrong_words_are_refused_with_the_usage(words: list[str], text: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(PROGRAMS / words[0]), *words[1:]],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert text in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["throttle", "messages", "a", "often"], "[often] is not a number above 0"),
+        (["throttle", "messages", "a", "0"], "[0] is not a number above 0"),
+        (["throttle", "bytes", "a", "5"], "throttle bytes takes 3 words"),
+        (["throttle", "letters", "a", "5"], "usage:"),
+        (["drop", "a", "-1", "3"], "[-1] is not a number of messages"),
+    ],
+)
+def test_wrong_numbers_are_refused_in_one_line(words: list[str], text: str, master: str) -> None:
+    test_wrong_words_are_refused_with_the_usage(words, text)
+
+
+def test_limit_of_messages() -> None:
+    limit = MessageLimit(1.0)
+    assert [limit(now, 0) for now in (10.0, 10.5, 11.0, 11.1, 12.2)] == [True, False, False, True, True]
+
+
+def test_limit_of_bytes() -> None:
+    limit = ByteLimit(100, 1.0)
+    assert [limit(now, 60) for now in (0.0, 0.1, 0.2, 1.05, 1.2)] == [True, True, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("dropped", "of", "passed"), [(1, 3, "-12-45-"), (0, 1, "0123456"), (2, 2, "-------"), (1, 2, "-1-3-5-")]
+)
+def test_drop_leaves_out_the_first_of_each(dropped: int, of: int, passed: str) -> None:
+    passes = every(dropped, of)
+    assert "".join(str(number) if passes(0.0, 0) else "-" for number in range(7)) == passed
+
+
+def test_base_names() -> None:
+    assert [base_name(topic) for topic in ("a", "/a/b", "/a/b/", "~c")] == ["a", "b", "b", "c"]
+    with pytest.raises(ValueError, match="not the name of a topic"):
+        base_name("/")
