@@ -74,6 +74,11 @@ def test_trees_that_are_not_connected_are_named_with_similar_names() -> None:
     )
 
 
+def test_two_roots_that_are_alike_are_one_hint() -> None:
+    ((_, text),) = said(frame("arm", "base_link"), frame("laser", "base-link"))
+    assert text.endswith("([base-link] is nearly [base_link]: was one of them meant?)")
+
+
 @pytest.mark.parametrize(("one", "two"), [("robot1/odom", "robot2/odom"), ("map", "world"), ("arm1", "arm2")])
 def test_names_that_are_alike_on_purpose_are_no_hint(one: str, two: str) -> None:
     ((_, text),) = said(frame("x", one), frame("y", two))

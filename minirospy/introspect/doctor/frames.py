@@ -161,11 +161,13 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
         # Of a loop any of its frames.
         tree.update(dict.fromkeys(way, tree.get(at, at)))
 
-    hints = []
+    hints: list[str] = []
+    hinted: set[str] = set()
     for root in roots:
         others = [name for name in tree if tree[name] != root]
         near = _similar(root, others)
-        if near:
+        if near and root not in hinted:
+            hinted.add(near)
             hints.append(f"[{root}] is nearly [{near}]")
     shown = _listed(f"[{root}]" for root in roots)
     meant = f" ({'; '.join(hints)}: was one of them meant?)" if hints else ""
