@@ -12,7 +12,7 @@ from collections import OrderedDict
 from collections.abc import Container, Iterable
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple, Protocol
 
-from minirospy.bag import compression, records
+from minirospy.bag import compression, encoding, records
 from minirospy.bag.index import read_entries
 from minirospy.bag.records import Chunk, ChunkInfo, Connection
 from minirospy.errors import BagFormatError
@@ -152,7 +152,7 @@ class ChunkStream:
         self, start: int, size: int, entries: list[tuple[int, int, int, int]]
     ) -> tuple[bytes, list[Found]]:
         """Return the bodies of messages one behind the other. Raise BagFormatError where the index is wrong."""
-        prefixes = {number: records.message_prefixes(number) for *_, number in entries}
+        prefixes = {number: encoding.message_prefixes(number) for *_, number in entries}
         bodies: list[bytes] = []
         found: list[Found] = []
         end = 0

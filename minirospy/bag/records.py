@@ -1,17 +1,16 @@
-"""The records of bags: bytes <-> named tuples.
+"""The records of bags: bytes in, named tuples out.
 
 A record is a header (its length, then fields ``name=value``, each with its length in front) and data (its length, then
 bytes). Which record it is, the field ``op`` says. All numbers are little-endian; times are nanoseconds since 1970 here,
 and seconds and nanoseconds of 32 bits each in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
 
-The fields of records are written in the order of rosbag's Python writer. Any order is read, and unknown fields and
-records are passed over.
+Any order of fields is read, and unknown fields and records are passed over. The way back: `minirospy.bag.encoding`.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
 from minirospy.errors import BagEncryptedError, BagFormatError
@@ -37,15 +36,6 @@ __all__ = [
     "IndexEntry",
     "MessageData",
     "Record",
-    "encode_bag_header",
-    "encode_chunk_header",
-    "encode_chunk_info",
-    "encode_connection",
-    "encode_fields",
-    "encode_index_data",
-    "encode_message_header",
-    "message_prefix",
-    "message_prefixes",
     "parse_bag_header",
     "parse_chunk_header",
     "parse_chunk_info",
@@ -81,8 +71,6 @@ MAX_HEADER = 16 * 1024 * 1024
 MAX_UINT32 = 0xFFFFFFFF
 """Sizes and times of 32 bits end here: a record's data, a chunk's content."""
 
-MAX_TIME = MAX_UINT32 * 10**9 + 999_999_999
-
 _BILLION = 10**9
 _OPS = {
     OP_MESSAGE_DEFINITION: "MSG_DEF",
@@ -99,7 +87,6 @@ _UINT64 = struct.Struct("<Q")
 _TIME = struct.Struct("<II")
 _PAIR = struct.Struct("<II")
 _ENTRY = struct.Struct("<III")
-_MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
 
 Fields = dict[str, bytes]
 """The fields of a header; values stay bytes, since definitions are not always UTF-8."""
@@ -247,9 +234,6 @@ def to_nanoseconds(seconds: int, nanoseconds: int) -> int:
     return seconds * _BILLION + nanoseconds
 
 
-# -- bytes in ----------------------------------------------------------------------------------------------------
-
-
 def read_version(stream: BinaryIO) -> int:
     """Read a bag's first line; return its version, 200 for 2.0. Raise BagFormatError."""
     line = stream.readline(100)
@@ -395,120 +379,6 @@ def parse_chunk_info(record: Record, data: bytes) -> ChunkInfo:
 
     counts = dict(_PAIR.iter_unpack(data[: count * _PAIR.size]))
     return ChunkInfo(record.uint64("chunk_pos"), record.time("start_time"), record.time("end_time"), counts)
-
-
-def message_prefix(connection: int) -> bytes:
-    """Return the 34 bytes in front of a message's time, which are the same for each message of a connection.
-
-    After the prefix come seconds, nanoseconds and the size of the body, 32 bits each, then the body.
-    """
-    return b"\x26\0\0\0\x04\0\0\0op=\x02\x09\0\0\0conn=" + _UINT32.pack(connection) + b"\x0d\0\0\0time="
-
-
-def message_prefixes(connection: int) -> tuple[bytes, bytes]:
-    """Return :func:`message_prefix` as Python's rosbag writes it, and as C++'s does, which sorts the fields.
-
-    So a reader recognises nearly every message by one comparison; the others are left to :func:`parse_record`.
-    """
-    number = _UINT32.pack(connection)
-    return (
-        message_prefix(connection),
-        b"\x26\0\0\0\x09\0\0\0conn=" + number + b"\x04\0\0\0op=\x02\x0d\0\0\0time=",
-    )
-
-
-# -- bytes out ---------------------------------------------------------------------------------------------------
-
-
-def encode_fields(fields: Mapping[str, bytes]) -> bytes:
-    """Return a header with its length in front, its fields in the order of the mapping."""
-    parts = [b""]
-    for name, value in fields.items():
-        field = name.encode() + b"=" + value
-        parts += (_UINT32.pack(len(field)), field)
-    parts[0] = _UINT32.pack(sum(map(len, parts)))
-    return b"".join(parts)
-
-
-def encode_bag_header(header: BagHeader) -> bytes:
-    """Return the first record, padded to its constant size."""
-    fields = encode_fields(
-        {
-            "op": bytes((OP_BAG_HEADER,)),
-            "index_pos": _UINT64.pack(header.index_pos),
-            "conn_count": _UINT32.pack(header.connection_count),
-            "chunk_count": _UINT32.pack(header.chunk_count),
-        }
-    )
-    padding = BAG_HEADER_SIZE - (len(fields) - 4)
-    return fields + _UINT32.pack(padding) + b" " * padding
-
-
-def encode_chunk_header(chunk: Chunk) -> bytes:
-    """Return the header of a chunk and the length of its data, which comes next. Raise BagFormatError above 4 GiB."""
-    if max(chunk.size, chunk.compressed_size) > MAX_UINT32:
-        raise BagFormatError(f"a chunk of {chunk.size} bytes is larger than the format allows, 4 GiB")
-    fields = {
-        "op": bytes((OP_CHUNK,)),
-        "compression": chunk.compression.encode(),
-        "size": _UINT32.pack(chunk.size),
-    }
-    return encode_fields(fields) + _UINT32.pack(chunk.compressed_size)
-
-
-def encode_connection(connection: Connection) -> bytes:
-    """Return the record of a connection."""
-    fields = {
-        "op": bytes((OP_CONNECTION,)),
-        "topic": connection.topic.encode(),
-        "conn": _UINT32.pack(connection.id),
-    }
-    return encode_fields(fields) + encode_fields(connection.header)
-
-
-def encode_message_header(connection: int, time: int, size: int) -> bytes:
-    """Return a message's header and the length of its body, which comes next. Raise BagFormatError above the limits."""
-    if size > MAX_UINT32:
-        raise BagFormatError(f"a message of {size} bytes is larger than the format allows, 4 GiB")
-    if not 0 <= time <= MAX_TIME:
-        raise BagFormatError(f"the time {time} ns does not fit into a bag: it must be from 0 to 2106")
-    seconds, nanoseconds = divmod(time, _BILLION)
-    return _MESSAGE_HEADER.pack(
-        38, 4, b"op=", OP_MESSAGE_DATA, 9, b"conn=", connection, 13, b"time=", seconds, nanoseconds, size
-    )
-
-
-def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> bytes:
-    """Return the index of one connection in the chunk before: pairs of time and offset, in the order of time."""
-    fields = {
-        "op": bytes((OP_INDEX_DATA,)),
-        "conn": _UINT32.pack(connection),
-        "ver": _UINT32.pack(1),
-        "count": _UINT32.pack(len(entries)),
-    }
-    data = b"".join(_ENTRY.pack(*divmod(time, _BILLION), offset) for time, offset in entries)
-    return _encode_record(fields, data)
-
-
-def encode_chunk_info(info: ChunkInfo) -> bytes:
-    """Return the summary of a chunk."""
-    fields = {
-        "op": bytes((OP_CHUNK_INFO,)),
-        "ver": _UINT32.pack(1),
-        "chunk_pos": _UINT64.pack(info.position),
-        "start_time": _TIME.pack(*divmod(info.start_time, _BILLION)),
-        "end_time": _TIME.pack(*divmod(info.end_time, _BILLION)),
-        "count": _UINT32.pack(len(info.counts)),
-    }
-    return _encode_record(fields, _encode_pairs(info.counts.items()))
-
-
-def _encode_pairs(pairs: Iterable[tuple[int, int]]) -> bytes:
-    return b"".join(_PAIR.pack(*pair) for pair in pairs)
-
-
-def _encode_record(fields: Mapping[str, bytes], data: bytes) -> bytes:
-    return encode_fields(fields) + _UINT32.pack(len(data)) + data
 
 
 def _read_length(stream: BinaryIO, position: int) -> int:

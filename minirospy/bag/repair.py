@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
-from minirospy.bag import compression, records
+from minirospy.bag import compression, encoding, records
 from minirospy.bag.chunks import Found, StoredChunk, scan_into, size_of
 from minirospy.bag.index import read_entries
 from minirospy.bag.records import BagHeader, Chunk, ChunkInfo, Connection, Record
@@ -36,7 +36,7 @@ class _Content(NamedTuple):
         entries: dict[int, list[tuple[int, int]]] = {}
         for time, number, at, _, _ in self.messages:
             entries.setdefault(number, []).append((time, at))
-        return b"".join(records.encode_index_data(number, sorted(each)) for number, each in entries.items())
+        return b"".join(encoding.encode_index_data(number, sorted(each)) for number, each in entries.items())
 
 
 class Repair:
@@ -94,7 +94,7 @@ class Repair:
             record, content = self._tail
             position, (chunk, data_position) = self.tail
             stream.seek(position)
-            stream.write(records.encode_fields(record.fields | {"size": chunk.size.to_bytes(4, "little")}))
+            stream.write(encoding.encode_fields(record.fields | {"size": chunk.size.to_bytes(4, "little")}))
             stream.write(chunk.compressed_size.to_bytes(4, "little"))
             stream.seek(data_position + chunk.compressed_size)
             stream.truncate()
@@ -113,7 +113,7 @@ class Repair:
             records.parse_bag_header(header)
         except BagFormatError as error:
             self.problems.append(f"bag header: {error}")
-            return start + len(records.encode_bag_header(BagHeader(0, 0, 0)))
+            return start + len(encoding.encode_bag_header(BagHeader(0, 0, 0)))
         return header.end
 
     def _read(self, position: int, limit: int) -> int:

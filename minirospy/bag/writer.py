@@ -15,6 +15,14 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.bag.compression import NONE, check_compression, compress
+from minirospy.bag.encoding import (
+    encode_bag_header,
+    encode_chunk_header,
+    encode_chunk_info,
+    encode_connection,
+    encode_fields,
+    message_prefixes,
+)
 from minirospy.bag.records import (
     MAGIC,
     MAX_UINT32,
@@ -23,12 +31,6 @@ from minirospy.bag.records import (
     Chunk,
     ChunkInfo,
     Connection,
-    encode_bag_header,
-    encode_chunk_header,
-    encode_chunk_info,
-    encode_connection,
-    encode_fields,
-    message_prefixes,
     to_nanoseconds,
 )
 from minirospy.errors import BagFormatError

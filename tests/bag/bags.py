@@ -6,12 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from minirospy.bag.compression import compress
-from minirospy.bag.records import (
-    MAGIC,
-    BagHeader,
-    Chunk,
-    ChunkInfo,
-    Connection,
+from minirospy.bag.encoding import (
     encode_bag_header,
     encode_chunk_header,
     encode_chunk_info,
@@ -19,6 +14,13 @@ from minirospy.bag.records import (
     encode_index_data,
     encode_message_header,
     message_prefixes,
+)
+from minirospy.bag.records import (
+    MAGIC,
+    BagHeader,
+    Chunk,
+    ChunkInfo,
+    Connection,
 )
 
 STRING = "string data\n"

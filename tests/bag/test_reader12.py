@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import pytest
 
+from minirospy.bag.encoding import encode_fields
 from minirospy.bag.reader import open_bag
 from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.bag.records import encode_fields
 from minirospy.errors import BagFormatError, BagUnindexedError
 from tests.bag.bags import STRING, STRING_MD5
 

@@ -8,6 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from minirospy.bag.encoding import (
+    encode_bag_header,
+    encode_chunk_header,
+    encode_chunk_info,
+    encode_connection,
+    encode_fields,
+    encode_index_data,
+    encode_message_header,
+    message_prefixes,
+)
 from minirospy.bag.records import (
     MAGIC,
     MAX_UINT32,
@@ -17,14 +27,6 @@ from minirospy.bag.records import (
     Connection,
     Fields,
     IndexEntry,
-    encode_bag_header,
-    encode_chunk_header,
-    encode_chunk_info,
-    encode_connection,
-    encode_fields,
-    encode_index_data,
-    encode_message_header,
-    message_prefixes,
     parse_bag_header,
     parse_chunk_header,
     parse_chunk_info,
