@@ -128,7 +128,7 @@ class Player:
         gc.freeze()
         try:
             # Before the keys are read: the first ones count.
-            self._schedule = Schedule(options, first[1].time, last, time.monotonic_ns())
+            self._schedule = Schedule(options, first[1].time, last, time.perf_counter_ns())
             with read_keys(self._on_key):
                 self._play_all(selection, first[1].time, last)
         finally:
@@ -174,7 +174,7 @@ class Player:
         def pause(request: SetBoolRequest) -> SetBoolResponse:
             with self._lock:
                 changed = bool(
-                    self._schedule and self._schedule.set_paused(request.data, time.monotonic_ns())
+                    self._schedule and self._schedule.set_paused(request.data, time.perf_counter_ns())
                 )
             self._wait.wake()
             if changed:
@@ -215,13 +215,13 @@ class Player:
                 self._say("\nDone.")
                 return
             with self._lock:
-                self._schedule = Schedule(self._options, first, last, time.monotonic_ns())
+                self._schedule = Schedule(self._options, first, last, time.perf_counter_ns())
 
     def _play(self, message: StoredMessage) -> bool:
         """Wait until a message is due; return False at a shutdown."""
         schedule = self._schedule
         assert schedule
-        now = time.monotonic_ns()
+        now = time.perf_counter_ns()
         with self._lock:
             schedule.offer(message.time, message.connection.topic, now)
         while not self._ended:
@@ -239,7 +239,7 @@ class Player:
         schedule = self._schedule
         assert schedule
         while not self._ended:
-            now = time.monotonic_ns()
+            now = time.perf_counter_ns()
             with self._lock:
                 wait = schedule.run_on(now)
             self._tick(schedule, now)
@@ -273,7 +273,7 @@ class Player:
     # --- what comes from outside
 
     def _on_key(self, key: str) -> None:
-        now = time.monotonic_ns()
+        now = time.perf_counter_ns()
         with self._lock:
             if not (schedule := self._schedule):
                 return
@@ -304,8 +304,8 @@ class Player:
         self._wait.wake()
 
     def _sleep(self, nanoseconds: int) -> None:
-        end = time.monotonic_ns() + nanoseconds
-        while not self._ended and (now := time.monotonic_ns()) < end:
+        end = time.perf_counter_ns() + nanoseconds
+        while not self._ended and (now := time.perf_counter_ns()) < end:
             self._wait.until(min(end, now + _TICK))
 
     def _say(self, text: str, end: str = "\n") -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import threading
 import time
+
+from minirospy.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
@@ -17,10 +18,14 @@ _TIMER_SLACK = 29
 
 
 class PreciseWait:
-    """Waits on ``time.monotonic_ns()``. For one thread, which makes it; ``wake`` may be called by any other."""
+    """Waits on ``time.perf_counter_ns()``, which is precise on every OS.
+
+    For one thread, which makes it; any other, and a signal's handler, may call ``wake``.
+    """
 
     def __init__(self) -> None:
-        self._event = threading.Event()
+        # A signal's handler wakes the thread that it interrupts.
+        self._event = SignalSafeEvent()
         self._spin_ns = 150_000
         if sys.platform.startswith("linux"):
             with contextlib.suppress(OSError, AttributeError, ImportError):
@@ -36,14 +41,14 @@ class PreciseWait:
     def until(self, wall: int) -> int:
         """Wait until ``wall``, or until :meth:`wake` is called; return the time."""
         while True:
-            now = time.monotonic_ns()
+            now = time.perf_counter_ns()
             rest = wall - now
             if rest <= 0:
                 return now
             if rest > _EVENT_NS:
                 if self._event.wait((rest - _EVENT_NS) / 1e9):
                     self._event.clear()
-                    return time.monotonic_ns()
+                    return time.perf_counter_ns()
             elif rest > self._spin_ns:
                 time.sleep((rest - self._spin_ns) / 1e9)
             else:
