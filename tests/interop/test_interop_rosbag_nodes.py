@@ -176,7 +176,7 @@ def test_split_files_are_played_by_ros(talkers: tuple[Talker, Talker], run: Run,
     assert again.stdout
     while "Subscribing" not in again.stdout.readline():
         pass
-    player = run("cpp", "play", *parts, "-d", "1", "/chatter:=/again")
+    player = run("cpp", "play", *parts, "--wait-for-subscribers", "/chatter:=/again")
     player.communicate(timeout=60)
     again.communicate(timeout=60)
     assert [one.body for one in stored(tmp_path / "again.bag")] == [
@@ -240,10 +240,8 @@ def make_bag(path: Path) -> None:
 def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_path: Path) -> None:
     make_bag(tmp_path / "in.bag")
     recording = run(recorder, "record", "--chunksize", "0", "-O", "out", "/chatter", "/map")
-    assert recording.stdout
-    while "Recording to" not in recording.stdout.readline():
-        pass
-    output, errors = run(player, "play", "in.bag", "-d", "2").communicate(timeout=60)
+    playing = run(player, "play", "in.bag", "-d", "1", "--wait-for-subscribers")
+    output, errors = playing.communicate(timeout=60)
     assert not errors
     assert output.replace("\r", "\n").splitlines()[-1] == "Done."
     holds(tmp_path / "out.bag", b"59x")
