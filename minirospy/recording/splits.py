@@ -40,7 +40,7 @@ class Splits:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
             if now - self._start > _MOST_EMPTY * options.max_duration:
-                # The clock has jumped: a simulator's, or that of a machine without one of its own.
+                # The clock has jumped: a simulator's, or a machine's that was set.
                 self._start = now - options.max_duration
             self._start += options.max_duration
             return self._full()

@@ -12,7 +12,7 @@ python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure
 python3-tf2-ros python3-tf python3-tf2-geometry-msgs python3-tf2-sensor-msgs python3-tf2-kdl python3-tf-conversions python3-pykdl
 tf2-tools tf-tools libtf2-dev libtf2-ros-dev
 catkin cmake ros-message-generation
-python3-rosbag python3-roslz4 rosbag
+python3-rosbag python3-roslz4
 g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev iproute2
 ros-robot-state-publisher joint-state-publisher liburdfdom-tools tf-tools tf2-tools python3-tf2-ros graphviz"
 missing=""

@@ -308,7 +308,7 @@ def test_keys_of_a_terminal(ear: Ear, start: Start, tmp_path: Path) -> None:
     ear.listen("/a")
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
-    # With a session of its own, whose terminal this is.
+    # In a new session, whose terminal this is.
     take = "import os, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)"
     process = start("play", name, "--pause", "--wait-for-subscribers", stdin=theirs, prelude=take)
     read_until(process, "Finished waiting")

@@ -181,7 +181,7 @@ def test_the_clock_follows_the_rate() -> None:
     assert wall.ticks == [(0, 0), (1, 3), (2, 6)]
 
 
-def test_the_clock_stands_still_in_a_pause_and_goes_on() -> None:
+def test_the_clock_stops_in_a_pause_and_goes_on() -> None:
     wall = Wall(PlayOptions(clock=True, clock_hz=1.0))
     wall.events = [(1.5, "space"), (3.5, "space")]
     wall.play(0, 3)
