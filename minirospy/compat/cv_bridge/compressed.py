@@ -6,7 +6,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from minirospy.compat.cv_bridge.encodings import Pixels
 
 __all__ = ["decode", "encode", "opencv"]
 
@@ -32,13 +32,13 @@ def opencv() -> Any:
     return cv2
 
 
-def decode(data: bytes) -> NDArray[Any]:
+def decode(data: bytes) -> Pixels:
     """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA. Raises ValueError."""
     import numpy as np
 
     cv2 = opencv()
     if cv2:
-        image: NDArray[Any] | None = (
+        image: Pixels | None = (
             cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
         )
         if image is None:
@@ -59,7 +59,7 @@ def decode(data: bytes) -> NDArray[Any]:
         raise ValueError(f"{len(data)} bytes are not an image that Pillow can read: {error}") from error
 
 
-def encode(image: NDArray[Any], format: str) -> bytes:
+def encode(image: Pixels, format: str) -> bytes:
     """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raises ValueError."""
     import numpy as np
 
@@ -90,7 +90,7 @@ def encode(image: NDArray[Any], format: str) -> bytes:
     return buffer.getvalue()
 
 
-def _swapped(image: NDArray[Any]) -> NDArray[Any]:
+def _swapped(image: Pixels) -> Pixels:
     """Return an image with red and blue exchanged: BGR is OpenCV's order, RGB that of Pillow."""
     import numpy as np
 

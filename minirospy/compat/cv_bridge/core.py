@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
@@ -13,7 +13,8 @@ from minirospy.compat.cv_bridge.encodings import DEPTHS, converted, is_converted
 
 if TYPE_CHECKING:
     import numpy
-    from numpy.typing import NDArray
+
+    from minirospy.compat.cv_bridge.encodings import Pixels
 
 __all__ = ["CvBridge", "CvBridgeError"]
 
@@ -37,7 +38,7 @@ class CvBridge:
             **DEPTHS,
         }
 
-    def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[Any], n_channels: int) -> str:
+    def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[numpy.generic], n_channels: int) -> str:
         """Return the name of an array's type, such as 8UC3. Raises CvBridgeError where OpenCV has none."""
         if dtype.name not in self.numpy_type_to_cvtype:
             raise CvBridgeError(
@@ -60,7 +61,7 @@ class CvBridge:
         """Return numpy's type and the number of channels of an encoding. Raises CvBridgeError."""
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
-    def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> NDArray[Any]:
+    def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> Pixels:
         """Return the image of a message.
 
         It is a read-only view of the message's data, without a copy, unless the encoding or the order of bytes has to
@@ -89,7 +90,7 @@ class CvBridge:
             (step, channels * dtype.itemsize, dtype.itemsize),
         )
         dimensions = 2 if channels == 1 else 3
-        image: NDArray[Any] = np.ndarray(
+        image: Pixels = np.ndarray(
             shape[:dimensions], dtype, data if needed else bytes(1), 0, strides[:dimensions]
         )
         if dtype.itemsize > 1 and bool(img_msg.is_bigendian) == (sys.byteorder == "little"):
@@ -99,7 +100,7 @@ class CvBridge:
         return _converted(image, img_msg.encoding, desired_encoding)
 
     def cv2_to_imgmsg(
-        self, cvim: NDArray[Any], encoding: str = "passthrough", header: Header | None = None
+        self, cvim: Pixels, encoding: str = "passthrough", header: Header | None = None
     ) -> Image:
         """Return the message of an image.
 
@@ -122,7 +123,7 @@ class CvBridge:
 
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
-    ) -> NDArray[Any]:
+    ) -> Pixels:
         """Return the image of a compressed message. Raises CvBridgeError where it is not one, or there is no such conversion."""
         try:
             image = decode(bytes(cmprs_img_msg.data))
@@ -134,7 +135,7 @@ class CvBridge:
         kind = {1: "mono", 3: "bgr", 4: "bgra"}[channels]
         return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
 
-    def cv2_to_compressed_imgmsg(self, cvim: NDArray[Any], dst_format: str = "jpg") -> CompressedImage:
+    def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
         """Return the compressed message of an image: jpg, png, bmp, tiff, webp, ...
 
         Raises CvBridgeError where the format cannot hold it, TypeError where it is not an array.
@@ -155,7 +156,7 @@ def _check_array(image: object) -> None:
         raise CvBridgeError(f"an image has two or three dimensions, not {image.ndim}")
 
 
-def _converted(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
+def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image in another encoding. Raises CvBridgeError."""
     try:
         if is_converted_by_opencv(source, wanted):
@@ -165,7 +166,7 @@ def _converted(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
         raise CvBridgeError(error) from error
 
 
-def _by_opencv(image: NDArray[Any], source: str, wanted: str) -> tuple[NDArray[Any], str]:
+def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
     """Return an image of a Bayer pattern or YUV in colors of the same depth, and its encoding then. Raises ValueError."""
     cv2 = opencv()
     if cv2 is None:

@@ -7,10 +7,13 @@ OpenCV gives, bit by bit. Source: sensor_msgs/image_encodings.h, https://docs.op
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    Pixels: TypeAlias = NDArray[Any]
+    """An image of any depth: (height, width) or (height, width, channels)."""
 
 __all__ = ["DEPTHS", "converted", "is_converted_by_opencv", "type_of_encoding"]
 
@@ -58,7 +61,7 @@ def is_converted_by_opencv(source: str, wanted: str) -> bool:
     )
 
 
-def converted(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
+def converted(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image in another encoding; the same array where nothing changes.
 
     Raises ValueError where there is no such conversion, in the words of ROS.
@@ -100,7 +103,7 @@ def _kind(encoding: str) -> str:
     return "color" if match[1] in _CHANNELS else "bayer"
 
 
-def _recolored(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
+def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image with the channels of another encoding, and its own depth."""
     import numpy as np
 
@@ -127,7 +130,7 @@ def _recolored(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
     return result
 
 
-def _of_depth(image: NDArray[Any], source: str, wanted: str) -> NDArray[Any]:
+def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image with another depth: 8 and 16 bits are scaled, all else is rounded and limited."""
     import numpy as np
 
