@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias, TypedDict
 
 __all__ = [
     "DynamicReconfigureCallbackException",
@@ -14,6 +14,35 @@ __all__ = [
 ]
 
 _SUFFIX = "/set_parameters"
+
+Value: TypeAlias = bool | int | float | str
+"""A parameter's value."""
+
+Values: TypeAlias = Mapping[str, Any]
+"""Values by the names of parameters; ``groups``, if it is there, holds the tree of groups or their states."""
+
+GroupTree: TypeAlias = Mapping[str, Any]
+"""A group, of a type's description or decoded: its number, name and state, its parameters, and the groups in it."""
+
+
+class Entry(TypedDict, total=False):
+    """A parameter or a constant, as a .cfg file describes it and the generated module has it."""
+
+    name: str
+    type: str
+    ctype: str
+    cconsttype: str
+    description: str
+    srcfile: str
+    srcline: int
+    # Of a constant.
+    value: Value
+    # Of a parameter.
+    default: Value | None
+    min: Value | None
+    max: Value | None
+    level: int
+    edit_method: str
 
 
 class DynamicReconfigureException(Exception):
@@ -31,10 +60,10 @@ class DynamicReconfigureCallbackException(DynamicReconfigureException):
 class ConfigType(Protocol):
     """A module ``package.cfg.NAMEConfig``, which is generated from a .cfg file."""
 
-    defaults: Mapping[str, Any]
-    min: Mapping[str, Any]
-    max: Mapping[str, Any]
-    config_description: Mapping[str, Any]
+    defaults: Mapping[str, Value]
+    min: Mapping[str, Value]
+    max: Mapping[str, Value]
+    config_description: GroupTree
 
 
 def find_reconfigure_services() -> list[str]:

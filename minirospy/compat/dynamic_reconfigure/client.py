@@ -6,7 +6,7 @@ import ast
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from dynamic_reconfigure.msg import Config as ConfigMsg
@@ -17,6 +17,8 @@ from minirospy import client as rospy
 from minirospy.compat.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
+    Entry,
+    Values,
 )
 from minirospy.compat.dynamic_reconfigure.encoding import (
     Config,
@@ -35,7 +37,7 @@ _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool
 _TRUE = ("yes", "true", "t", "1")
 
 ConfigCallback = Callable[[Config | None], object]
-DescriptionCallback = Callable[[list[dict[str, Any]] | None], object]
+DescriptionCallback = Callable[[list[Entry] | None], object]
 
 
 class Client:
@@ -54,7 +56,7 @@ class Client:
         """
         self.name = name
         self.config: Config | None = None
-        self.param_description: list[dict[str, Any]] | None = None
+        self.param_description: list[Entry] | None = None
         self.group_description: Config | None = None
         self._param_types: dict[str, type] = {}
         self._cv = threading.Condition()
@@ -80,7 +82,7 @@ class Client:
         self._wait(lambda: self.config is not None, timeout)
         return self.config
 
-    def get_parameter_descriptions(self, timeout: float | None = None) -> list[dict[str, Any]] | None:
+    def get_parameter_descriptions(self, timeout: float | None = None) -> list[Entry] | None:
         """Return a dict for each parameter of the server; None after ``timeout`` seconds, or at shutdown."""
         self._wait(lambda: self.param_description is not None, timeout)
         return self.param_description
@@ -90,7 +92,7 @@ class Client:
         self._wait(lambda: self.group_description is not None, timeout)
         return self.group_description
 
-    def update_configuration(self, changes: Mapping[str, Any]) -> Config:
+    def update_configuration(self, changes: Values) -> Config:
         """Change values at the server; return the configuration that it has then.
 
         Texts are converted to the type of the parameter; of one with an enum the name of a constant will do.
@@ -99,7 +101,7 @@ class Client:
         """
         descriptions = self.get_parameter_descriptions() or []
         by_name = {each["name"]: each for each in descriptions}
-        config: dict[str, Any] = {}
+        config: dict[str, object] = {}
         for name, value in changes.items():
             if name == "groups":
                 config[name] = self.update_groups(value)
@@ -114,7 +116,7 @@ class Client:
             raise DynamicReconfigureCallbackException("service call failed") from error
         return decode_config(answer, self.get_group_descriptions())
 
-    def update_groups(self, changes: Mapping[str, Any]) -> Config | None:
+    def update_groups(self, changes: Values) -> Config | None:
         """Return the tree of the server's groups with other states, by the groups' names."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
@@ -189,7 +191,7 @@ class Client:
             )
         return _TYPES[type_str]
 
-    def _converted(self, description: Mapping[str, Any], value: Any) -> Any:
+    def _converted(self, description: Entry, value: object) -> object:
         """Return a value in the type of a parameter."""
         name = description["name"]
         wanted = self._param_types[name]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy import client as rospy
 from minirospy.cli.command import NO_MASTER
@@ -17,9 +17,13 @@ from minirospy.cli.verbs import Command
 from minirospy.compat.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
+    Values,
     find_reconfigure_services,
 )
 from minirospy.errors import MinirospyError, UsageError
+
+if TYPE_CHECKING:
+    from minirospy.compat.dynamic_reconfigure.encoding import Config
 
 __all__ = ["COMMANDS", "main"]
 
@@ -129,7 +133,7 @@ def _set(node: str, name: str, value: str | None, timeout: float | None) -> None
         print(f"couldn't set parameters at node {node}")
 
 
-def _dictionary(text: str) -> dict[str, Any]:
+def _dictionary(text: str) -> Values:
     import yaml
 
     try:
@@ -151,7 +155,7 @@ def _set_from_parameters(node: str, timeout: float | None) -> None:
 
 
 def _load(node: str, file: str, timeout: float | None) -> None:
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
     for document in _documents(file):
         if not isinstance(document, dict):
             raise MinirospyError(f"{file} holds {document!r}, which is not a dictionary of values")
@@ -188,7 +192,7 @@ def _dump(node: str, file: str, timeout: float | None) -> None:
     Path(file).write_text(yaml.safe_dump(_plain(values)), encoding="utf-8")
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return a configuration as dicts, which need no tags in YAML."""
     return {key: _plain(each) for key, each in value.items()} if isinstance(value, dict) else value
 
@@ -206,14 +210,14 @@ def _check_master() -> None:
         graph.state()
 
 
-def _values_of(node: str, timeout: float | None) -> Any:
+def _values_of(node: str, timeout: float | None) -> Config | None:
     from minirospy.compat.dynamic_reconfigure.client import Client
 
     _connect()
     return Client(node, timeout=timeout).get_configuration(timeout=timeout)
 
 
-def _change(node: str, values: Mapping[str, Any], timeout: float | None) -> None:
+def _change(node: str, values: Values, timeout: float | None) -> None:
     """Change values at a node. Raises ROSException where it is not there in time, MinirospyError where it fails."""
     from minirospy.compat.dynamic_reconfigure.client import Client
 

@@ -8,8 +8,8 @@ outermost.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
 
 from dynamic_reconfigure.msg import (
     BoolParameter,
@@ -23,7 +23,7 @@ from dynamic_reconfigure.msg import (
 )
 from dynamic_reconfigure.msg import Config as ConfigMsg
 
-from minirospy.compat.dynamic_reconfigure import ConfigType
+from minirospy.compat.dynamic_reconfigure import ConfigType, Entry, GroupTree, Values
 
 __all__ = [
     "Config",
@@ -39,11 +39,13 @@ __all__ = [
     "initial_config",
 ]
 
+_G = TypeVar("_G", bound="Group | GroupState")
+
 
 class Config(dict[str, Any]):
     """A configuration; its values are attributes as well. A missing one raises KeyError, as in ROS."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
+    def __init__(self, *args: Iterable[tuple[str, object]] | Values, **kwargs: object) -> None:
         """Take the arguments of dict."""
         super().__init__(*args, **kwargs)
 
@@ -53,17 +55,17 @@ class Config(dict[str, Any]):
             raise AttributeError(name)
         return self[name]
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         self[name] = value
 
     def copy(self) -> Config:
         """Return a copy with the same values."""
         return Config(self)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Config:
+    def __deepcopy__(self, memo: dict[int, object]) -> Config:
         return type(self)({key: copy.deepcopy(value, memo) for key, value in self.items()})
 
-    def __reduce__(self) -> tuple[type[Config], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type[Config], tuple[dict[str, object]]]:
         return type(self), (dict(self),)
 
 
@@ -77,7 +79,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
     )
 
 
-def encode_groups(parent: Group | None, group: Mapping[str, Any]) -> list[Group]:
+def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
     """Return a group of a type's description, and all groups in it."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
@@ -87,7 +89,7 @@ def encode_groups(parent: Group | None, group: Mapping[str, Any]) -> list[Group]
     return [encoded, *(inner for each in group["groups"] for inner in encode_groups(encoded, each))]
 
 
-def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMsg:
+def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
     """Return the message of a configuration. Values that are no bool, int, float or str are left out, groups apart.
 
     With ``flat`` a group is a tree; without, its values are the groups.
@@ -111,7 +113,7 @@ def encode_config(config: Mapping[str, Any], flat: bool = True) -> ConfigMsg:
     return message
 
 
-def _inner_groups(group: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
     """Yield the groups in a group, each after those in it."""
     for each in group["groups"].values():
         yield from _inner_groups(each)
@@ -162,7 +164,7 @@ def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None 
     return _children(m.groups, group.id, group_dict, set())
 
 
-def _tree(groups: Iterable[Any], decode: Any) -> Config:
+def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
     """Return the outermost group; an empty one where a message has none."""
     outermost = [each for each in groups if each.id == 0]
     if not outermost:
@@ -172,7 +174,7 @@ def _tree(groups: Iterable[Any], decode: Any) -> Config:
     return root
 
 
-def _children(groups: Iterable[Any], parent: int, decode: Any, above: set[int]) -> Config:
+def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config], above: set[int]) -> Config:
     """Return the groups in a group by their names. Groups that contain themselves are left out."""
     children = Config()
     for each in groups:
@@ -183,7 +185,7 @@ def _children(groups: Iterable[Any], parent: int, decode: Any, above: set[int]) 
     return children
 
 
-def initial_config(msg: ConfigMsg, description: Mapping[str, Any] | None = None) -> Config:
+def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
     """Return a server's first configuration: groups have the states of the type's description."""
     config = _values(msg)
     if msg.groups and description is not None:
@@ -198,7 +200,7 @@ def initial_config(msg: ConfigMsg, description: Mapping[str, Any] | None = None)
     return config
 
 
-def decode_config(msg: ConfigMsg, description: Mapping[str, Any] | None = None) -> Config:
+def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
     """Return a configuration; with a type's description, its groups have their parameters' values, too."""
     config = _values(msg)
     if msg.groups and description is not None:
@@ -210,23 +212,28 @@ def decode_config(msg: ConfigMsg, description: Mapping[str, Any] | None = None) 
 
 
 def _values(msg: ConfigMsg) -> Config:
-    parameters: list[Any] = [*msg.bools, *msg.ints, *msg.strs, *msg.doubles]
+    parameters: list[BoolParameter | IntParameter | StrParameter | DoubleParameter] = [
+        *msg.bools,
+        *msg.ints,
+        *msg.strs,
+        *msg.doubles,
+    ]
     return Config((each.name, each.value) for each in parameters)
 
 
-def _groups_in(group: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _groups_in(group: GroupTree) -> list[GroupTree]:
     """Return the groups in a group: a list in a type's description, a dict in a decoded one."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, dict) else list(groups)
 
 
-def _all_groups(group: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
     yield group
     for each in _groups_in(group):
         yield from _all_groups(each)
 
 
-def _matching(group: Config, description: Mapping[str, Any]) -> Iterator[tuple[Config, Mapping[str, Any]]]:
+def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
     """Yield each group of a configuration with what describes it, by name."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
@@ -235,12 +242,12 @@ def _matching(group: Config, description: Mapping[str, Any]) -> Iterator[tuple[C
             yield from _matching(each, described[name])
 
 
-def extract_params(group: Mapping[str, Any]) -> list[dict[str, Any]]:
+def extract_params(group: GroupTree) -> list[Entry]:
     """Return the parameters of a group, and of all groups in it."""
     return [each for inner in _all_groups(group) for each in inner["parameters"]]
 
 
-def get_parents(group: Mapping[str, Any], descriptions: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def get_parents(group: GroupTree, descriptions: GroupTree) -> list[GroupTree]:
     """Return the groups that a group is in, the outermost first; ``descriptions["group"]`` has all of them."""
     for each in descriptions["group"]:
         if each["id"] == group["parent"] and each is not group:

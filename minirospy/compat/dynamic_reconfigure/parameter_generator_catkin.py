@@ -10,9 +10,9 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypeAlias
 
-from minirospy.compat.dynamic_reconfigure import generated
+from minirospy.compat.dynamic_reconfigure import Entry, Value, generated
 
 __all__ = [
     "ParameterGenerator",
@@ -29,7 +29,7 @@ bool_t = "bool"
 int_t = "int"
 double_t = "double"
 
-_PYTHON_TYPES: dict[str, type[Any]] = {str_t: str, int_t: int, double_t: float, bool_t: bool}
+_PYTHON_TYPES: dict[str, type[Value]] = {str_t: str, int_t: int, double_t: float, bool_t: bool}
 _CPP_TYPES = {str_t: "std::string", int_t: "int", double_t: "double", bool_t: "bool"}
 _CPP_CONSTANTS = {
     str_t: "const char * const",
@@ -37,6 +37,7 @@ _CPP_CONSTANTS = {
     double_t: "const double",
     bool_t: "const bool",
 }
+_ValueKey: TypeAlias = Literal["value", "default", "min", "max"]
 _NAME = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*\Z")
 
 _USAGE = """This program describes parameters; it is not called by itself.
@@ -66,9 +67,9 @@ def check_name(name: str) -> None:
 class ParameterGenerator:
     """The parameters of a node, in groups; ``generate`` writes what programs import and include."""
 
-    minval: Mapping[str, Any] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
-    maxval: Mapping[str, Any] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
-    defval: Mapping[str, Any] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
+    minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
+    maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
+    defval: Mapping[str, Value] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
 
     class Group:
         """Parameters that are shown together, and groups in it."""
@@ -84,7 +85,7 @@ class ParameterGenerator:
             self.id = id
             self.parent = parent
             self.groups: list[ParameterGenerator.Group] = []
-            self.parameters: list[dict[str, Any]] = []
+            self.parameters: list[Entry] = []
             self.srcfile, self.srcline = _source_line()
             gen._groups[id] = self
 
@@ -104,9 +105,9 @@ class ParameterGenerator:
             paramtype: str,
             level: int,
             description: str,
-            default: Any = None,
-            min: Any = None,
-            max: Any = None,
+            default: Value | None = None,
+            min: Value | None = None,
+            max: Value | None = None,
             edit_method: str = "",
         ) -> None:
             """Add a parameter; ``level``: the bits that the server's callback gets when it changes.
@@ -117,7 +118,7 @@ class ParameterGenerator:
                 raise Exception(f"Max or min specified for {name}, which is of '{paramtype}' type")
             check_name(name)
             srcfile, srcline = _source_line()
-            param: dict[str, Any] = {
+            param: Entry = {
                 "name": name,
                 "type": paramtype,
                 "default": default,
@@ -136,7 +137,7 @@ class ParameterGenerator:
             gen.check_type_fill_default(param, "min", gen.minval[paramtype])
             self.parameters.append(param)
 
-        def get_parameters(self) -> list[dict[str, Any]]:
+        def get_parameters(self) -> list[Entry]:
             """Return its parameters, and those of all groups in it."""
             return [*self.parameters, *(each for group in self.groups for each in group.get_parameters())]
 
@@ -155,7 +156,7 @@ class ParameterGenerator:
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
-        def to_dict(self) -> dict[str, Any]:
+        def to_dict(self) -> dict[str, object]:
             """Return what the generated module knows of it."""
             return {
                 "name": self.name,
@@ -180,23 +181,23 @@ class ParameterGenerator:
         """Take the folders from the command line. Raises SystemExit where it has none."""
         self._groups: dict[int, ParameterGenerator.Group] = {}
         self.group = self.Group(self, "Default", "", True, 0, 0)
-        self.constants: list[dict[str, Any]] = []
+        self.constants: list[Entry] = []
         if len(sys.argv) < 5:
             raise SystemExit(_USAGE)
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
 
-    def pytype(self, drtype: str) -> type[Any]:
+    def pytype(self, drtype: str) -> type[Value]:
         """Return the Python type of a parameter's type. Raises KeyError."""
         return _PYTHON_TYPES[drtype]
 
-    def check_type(self, param: dict[str, Any], field: str) -> None:
+    def check_type(self, param: Entry, field: _ValueKey) -> None:
         """Convert a parameter's value to its type. Raises TypeError where it has another."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
-        param[field] = wanted(value)
+        param[field] = float(value) if type(value) is int and wanted is float else value
 
-    def fill_type(self, param: dict[str, Any]) -> None:
+    def fill_type(self, param: Entry) -> None:
         """Add the C++ types of a parameter or constant. Raises TypeError where its type is unknown."""
         if param["type"] not in _CPP_TYPES:
             raise TypeError(
@@ -205,17 +206,17 @@ class ParameterGenerator:
         param["ctype"] = _CPP_TYPES[param["type"]]
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
-    def check_type_fill_default(self, param: dict[str, Any], field: str, default: Any) -> None:
+    def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
         """Convert a parameter's value, or set the default where there is none. Raises TypeError."""
         if param[field] is None:
             param[field] = default
         else:
             self.check_type(param, field)
 
-    def const(self, name: str, type: str, value: Any, descr: str) -> dict[str, Any]:
+    def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
         """Add a constant ``NAME_name`` to the module; return what ``enum`` takes. Raises Exception, TypeError."""
         srcfile, srcline = _source_line()
-        constant: dict[str, Any] = {
+        constant: Entry = {
             "name": name,
             "type": type,
             "value": value,
@@ -229,7 +230,7 @@ class ParameterGenerator:
         self.constants.append(constant)
         return constant
 
-    def enum(self, constants: Sequence[Mapping[str, Any]], description: str) -> str:
+    def enum(self, constants: Sequence[Entry], description: str) -> str:
         """Return the ``edit_method`` of a parameter that is one of some constants. Raises Exception."""
         if len({constant["type"] for constant in constants}) != 1:
             raise Exception("Inconsistent types in enum!")
@@ -242,9 +243,9 @@ class ParameterGenerator:
         paramtype: str,
         level: int,
         description: str,
-        default: Any = None,
-        min: Any = None,
-        max: Any = None,
+        default: Value | None = None,
+        min: Value | None = None,
+        max: Value | None = None,
         edit_method: str = "",
     ) -> None:
         """Add a parameter to the outermost group, as ``Group.add``."""

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription
@@ -19,6 +18,9 @@ from minirospy.compat.dynamic_reconfigure import (
     ConfigType,
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
+    Entry,
+    Value,
+    Values,
 )
 from minirospy.compat.dynamic_reconfigure.encoding import (
     Config,
@@ -61,7 +63,7 @@ class Server:
             self.ns = (namespace if namespace[0] in "/~" else f"~{namespace}").rstrip("/") + "/"
         self.type = type
         self.callback = callback
-        self._params: list[dict[str, Any]] = extract_params(type.config_description)
+        self._params: list[Entry] = extract_params(type.config_description)
         self.description = encode_description(type)
 
         config = Config(type.defaults)
@@ -80,7 +82,7 @@ class Server:
         self._change_config(self.config, ~0)
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
-    def update_configuration(self, changes: Mapping[str, Any]) -> Config:
+    def update_configuration(self, changes: Values) -> Config:
         """Change values; return the configuration that the callback returned. Raises what the callback raises."""
         with self.mutex:
             config = copy.deepcopy(self.config)
@@ -135,7 +137,7 @@ class Server:
         self.update_topic.publish(encode_config(changed))
         return changed
 
-    def _calc_level(self, config1: Mapping[str, Any], config2: Mapping[str, Any]) -> int:
+    def _calc_level(self, config1: Values, config2: Values) -> int:
         level = 0
         for param in self._params:
             if config1[param["name"]] != config2[param["name"]]:
@@ -152,7 +154,7 @@ class Server:
                 config[name] = least
 
 
-def _fits(param: Mapping[str, Any], value: object) -> bool:
+def _fits(param: Entry, value: object) -> bool:
     """Return whether a parameter may have a value."""
     allowed = _TYPES.get(param["type"])
     if allowed is None:
@@ -160,7 +162,7 @@ def _fits(param: Mapping[str, Any], value: object) -> bool:
     return isinstance(value, allowed) and (bool in allowed or not isinstance(value, bool))
 
 
-def _converted(param: Mapping[str, Any], value: Any) -> Any:
+def _converted(param: Entry, value: Value) -> Value:
     """Return a value in the type that its message has."""
     if param["type"] == "double":
         return float(value)
