@@ -15,6 +15,7 @@ SHARED = {
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",
     "message_filters/stamps.py",
+    "topic_tools/expressions.py",
     "ros_names.py",
     "__init__.py",
     "rosbag/exceptions.py",

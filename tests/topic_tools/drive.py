@@ -1,10 +1,12 @@
 """What a user sees of topic_tools' programs, ours or the real ones: ``sys.argv[1]`` is their folder, the rest starts one."""
 
 import queue
+import re
 import subprocess
 import sys
 import threading
 
+import roslib.message
 import rospy
 import rostopic
 from geometry_msgs.msg import PointStamped
@@ -121,6 +123,43 @@ with Program("throttle", "bytes", "/b", "100", "1000"):
     while found[-1] != text(3):
         found += heard.texts(1)
     say("throttle", [each.split()[0] for each in dict.fromkeys(found)], heard.messages.qsize())
+
+points = rospy.Publisher("/stamped", PointStamped, queue_size=5, latch=True)
+message = PointStamped()
+message.header.frame_id, message.point.x, message.point.y = "map", 3, 4
+timer = rospy.Timer(rospy.Duration(0.1), lambda event: points.publish(message))
+for words in (
+    ("transform", "/stamped/point", "/length", "std_msgs/Float64", "numpy.sqrt(m.x**2 + m.y**2)"),
+    (
+        "transform",
+        "/stamped",
+        "/frame",
+        "std_msgs/String",
+        "m.header.frame_id + str(math.floor(m.point.y))",
+        "-i",
+        "math",
+    ),
+    ("transform", "/stamped/point/x", "/vector", "geometry_msgs/Vector3", "[m, m + 1, -m]"),
+    (
+        "relay_field",
+        "/stamped/point",
+        "/placed",
+        "geometry_msgs/PoseStamped",
+        "{header: {frame_id: odom}, pose: {position: {x: m.x, y: -m.y}}}",
+    ),
+    (
+        "relay_field",
+        "/stamped",
+        "/named",
+        "std_msgs/Header",
+        "{stamp: {secs: int(m.point.x)}, frame_id: m.header.frame_id}",
+    ),
+):
+    with Program(*words):
+        found = rospy.wait_for_message(words[2], roslib.message.get_message_class(words[3]), 20)
+        say(words[0], re.sub(r"seq: \d+ ", "", " ".join(str(found).split())))
+
+timer.shutdown()
 
 with Program("mux", "/chosen", "/left", "/right"):
     select, add, delete, names = (

@@ -59,6 +59,11 @@ def test_wrong_words_are_refused_with_the_usage(words: list[str], text: str) -> 
         (["throttle", "bytes", "a", "5"], "throttle bytes takes 3 words"),
         (["throttle", "letters", "a", "5"], "usage:"),
         (["drop", "a", "-1", "3"], "[-1] is not a number of messages"),
+        (["transform", "/a", "/b", "std_msgs/String", "m"], "ERROR: Wrong input topic (or topic field): /a"),
+        (["transform", "/a", "/b", "std_msgs/String", "m +"], "'m +' is not an expression of Python"),
+        (["transform", "/a", "/b", "std_msgs/Strong", "m"], "std_msgs/Strong"),
+        (["relay_field", "/a", "/b", "std_msgs/String", "{data: m"], "the expression is not YAML"),
+        (["relay_field", "/a", "/b", "std_msgs/String", "m"], "the expression is not a dictionary of fields"),
     ],
 )
 def test_wrong_numbers_are_refused_in_one_line(words: list[str], text: str, master: str) -> None:
