@@ -36,6 +36,7 @@ def test_solvers_refuse_by_name(name: str) -> None:
     "make",
     [
         lambda: PyKDL.Vector(1, 2),  # type: ignore[call-overload]
+        lambda: PyKDL.Vector("1", 2, 3),  # type: ignore[call-overload]
         lambda: PyKDL.Rotation(1, 2),
         lambda: PyKDL.Frame(5),  # type: ignore[arg-type]
         lambda: PyKDL.Vector() + 1,  # type: ignore[operator]
@@ -50,6 +51,19 @@ def test_wrong_arguments_are_type_errors(make: object) -> None:
     assert callable(make)
     with pytest.raises(TypeError):
         make()
+
+
+@pytest.mark.parametrize("off", [1e-8, 9e-7, 1.1e-6])
+def test_objects_within_a_millionth_are_equal(off: float) -> None:
+    a, b = PyKDL.Vector(1, 2, 3), PyKDL.Vector(1, 2, 3 + off)
+    m, n = PyKDL.Rotation(), PyKDL.Rotation(1, 0, 0, 0, 1 + off, 0, 0, 0, 1)
+
+    is_equal = off < 1e-6
+    assert (a == b, a != b) == (is_equal, not is_equal)
+    assert (PyKDL.Twist(a, a) == PyKDL.Twist(a, b)) is is_equal
+    assert (PyKDL.Wrench(a, a) == PyKDL.Wrench(a, b)) is is_equal
+    assert (PyKDL.Frame(m, a) == PyKDL.Frame(m, b)) is is_equal
+    assert (m == n, PyKDL.Frame(m) == PyKDL.Frame(n)) == (is_equal, is_equal)
 
 
 def test_stamped_kdl_objects_are_transformed() -> None:

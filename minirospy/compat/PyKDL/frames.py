@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from minirospy.compat.PyKDL.vectors import EPSILON, Twist, Vector, Wrench
+from minirospy.compat.PyKDL.vectors import EPSILON, Twist, Vector, Wrench, are_near
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
@@ -249,7 +249,7 @@ class Rotation:
         self._m[3 * row + column] = float(value)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Rotation) and self._m == other._m
+        return isinstance(other, Rotation) and are_near(self._m, other._m)
 
     def __str__(self) -> str:
         rows = (",".join(f"{each:12.6g}" for each in self._m[start : start + 3]) for start in (0, 3, 6))

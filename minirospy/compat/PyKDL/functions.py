@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NoReturn, TypeVar, overload
 
 from minirospy.compat.PyKDL.frames import Frame, Rotation
-from minirospy.compat.PyKDL.vectors import EPSILON, Screw, Twist, Vector, Wrench
+from minirospy.compat.PyKDL.vectors import EPSILON, Screw, Twist, Vector, Wrench, are_near
 
 __all__ = ["Equal", "SetToZero", "addDelta", "diff", "dot", "refusal"]
 
@@ -27,7 +27,7 @@ def Equal(a: Any, b: Any, eps: float = EPSILON) -> bool:
     """Return whether two objects of a type differ in no number by ``eps`` or more. Raise TypeError."""
     if type(a) is not type(b) or not isinstance(a, Vector | Rotation | Frame | Screw):
         raise TypeError("Equal() takes two objects of one type: Vector, Rotation, Frame, Twist or Wrench")
-    return all(abs(x - y) < eps for x, y in zip(_numbers(a), _numbers(b), strict=True))
+    return are_near(_numbers(a), _numbers(b), eps)
 
 
 def SetToZero(a: Vector | Twist | Wrench) -> None:

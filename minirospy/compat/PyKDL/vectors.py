@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeVar, overload
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
 
-__all__ = ["EPSILON", "Screw", "Twist", "Vector", "Wrench", "numbers_text"]
+__all__ = ["EPSILON", "Screw", "Twist", "Vector", "Wrench", "are_near", "numbers_text"]
 
 EPSILON = 1e-6
 _S = TypeVar("_S", bound="Screw")
@@ -34,7 +35,7 @@ class Vector:
             self._v = list(x._v)
         elif x is None and y is None and z is None:
             self._v = [0.0, 0.0, 0.0]
-        elif x is None or y is None or z is None or isinstance(x, Vector):
+        elif x is None or y is None or z is None or isinstance(x, Vector | str):
             raise TypeError("a Vector is made of nothing, of x, y and z, or of another Vector")
         else:
             self._v = [float(x), float(y), float(z)]
@@ -134,7 +135,7 @@ class Vector:
         return self * (1.0 / other if other else math.inf)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Vector) and self._v == other._v
+        return isinstance(other, Vector) and are_near(self._v, other._v)
 
     def __str__(self) -> str:
         return numbers_text(self._v)
@@ -265,6 +266,11 @@ class Wrench(Screw):
     def RefPoint(self, base: Vector) -> Wrench:
         """Return the same load, with the torque about the point ``base``."""
         return Wrench(self.force, self.torque + self.force * base)
+
+
+def are_near(a: Sequence[float], b: Sequence[float], eps: float = EPSILON) -> bool:
+    """Return whether no two numbers differ by ``eps`` or more: what KDL means by equal."""
+    return all(abs(x - y) < eps for x, y in zip(a, b, strict=True))
 
 
 def numbers_text(values: list[float]) -> str:
