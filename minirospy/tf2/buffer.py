@@ -278,10 +278,13 @@ class TransformBuffer(FrameTree):
 
     def _path(self, target: str, source: str, time: int) -> list[str]:
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
-        if target_frame is None or source_frame is None:
-            raise _unconnected(target_frame or Frame("NO_PARENT"), source_frame or Frame("NO_PARENT"))
         if target_frame is source_frame:
+            # Two names that do not exist are the same frame, too.
             return []
+        if target_frame is None or source_frame is None:
+            if time == 0:
+                raise LookupException("")
+            raise _unconnected(target_frame or Frame("NO_PARENT"), source_frame or Frame("NO_PARENT"))
         _, up, down = self._walk(time, target_frame, source_frame)
         rising = [source, *(sample[0].name for sample in up)] if up else []
         falling = [target, *(sample[0].name for sample in down)] if down else []
