@@ -29,7 +29,8 @@ def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iter
 
 
 def _short(value: object) -> str:
-    text = str(value).strip()
-    if "\n" in text:
-        return "<...>"
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    text = str(value)
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST - 3]}..."
+    text = text.rstrip()
+    return text if text.isascii() and text.isprintable() else "<...>"
