@@ -16,7 +16,7 @@ from minirospy.frames.tools import echo, monitor, static_publisher, view
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.frames.tools.monitor import Delays
 from minirospy.urdf.poses import quaternion_from_rpy
-from tests.robots.conftest import SECONDS, Start
+from tests.robots.conftest import SECONDS, Start, python
 
 STATIC = ("tf2_ros", "static_transform_publisher")
 OLD_STATIC = ("tf", "static_transform_publisher")
@@ -198,7 +198,7 @@ def test_names_of_frames_stay_names() -> None:
             static_publisher.main_tf,
             "1 2 3 0 0 0 /a a 100",
             1,
-            "source frame are the same (a, a) this cannot work",
+            "source frame are the same (/a, a) this cannot work",
         ),
         (
             static_publisher.main_tf2,
@@ -255,6 +255,16 @@ def test_parameter_is_broadcast(start: Start) -> None:
     program = start("tf", "tf_echo", "p", "q", "20")
     read = lines_until(program, "- Translation: ")
     assert read.endswith("- Translation: [1.000, 2.500, 0.000]\n")
+
+
+@pytest.mark.usefixtures("frames")
+def test_names_are_published_as_they_are_typed() -> None:
+    read = python(
+        "import rospy; from tf2_msgs.msg import TFMessage; rospy.init_node('names', anonymous=True); "
+        f"seen = rospy.wait_for_message('/tf', TFMessage, {SECONDS}).transforms[0]; "
+        "print(seen.header.frame_id, seen.child_frame_id)"
+    )
+    assert read == "/a /b\n"
 
 
 @pytest.mark.usefixtures("frames")

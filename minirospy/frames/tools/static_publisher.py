@@ -60,7 +60,7 @@ def _run_tf(words: Sequence[str]) -> None:
     if len(words) not in (9, 10):
         raise ToolError(_WRONG_COUNT, text=_TF_USAGE)
     *numbers, parent, child, period = words
-    transform = _transform(numbers, parent.removeprefix("/"), child.removeprefix("/"))
+    transform = _transform(numbers, parent, child)
     seconds = max(_number(period, "period"), 1000 * _SHORTEST) / 1000
 
     rospy.init_node(_NAME, anonymous=True)
@@ -126,7 +126,8 @@ def _number(text: str, what: str) -> float:
 def _checked(transform: TransformStamped) -> TransformStamped:
     """Return a transform that listeners take. Raises ToolError."""
     parent, child = transform.header.frame_id, transform.child_frame_id
-    if parent == child:
+    # Listeners drop a leading slash.
+    if parent.removeprefix("/") == child.removeprefix("/"):
         why = f"target_frame and source frame are the same ({parent}, {child}) this cannot work"
         raise ToolError(why, level="FATAL", status=1)
     if not parent or not child:
