@@ -125,7 +125,7 @@ class Mesh(Object):
         self.scale = scale
 
 
-class GeometricType(Codec):
+class GeometricType(Codec[Object]):
     """The one shape in a ``<geometry>``."""
 
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
@@ -152,7 +152,9 @@ class Collision(Object):
     TAG = "collision"
     FIELDS = (_OPTIONAL_NAME, _ORIGIN, Element("geometry", GeometricType()))
 
-    def __init__(self, geometry: Any = None, origin: Pose | None = None, name: str | None = None) -> None:
+    def __init__(
+        self, geometry: Object | None = None, origin: Pose | None = None, name: str | None = None
+    ) -> None:
         self.geometry = geometry
         self.name = name
         self.origin = origin
@@ -207,7 +209,7 @@ class Visual(Object):
 
     def __init__(
         self,
-        geometry: Any = None,
+        geometry: Object | None = None,
         material: Material | None = None,
         origin: Pose | None = None,
         name: str | None = None,

@@ -59,7 +59,7 @@ _TEXT = Text()
 _NAME = Attribute("name", _TEXT)
 
 
-class _Transmissions(Codec):
+class _Transmissions(Codec[Object]):
     """A transmission of either form."""
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:

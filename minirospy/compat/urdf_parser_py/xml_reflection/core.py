@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as File
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 from xml.dom import minidom
 from xml.etree import ElementTree as ET
 
@@ -19,6 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 _T = TypeVar("_T", bound="Object")
+_V = TypeVar("_V")
 
 
 def on_error_stderr(message: str) -> None:
@@ -59,27 +60,27 @@ class ParseError(Exception):
         super().__init__(f"ParseError in {path}:\n{e}")
 
 
-class Codec:
+class Codec(Generic[_V]):
     """Between an element, or an attribute's text, and a value."""
 
-    def from_string(self, text: str) -> Any:
+    def from_string(self, text: str) -> _V:
         """Return the value of a text. Raises ValueError."""
         raise NotImplementedError
 
-    def to_string(self, value: Any) -> str:
+    def to_string(self, value: _V) -> str:
         """Return the text of a value."""
         return str(value)
 
-    def from_xml(self, node: ET.Element, path: Path) -> Any:
+    def from_xml(self, node: ET.Element, path: Path) -> _V:
         """Return the value of an element."""
         return self.from_string(node.text or "")
 
-    def write_xml(self, node: ET.Element, value: Any) -> None:
+    def write_xml(self, node: ET.Element, value: _V) -> None:
         """Write a value into an element."""
         node.text = self.to_string(value)
 
 
-class Text(Codec):
+class Text(Codec[str]):
     """A text as it is."""
 
     def from_string(self, text: str) -> str:
@@ -87,7 +88,7 @@ class Text(Codec):
         return text
 
 
-class Number(Codec):
+class Number(Codec[float]):
     """A number."""
 
     def from_string(self, text: str) -> float:
@@ -95,7 +96,7 @@ class Number(Codec):
         return float(text)
 
 
-class VectorOf(Codec):
+class VectorOf(Codec[Iterable[float]]):
     """So many numbers."""
 
     def __init__(self, count: int) -> None:
@@ -116,26 +117,26 @@ class VectorOf(Codec):
         return " ".join(words)
 
 
-class NamedAttribute(Codec):
+class NamedAttribute(Codec[_V]):
     """An element whose value is one attribute: ``<parent link="base"/>``."""
 
-    def __init__(self, attribute: str, codec: Codec) -> None:
+    def __init__(self, attribute: str, codec: Codec[_V]) -> None:
         self._attribute = attribute
         self._codec = codec
 
-    def from_xml(self, node: ET.Element, path: Path) -> Any:
+    def from_xml(self, node: ET.Element, path: Path) -> _V:
         """Return the attribute's value."""
         text = node.get(self._attribute)
         if text is None:
             raise ParseError(Exception(f"Required attribute not set in XML: {self._attribute}"), path)
         return self._codec.from_string(text)
 
-    def write_xml(self, node: ET.Element, value: Any) -> None:
+    def write_xml(self, node: ET.Element, value: _V) -> None:
         """Write the attribute."""
         node.set(self._attribute, self._codec.to_string(value))
 
 
-class Raw(Codec):
+class Raw(Codec[ET.Element]):
     """An element as it is."""
 
     def from_xml(self, node: ET.Element, path: Path) -> ET.Element:
@@ -149,7 +150,7 @@ class Raw(Codec):
         node.attrib.update(value.attrib)
 
 
-class ObjectOf(Codec):
+class ObjectOf(Codec["Object"]):
     """An element that is an object of a class."""
 
     def __init__(self, kind: type[Object]) -> None:
@@ -171,9 +172,9 @@ class Attribute:
     """An attribute of an element, and of its object."""
 
     name: str
-    codec: Codec
+    codec: Codec[Any]
     required: bool = True
-    default: Any = None
+    default: object = None
     kind: ClassVar[str] = "attribute"
 
 
@@ -182,9 +183,9 @@ class Element:
     """An element in an element, at most once."""
 
     name: str
-    codec: Codec
+    codec: Codec[Any]
     required: bool = True
-    default: Any = None
+    default: object = None
     kind: ClassVar[str] = "element"
 
 
@@ -193,7 +194,7 @@ class Many:
     """Elements in an element, any number of them: a list of the object's, called ``name`` + s."""
 
     name: str
-    codec: Codec
+    codec: Codec[Any]
 
 
 class Object:
@@ -334,21 +335,21 @@ class Object:
 
     def aggregate_init(self) -> None:
         """Start without elements in lists."""
-        self.aggregate_order: list[Any] = []
-        self.aggregate_type: dict[Any, str] = {}
+        self.aggregate_order: list[object] = []
+        self.aggregate_type: dict[object, str] = {}
 
-    def get_aggregate_list(self, xml_var: str) -> list[Any]:
+    def get_aggregate_list(self, xml_var: str) -> list[object]:
         """Return the list of the elements of a tag."""
-        found: list[Any] = getattr(self, f"{xml_var}s")
+        found: list[object] = getattr(self, f"{xml_var}s")
         return found
 
-    def add_aggregate(self, xml_var: str, obj: Any) -> None:
+    def add_aggregate(self, xml_var: str, obj: object) -> None:
         """Add an element of a tag."""
         self.get_aggregate_list(xml_var).append(obj)
         self.aggregate_order.append(obj)
         self.aggregate_type[obj] = xml_var
 
-    def remove_aggregate(self, obj: Any) -> None:
+    def remove_aggregate(self, obj: object) -> None:
         """Remove an element."""
         self.aggregate_order.remove(obj)
         self.get_aggregate_list(self.aggregate_type.pop(obj)).remove(obj)
@@ -362,7 +363,7 @@ class Object:
                     self.aggregate_order.append(each)
                     self.aggregate_type[each] = field.name
 
-    def _aggregates(self) -> list[tuple[str, Any]]:
+    def _aggregates(self) -> list[tuple[str, object]]:
         return [(self.aggregate_type[each], each) for each in self.aggregate_order]
 
     # --- for people
