@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar, overload
 
 from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
@@ -28,7 +28,9 @@ __all__ = [
 ]
 
 NO_WAIT = Duration()
+_A = TypeVar("_A")
 _T = TypeVar("_T")
+_Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
@@ -51,9 +53,9 @@ class _Registry:
     """Functions by type, or by a pair of types, for the whole process."""
 
     def __init__(self) -> None:
-        self.functions: dict[object, Callable[..., Any]] = {}
+        self.functions: dict[object, _Function] = {}
 
-    def get(self, key: object) -> Callable[..., Any]:
+    def get(self, key: object) -> _Function:
         try:
             return self.functions[key]
         except KeyError:
@@ -69,11 +71,11 @@ class TransformRegistration:
         """Print what is registered."""
         print(self._registry.functions)
 
-    def add(self, key: type, callback: Callable[[Any, TransformStamped], Any]) -> None:
+    def add(self, key: type[_T], callback: Callable[[_T, TransformStamped], _T]) -> None:
         """Register a function for a type."""
         self._registry.functions[key] = callback
 
-    def get(self, key: type) -> Callable[[Any, TransformStamped], Any]:
+    def get(self, key: type[_T]) -> Callable[[_T, TransformStamped], _T]:
         """Return the function for a type. Raise TypeException."""
         return self._registry.get(key)
 
@@ -85,27 +87,27 @@ class ConvertRegistration:
     _from_msg = _Registry()
     _convert = _Registry()
 
-    def add_from_msg(self, key: type, callback: Callable[[Any], Any]) -> None:
+    def add_from_msg(self, key: type[_T], callback: Callable[..., _T]) -> None:
         """Register how a message becomes an object of the type."""
         self._from_msg.functions[key] = callback
 
-    def add_to_msg(self, key: type, callback: Callable[[Any], Any]) -> None:
+    def add_to_msg(self, key: type[_A], callback: Callable[[_A], object]) -> None:
         """Register how an object of the type becomes a message."""
         self._to_msg.functions[key] = callback
 
-    def add_convert(self, key: tuple[type, type], callback: Callable[[Any], Any]) -> None:
+    def add_convert(self, key: tuple[type[_A], type[_T]], callback: Callable[[_A], _T]) -> None:
         """Register a direct conversion for a pair (from, to)."""
         self._convert.functions[key] = callback
 
-    def get_from_msg(self, key: type) -> Callable[[Any], Any]:
+    def get_from_msg(self, key: type[_T]) -> Callable[..., _T]:
         """Return what makes an object of a message. Raise TypeException."""
         return self._from_msg.get(key)
 
-    def get_to_msg(self, key: type) -> Callable[[Any], Any]:
+    def get_to_msg(self, key: type[_A]) -> Callable[[_A], object]:
         """Return what makes a message of an object. Raise TypeException."""
         return self._to_msg.get(key)
 
-    def get_convert(self, key: tuple[type, type]) -> Callable[[Any], Any]:
+    def get_convert(self, key: tuple[type[_A], type[_T]]) -> Callable[[_A], _T]:
         """Return the direct conversion. Raise TypeException."""
         return self._convert.get(key)
 
@@ -118,10 +120,8 @@ def convert(a: object, b_type: type[_T]) -> _T:
     except TypeException:
         if type(a) is b_type:
             return deepcopy(a)
-        converted: _T = registration.get_from_msg(b_type)(registration.get_to_msg(type(a))(a))
-        return converted
-    result: _T = directly(a)
-    return result
+        return registration.get_from_msg(b_type)(registration.get_to_msg(type(a))(a))
+    return directly(a)
 
 
 def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:  # noqa: N802 - tf2_ros's name
@@ -136,9 +136,25 @@ class BufferInterface:
     def __init__(self) -> None:
         self.registration = TransformRegistration()
 
+    @overload
     def transform(
-        self, object_stamped: Any, target_frame: str, timeout: Moment = NO_WAIT, new_type: type | None = None
-    ) -> Any:
+        self, object_stamped: _A, target_frame: str, timeout: Moment = NO_WAIT, new_type: None = None
+    ) -> _A: ...
+    @overload
+    def transform(
+        self, object_stamped: object, target_frame: str, timeout: Moment = NO_WAIT, *, new_type: type[_T]
+    ) -> _T: ...
+    @overload
+    def transform(
+        self, object_stamped: object, target_frame: str, timeout: Moment, new_type: type[_T]
+    ) -> _T: ...
+    def transform(
+        self,
+        object_stamped: Any,
+        target_frame: str,
+        timeout: Moment = NO_WAIT,
+        new_type: type | None = None,
+    ) -> object:
         """Return a stamped object in ``target_frame``, at its own stamp, as ``new_type`` where that is given.
 
         Raise TypeException for a type that is not registered, else as :meth:`lookup_transform` does.
@@ -190,7 +206,7 @@ class BufferInterface:
 
     def can_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
-    ) -> Any:
+    ) -> object:
         """Return whether there is a transform; a subclass has it."""
         raise NotImplementedException
 
@@ -202,6 +218,6 @@ class BufferInterface:
         source_time: Moment,
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
-    ) -> Any:
+    ) -> object:
         """Return whether there is a transform between two times; a subclass has it."""
         raise NotImplementedException

@@ -60,7 +60,7 @@ class LazyTFMessage(TFMessage):
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types
 
-    def __init__(self, *args: Any, **kwds: Any) -> None:
+    def __init__(self, *args: object, **kwds: object) -> None:
         if args or kwds:
             super().__init__(*args, **kwds)
         self.raw: bytes | None = None
@@ -70,7 +70,7 @@ class LazyTFMessage(TFMessage):
         self.raw = data
         return self
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> list[TransformStamped]:
         if name != "transforms" or self.raw is None:
             raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
         super().deserialize(self.raw)
