@@ -12,7 +12,7 @@ import time
 from collections import namedtuple
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from minirospy.bag import compression as compressions
 from minirospy.bag import info
@@ -29,7 +29,7 @@ from minirospy.compat.rosbag.exceptions import (
     raise_as_ros,
 )
 from minirospy.compat.rosbag.internals import _ConnectionInfo, _get_message_type
-from minirospy.compat.rosbag.opening import CLOSED, OpenedBag
+from minirospy.compat.rosbag.opening import CLOSED, OpenedBag, Source
 from minirospy.compat.rosbag.private import (
     BagMessage,
     BagMessageWithConnectionHeader,
@@ -72,11 +72,18 @@ TopicTuple = namedtuple("TopicTuple", ["msg_type", "message_count", "connections
 TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
-class _Pieces(list[Any]):
+class _Pieces(list[bytes]):
     """The buffer that a message's ``serialize`` writes to."""
 
     __slots__ = ()
     write = list.append
+
+
+class Options(TypedDict, total=False):
+    """How the next chunks are written."""
+
+    compression: str
+    chunk_threshold: int
 
 
 class Bag(OpenedBag):
@@ -89,12 +96,12 @@ class Bag(OpenedBag):
 
     def __init__(
         self,
-        f: str | os.PathLike[str] | BinaryIO,
+        f: Source,
         mode: str = "r",
         compression: str = Compression.NONE,
         chunk_threshold: int = 768 * 1024,
         allow_unindexed: bool = False,
-        options: dict[str, Any] | None = None,
+        options: Options | None = None,
         skip_index: bool = False,
     ) -> None:
         if options is not None:
@@ -121,7 +128,7 @@ class Bag(OpenedBag):
             self._close_file()
             raise
 
-    def __iter__(self) -> Iterator[Any]:
+    def __iter__(self) -> Iterator[BagMessage]:
         return self.read_messages()
 
     def __enter__(self) -> Bag:
@@ -133,12 +140,12 @@ class Bag(OpenedBag):
         self.close()
 
     @property
-    def options(self) -> dict[str, Any]:
+    def options(self) -> Options:
         """The compression and the chunk threshold."""
         return {"compression": self._compression, "chunk_threshold": self._chunk_threshold}
 
     @property
-    def filename(self) -> Any:
+    def filename(self) -> str | os.PathLike[str] | None:
         """The path that was given, None for a file object."""
         return self._filename
 
@@ -223,7 +230,7 @@ class Bag(OpenedBag):
         msg: Any,
         t: Time | None = None,
         raw: bool = False,
-        connection_header: Mapping[str, Any] | None = None,
+        connection_header: Mapping[str, str | bytes] | None = None,
     ) -> None:
         """Write a message that came at ``t``, by default now.
 
@@ -300,7 +307,7 @@ class Bag(OpenedBag):
         finally:
             self._close_file()
 
-    def get_compression_info(self) -> Any:
+    def get_compression_info(self) -> CompressionTuple:
         """Return the most frequent compression, and the sizes of all chunks: compression, uncompressed, compressed."""
         with as_ros_errors():
             stored = info.compression_of(self._current())
@@ -324,7 +331,7 @@ class Bag(OpenedBag):
         """Return the time of the last message in seconds. Raise ROSBagException if there is none."""
         return self._times()[1]
 
-    def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> Any:
+    def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
         """Return (msg_types, topics): md5sums by type, and (msg_type, message_count, connections, frequency) by topic."""
         summary = self._summary(frequencies=not self._skip_index)
         topics = {

@@ -5,18 +5,21 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable, Mapping
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, TypeAlias, cast
 
 from minirospy.bag.base import BagReader
 from minirospy.bag.reader import ChunkedReader, open_bag
 from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.bag.records import read_version
+from minirospy.bag.records import ChunkInfo, Connection, read_version
 from minirospy.bag.writer import BagWriter, Continued
 from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagUnindexedException
 from minirospy.compat.rosbag.private import PrivateBag
 from minirospy.errors import BagUnindexedError
 
-__all__ = ["CLOSED", "OpenedBag"]
+__all__ = ["CLOSED", "OpenedBag", "Source"]
+
+Source: TypeAlias = str | os.PathLike[str] | BinaryIO
+"""What a bag is read from or written to: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
 
@@ -48,7 +51,7 @@ class OpenedBag(PrivateBag):
                 reader.connections.setdefault(connection.id, connection)
         return reader
 
-    def _open_read(self, f: Any, allow_unindexed: bool) -> None:
+    def _open_read(self, f: Source, allow_unindexed: bool) -> None:
         stream = self._file = self._take(f, "rb")
         position = stream.tell()
         self._version = read_version(stream)
@@ -62,14 +65,14 @@ class OpenedBag(PrivateBag):
                 stream.seek(position)
                 self._reader = unindexed_bag12(stream)
 
-    def _open_write(self, f: Any, allow_unindexed: bool) -> None:
+    def _open_write(self, f: Source, allow_unindexed: bool) -> None:
         self._file = self._take(f, "w+b")
         self._version = 200
         self._writer = BagWriter(
             self._file, compression=self._compression, chunk_threshold=self._chunk_threshold
         )
 
-    def _open_append(self, f: Any, allow_unindexed: bool) -> None:
+    def _open_append(self, f: Source, allow_unindexed: bool) -> None:
         if isinstance(f, (str, os.PathLike)) and not os.path.exists(f):
             self._open_write(f, allow_unindexed)
             return
@@ -88,7 +91,9 @@ class OpenedBag(PrivateBag):
         assert isinstance(reader, ChunkedReader)
         self._start_appending(reader.connections, reader.chunks, reader.index_position)
 
-    def _start_appending(self, connections: Mapping[int, Any], chunks: Iterable[Any], position: int) -> None:
+    def _start_appending(
+        self, connections: Mapping[int, Connection], chunks: Iterable[ChunkInfo], position: int
+    ) -> None:
         self._writer = BagWriter(
             self._open_file(),
             compression=self._compression,

@@ -22,8 +22,9 @@ from minirospy.compat.rosbag.internals import (
 from minirospy.names import canonicalize
 
 if TYPE_CHECKING:
-    from minirospy.bag.base import BagReader
+    from minirospy.bag.base import BagReader, Position
     from minirospy.client.time import Time as RospyTime
+    from minirospy.idl.protocols import Message
     from minirospy.times import Time
 
 __all__ = ["BagMessage", "BagMessageWithConnectionHeader", "ConnectionFilter", "PrivateBag", "nanoseconds_of"]
@@ -93,7 +94,7 @@ class PrivateBag(ABC):
         return sum(each.uncompressed_size for each in headers) if headers else self.size
 
     def _read_message(
-        self, position: Any, raw: bool = False, return_connection_header: bool = False
+        self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
         """Return the message at a position, as index entries and raw messages have it."""
         self.flush()
@@ -101,7 +102,7 @@ class PrivateBag(ABC):
             stored = self._current().message_at(position)
         connection = _ConnectionInfo.of(stored.connection)
         kind = _get_message_type(connection)
-        message: Any
+        message: Message | tuple[object, ...]
         if raw:
             message = (connection.datatype, stored.body, connection.md5sum, stored.position, kind)
         else:
