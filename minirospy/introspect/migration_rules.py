@@ -43,12 +43,20 @@ class BagMigrationException(Exception):
     """A migration is not possible, or a rule is used wrongly."""
 
 
+class _Node(Protocol):
+    """A step of a path."""
+
+    @property
+    def rule(self) -> MessageUpdateRule:
+        """What leads from one class to another."""
+
+
 class Migrator(Protocol):
     """What a rule needs of :class:`minirospy.introspect.migration.MessageMigrator`."""
 
     rename_map: dict[str, set[str]]
 
-    def find_path(self, old_class: MessageClass, new_class: MessageClass) -> Sequence[Any]:
+    def find_path(self, old_class: MessageClass, new_class: MessageClass) -> Sequence[_Node]:
         """Return the nodes of the scaffold that lead from one class to another."""
 
     def filter_rules_unique(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
@@ -156,7 +164,7 @@ class MessageUpdateRule:
         self.update(old_msg, new_msg)
         return new_msg
 
-    def update(self, old_msg: Any, new_msg: Any) -> None:
+    def update(self, old_msg: Message, new_msg: Message) -> None:
         """Fill the new message; subclasses override it. Raise BagMigrationException."""
         raise BagMigrationException("Tried to use rule without update overidden")
 
@@ -198,7 +206,7 @@ def get_message_key(c: Any) -> Key | None:
         return None
 
 
-def get_path_key(c1: Any, c2: Any) -> tuple[Key | None, Key | None]:
+def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | None]:
     """Return what identifies a migration from one class to another."""
     return get_message_key(c1), get_message_key(c2)
 
@@ -236,7 +244,7 @@ def constants_from_def(core_type: str, msg_def: str) -> set[tuple[str, object, s
     return {(each.name, each.value, each.type) for each in spec.constants}
 
 
-Step = Callable[[MessageUpdateRule, Any, Any], None]
+Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 
 
 def make_update_rule(
@@ -277,7 +285,7 @@ def make_update_rule(
         valid = False
         lines += [f"#No field to match field {name} from old message" for name in old_fields]
 
-    def update(self: MessageUpdateRule, old_msg: Any, new_msg: Any) -> None:
+    def update(self: MessageUpdateRule, old_msg: Message, new_msg: Message) -> None:
         for step in steps:
             step(self, old_msg, new_msg)
 
@@ -305,7 +313,7 @@ def _rule(
     migrated: Sequence[tuple[str, str]],
     *,
     valid: bool,
-    update: Callable[[MessageUpdateRule, Any, Any], None] | None = None,
+    update: Step | None = None,
 ) -> type[MessageUpdateRule]:
     """Return a class that is also a text for a .bmr file."""
     old_type, old_text = (old_class._type, old_class._full_text.strip()) if old_class else ("", "")
@@ -373,7 +381,7 @@ def _migration_line(name: str, type_: FieldType) -> str:
 
 
 def _migration_step(name: str, type_: FieldType) -> Step:
-    def migrate(rule: MessageUpdateRule, old_msg: Any, new_msg: Any) -> None:
+    def migrate(rule: MessageUpdateRule, old_msg: Message, new_msg: Message) -> None:
         if type_.is_array:
             rule.migrate_array(getattr(old_msg, name), getattr(new_msg, name), type_.base)
         else:
