@@ -54,6 +54,7 @@ class McapWriter:
 
         self._stream = stream
         self._chunk_size = chunk_size
+        self._is_plain = compression == "none"
         self._gathered = 0
         self._writer: Writer = Writer(
             cast(BinaryIO, _Whole(stream)),
@@ -67,8 +68,8 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """Bytes of the file so far."""
-        return self._stream.tell() + self._gathered
+        """Bytes of the file so far, besides those that are yet to be compressed."""
+        return self._stream.tell() + (self._gathered if self._is_plain else 0)
 
     @property
     def gathered(self) -> int:

@@ -149,6 +149,8 @@ class BagWriter:
         self._complete: deque[_Complete] = deque()
         self._waiting = 0
         """Bytes of the complete chunks, before compression."""
+        self._written = (0, 0)
+        """Bytes of the data of the written chunks: before compression, and as they are stored."""
         self._closed = False
         self._small = bytearray()
         self._pieces: list[Buffer] = []
@@ -185,8 +187,14 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Bytes of the bag so far; chunks that are not compressed yet count with their full size."""
-        return self._position + self.gathered
+        """Bytes of the bag so far; what is not compressed yet counts as if it shrank like the chunks before it.
+
+        Without a chunk before it, it does not count: how much it will shrink is not known.
+        """
+        if self._compression == NONE:
+            return self._position + self.gathered
+        data, stored = self._written
+        return self._position + (self.gathered * stored // data if data else 0)
 
     @property
     def gathered(self) -> int:
@@ -394,6 +402,7 @@ class BagWriter:
             self._put([header, *data, chunk.indexes])
             self.chunks.append(ChunkInfo(self._position, chunk.start, chunk.end, chunk.counts))
             self._position += len(header) + stored + len(chunk.indexes)
+            self._written = self._written[0] + chunk.size, self._written[1] + stored
             self._complete.popleft()
             self._waiting -= chunk.size
 

@@ -362,3 +362,13 @@ def test_any_messages_come_back(
             number == one for one, _, _ in messages
         )
     assert writer.chunks == bag.chunks
+
+
+@pytest.mark.parametrize("compression", [each for each in COMPRESSIONS if each != NONE])
+def test_size_is_that_after_compression(compression: str) -> None:
+    stream = io.BytesIO()
+    writer = BagWriter(stream, chunk_threshold=100_000, compression=compression)
+    number = writer.add_connection("/t", header("/t"))
+    for i in range(95):
+        writer.write(number, i, b"x" * 10_000)
+        assert len(stream.getvalue()) <= writer.size < 20_000
