@@ -104,6 +104,9 @@ class McapWriter:
         if self._gathered > self._chunk_size:
             self._gathered = 0
 
+    def write_ready(self) -> None:
+        """Do nothing: complete chunks are compressed and written immediately."""
+
     def close(self) -> None:
         """Complete the file: write its summary. Idempotent. Raise OSError."""
         if not self._closed:

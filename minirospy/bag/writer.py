@@ -284,6 +284,10 @@ class BagWriter:
         self._waiting += complete.size
         self._write_complete(self._most_waiting)
 
+    def write_ready(self) -> None:
+        """Write the complete chunks whose compression has ended. Raise OSError."""
+        self._write_complete(len(self._complete))
+
     def flush(self) -> None:
         """Write all messages so far into the stream, and flush it. Raise OSError."""
         self.finish_chunk()

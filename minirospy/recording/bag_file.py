@@ -38,6 +38,9 @@ class FileWriter(Protocol):
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
         """Write a message."""
 
+    def write_ready(self) -> None:
+        """Write the complete chunks whose compression has ended."""
+
     def close(self) -> None:
         """Complete the file."""
 
@@ -96,6 +99,11 @@ class BagFile:
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
         self._writer.write(number, time, body, tail)
+
+    def write_ready(self) -> None:
+        """Write what has been compressed since the last message."""
+        if not self._is_closed:
+            self._writer.write_ready()
 
     def close(self) -> None:
         """Complete the file in the disk's thread, behind what is queued."""

@@ -134,8 +134,10 @@ class Recorder:
             if now >= next_space:
                 self._check_space()
                 next_space = now + _SPACE_SECONDS
-            if self.options.max_duration:
-                with self._lock:
+            with self._lock:
+                if self._file:
+                    self._file.write_ready()
+                if self.options.max_duration:
                     self._split(self._clock())
             if self.options.limit:
                 self._end_finished()
@@ -259,6 +261,10 @@ class Recorder:
         if self._announcement:
             self._announcement.publish(self._announcement.data_class(name))
 
+    def _waiting(self, file: BagFile) -> int:
+        """Return how many bytes wait for the disk."""
+        return self._disk.pending + file.gathered
+
     def _close(self) -> None:
         file, self._file = self._file, None
         if file:
@@ -299,10 +305,13 @@ class Recorder:
                 kept = bytes(body) if not isinstance(body, bytes) else body
                 self._latched[topic.name, header.get("callerid", "")] = header, kept, tail
             most = self.options.buffer_size
-            waiting = self._disk.pending + self._file.gathered
-            if most and waiting and waiting + len(body) + len(tail) > most:
-                self.dropped[topic.name] += 1
-                return
+            size = len(body) + len(tail)
+            if most and self._waiting(self._file) + size > most:
+                # Chunks that have been compressed wait for the next message.
+                self._file.write_ready()
+                if (waiting := self._waiting(self._file)) and waiting + size > most:
+                    self.dropped[topic.name] += 1
+                    return
             try:
                 self._file.write(topic.name, header, now, body, tail)
             except BagFormatError as error:

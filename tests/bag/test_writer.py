@@ -372,3 +372,15 @@ def test_size_is_that_after_compression(compression: str) -> None:
     for i in range(95):
         writer.write(number, i, b"x" * 10_000)
         assert len(stream.getvalue()) <= writer.size < 20_000
+
+
+def test_chunk_that_has_been_compressed_is_written_without_another_message() -> None:
+    stream = io.BytesIO()
+    with ThreadPoolExecutor(1) as executor:
+        writer = BagWriter(
+            stream, chunk_threshold=0, compression=BZ2, executor=executor, most_waiting=sys.maxsize
+        )
+        writer.write(writer.add_connection("/t", header("/t")), 1, b"x" * 1000)
+    writer.write_ready()
+    assert writer.gathered == 0
+    assert b"BZh9" in stream.getvalue()

@@ -122,6 +122,22 @@ def test_limit_ends_the_recording(talker: Talker, start: Start, tmp_path: Path) 
     assert [said(one.body) for one in messages(tmp_path / "out.bag")] == ["0", "1", "2"]
 
 
+def test_compressed_message_reaches_the_disk_without_another(
+    talker: Talker, start: Start, tmp_path: Path
+) -> None:
+    chatter = talker.advertise("/chatter")
+    # A buffer that one message fills: nothing else would be recorded while it waited.
+    process = start("record", "-j", "-b", "1", "--chunksize", "0", "-O", "out", "/chatter")
+    connected(chatter)
+    for i in range(3):
+        say(chatter, f"{i}" + "x" * 1_000_000)
+        wait_until(lambda: (tmp_path / "out.bag.active").read_bytes().count(b"BZh9") == i + 1)  # noqa: B023
+    status, _, errors = end(process)
+
+    assert (status, errors) == (0, "")
+    assert [said(one.body)[0] for one in messages(tmp_path / "out.bag")] == ["0", "1", "2"]
+
+
 def test_split_by_size_repeats_the_latest_latched_message(
     talker: Talker, start: Start, tmp_path: Path
 ) -> None:
