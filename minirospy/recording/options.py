@@ -18,7 +18,7 @@ MEGABYTE = 1024 * 1024
 _SECOND = 10**9
 _FOREVER = 1e12
 _UNITS = {"s": 1, "m": 60, "h": 3600}
-_MULTIPLIERS = {"k": 10**3, "M": 10**6, "G": 10**9}
+_MULTIPLIERS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30}
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
@@ -41,7 +41,7 @@ class RecordOptions(NamedTuple):
     chunk_size: int = 768 * KILOBYTE
     limit: int = 0
     """Messages of each topic."""
-    min_space: int = 10**9
+    min_space: int = 2**30
     min_space_text: str = "1G"
     compression: str = "none"
     tcp_nodelay: bool = False
@@ -75,10 +75,10 @@ def parse_duration(text: str) -> int:
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes of ``1G``, ``500M``, ``20k`` or ``1000``: powers of 1000. Raise UsageError."""
+    """Return the bytes of ``1G``, ``500M``, ``20k`` or ``1000``: powers of 1024. Raise UsageError."""
     number = re.match(r"\s*\d+", text)
-    multiplier = _MULTIPLIERS.get(text[number.end() : number.end() + 1], 1) if number else 0
-    if not number:
+    multiplier = _MULTIPLIERS.get(text[number.end() :].lower()) if number else None
+    if not number or not multiplier:
         raise UsageError(f"the size {text!r} must be a number with G, M or k behind it")
     return int(number[0]) * multiplier
 

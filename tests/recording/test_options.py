@@ -42,15 +42,17 @@ def test_bad_durations_are_refused_in_the_words_of_ros(text: str, why: str) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "size"), [("1G", 10**9), ("500M", 5 * 10**8), ("20k", 20_000), ("1000", 1000)]
+    ("text", "size"),
+    [("1G", 2**30), ("2g", 2**31), ("500M", 500 * 2**20), ("20k", 20_480), ("1000", 1000), ("0", 0)],
 )
 def test_sizes(text: str, size: int) -> None:
     assert parse_size(text) == size
 
 
-def test_a_size_needs_a_number() -> None:
-    with pytest.raises(UsageError, match="'lots'"):
-        parse_size("lots")
+@pytest.mark.parametrize("text", ["lots", "5X", "1GB", "-1G", ""])
+def test_size_needs_a_number_and_a_known_unit(text: str) -> None:
+    with pytest.raises(UsageError, match=f"the size '{text}' must be"):
+        parse_size(text)
 
 
 def test_expressions_match_whole_names() -> None:

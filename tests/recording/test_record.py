@@ -305,6 +305,8 @@ def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Pa
     [
         ([], 2, "You must specify a topic name or else use the '-a' option."),
         (["--split", "/a"], 2, "Split specified without giving a maximum duration or size"),
+        (["a topic"], 2, "'a topic' is not a legal name of a topic: letters, digits, _ and /"),
+        (["-L", "5X", "/a"], 2, "the size '5X' must be a number with G, M or k behind it"),
         (["-b", "-1", "/a"], 2, "Buffer size must be 0 or positive"),
         (["-a", "-l", "2"], 2, "Specifying a count is not valid with automatic topic subscription."),
         (["-j", "--lz4", "/a"], 2, "Can only use one type of compression"),

@@ -132,7 +132,7 @@ def _record(
     mcap: bool,
     zstd: bool,
 ) -> int:
-    from minirospy.names import parse_arguments
+    from minirospy.names import is_legal_name, parse_arguments
     from minirospy.recording.options import MEGABYTE, RecordOptions, parse_duration, parse_size
 
     names = (*parse_arguments(topics).plain, *topic)
@@ -142,6 +142,9 @@ def _record(
     if split and not duration and not size:
         text = "Split specified without giving a maximum duration or size"
         raise Misuse(text, text)
+    for name in names:
+        if not regex and not is_legal_name(name):
+            raise UsageError(f"{name!r} is not a legal name of a topic: letters, digits, _ and /")
     _check_range("Buffer size", buffsize)
     if chunksize is not None:
         _check_range("Chunk size", chunksize)
