@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import sys
+from typing import TextIO
 
-__all__ = ["SafeTerminal", "escaped", "has_controls"]
+__all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
 # Marks that turn the direction of what follows: a name would look like another one.
@@ -33,6 +35,17 @@ def escaped(text: str, keep: str = "") -> str:
 def has_controls(text: str) -> bool:
     """Return whether ``text`` holds a control character or a separator of lines: it is not a name or a URI then."""
     return _NAME_CONTROL.search(text) is not None
+
+
+def own_output() -> TextIO:
+    """Return the standard output for a picture that moves the cursor, which :class:`SafeTerminal` would write out.
+
+    What is foreign in the picture has to be escaped.
+    """
+    if isinstance(sys.stdout, SafeTerminal) and sys.__stdout__ is not None:
+        sys.stdout.flush()
+        return sys.__stdout__
+    return sys.stdout
 
 
 class SafeTerminal(io.TextIOWrapper):

@@ -126,3 +126,24 @@ def test_error_of_a_command_is_escaped_in_a_file_too(capsys: pytest.CaptureFixtu
 
     assert run("t", body) == 1
     assert capsys.readouterr().err == "t: ERROR: topic [x\\x1b[2J] not found\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of Unix")
+def test_picture_on_a_terminal_moves_the_cursor() -> None:
+    import subprocess
+
+    master, slave = os.openpty()
+    code = (
+        "import sys\nfrom rich.console import Console\nfrom minirospy.cli.command import run\n"
+        "from minirospy.escape import own_output\n"
+        "def body():\n    print('a', end='')\n    Console(file=own_output()).show_cursor(False)\n    print('b')\n"
+        "sys.exit(run('t', body))"
+    )
+    environment = {**os.environ, "TERM": "xterm"}
+    subprocess.run([sys.executable, "-c", code], stdout=slave, stderr=slave, env=environment, check=True)
+    os.close(slave)
+    shown = b""
+    while b"\n" not in shown:
+        shown += os.read(master, 4096)
+    os.close(master)
+    assert shown == b"a\x1b[?25lb\r\n"

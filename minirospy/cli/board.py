@@ -13,6 +13,7 @@ from minirospy.cli.command import run
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Family, Verb
 from minirospy.errors import UsageError
+from minirospy.escape import own_output
 from minirospy.gpio.board import Board, BoardState
 from minirospy.gpio.model import BUTTONS, LEDS, Function, Pin, Position, Pull
 from minirospy.gpio.place import Place
@@ -154,7 +155,7 @@ def _show() -> int:
             style="dim",
         )
         shown = None
-        with Keys() as pressed, _drawing(Console()) as draw:
+        with Keys() as pressed, _drawing(Console(file=own_output())) as draw:
             key = ""
             while key not in {"q", "\x04"}:
                 _act(board, key)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
+from minirospy.escape import own_output
 from minirospy.gpio.board import Board
 
 if TYPE_CHECKING:
@@ -195,7 +196,7 @@ class _Picture:
 
         self._board = board
         self._caption = ""
-        self._live = Live(console=Console(), auto_refresh=False)
+        self._live = Live(console=Console(file=own_output()), auto_refresh=False)
 
     def __enter__(self) -> None:
         self._live.__enter__()

@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from minirospy.escape import own_output
+
 if TYPE_CHECKING:
     from types import TracebackType
 
@@ -46,7 +48,7 @@ class LiveTable:
         self._known: dict[int, psutil.Process] = {}
         self._live = Live(
             get_renderable=self._table,
-            console=console or Console(),
+            console=console or Console(file=own_output()),
             refresh_per_second=_PICTURES_A_SECOND,
             vertical_overflow="visible",
         )

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from minirospy import client as rospy
+from minirospy.escape import escaped, own_output
 from minirospy.keyboard import Keys
 from minirospy.robots.joint_publisher import JointPublisher, run_node
 from minirospy.robots.sliders import HINT, Row, Sliders
@@ -58,7 +59,7 @@ def _show(publisher: JointPublisher) -> None:
     from rich.live import Live
 
     sliders = Sliders(publisher.joints.free)
-    console = Console()
+    console = Console(file=own_output())
     shown: list[Row] = []
     with Keys() as keys, Live(console=console, auto_refresh=False) as live:
         key = ""
@@ -84,5 +85,5 @@ def _picture(rows: Sequence[Row]) -> RenderableType:
     for row in rows:
         style = "bold reverse" if row.is_selected else ""
         cells = (">" if row.is_selected else " ", row.name, f"[{row.bar}]", row.text)
-        table.add_row(*(Text(cell, style=style) for cell in cells))
+        table.add_row(*(Text(escaped(cell), style=style) for cell in cells))
     return Group(table, Text(HINT, style="dim"))

@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-from minirospy.escape import escaped
+from minirospy.escape import escaped, own_output
 
 __all__ = ["showing_progress"]
 
@@ -43,7 +43,7 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         TimeRemainingColumn(elapsed_when_finished=True),
     )
     # The bar moves the cursor, which the commands' own stream does not let pass; what is printed goes through that.
-    console = Console(file=sys.__stdout__)
+    console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))
         yield lambda done: progress.update(task, completed=done)
