@@ -175,7 +175,8 @@ def result_of(answer: Any) -> Any:
 def exchange(uri: str, data: bytes) -> bytes:
     """Return what the master answers until it hangs up, or until the answer is whole."""
     port = int(uri.rsplit(":", 1)[1])
-    with socket.create_connection(("127.0.0.1", port), 20) as sock:
+    # To read a million elements takes seconds, and on a busy machine many times as long.
+    with socket.create_connection(("127.0.0.1", port), 100) as sock:
         sock.sendall(data)
         answer = b""
         while more := sock.recv(65536):
