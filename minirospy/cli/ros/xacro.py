@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from minirospy.cli.command import run
-from minirospy.errors import MinirospyError
+from minirospy.errors import MinirospyError, NotFoundError
 
 __all__ = ["main"]
 
@@ -37,6 +37,18 @@ def _xacro(words: Sequence[str]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
         # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as such.
         sys.stdout.reconfigure(encoding="utf-8")
+    evaluate = xacro.eval_extension
+
+    def eval_extension(text: str) -> object:
+        """Evaluate `$(...)`; of a package that is not found, only say that: xacro adds a Python class, and says it twice."""
+        try:
+            return evaluate(text)
+        except xacro.XacroException as error:
+            if isinstance(getattr(error.exc, "__cause__", None), NotFoundError):
+                raise xacro.XacroException(str(error.exc)) from error
+            raise
+
+    xacro.eval_extension = eval_extension
     sys.argv = ["xacro", *(word for word in words if word not in _ALWAYS)]
     try:
         xacro.main()
