@@ -1,0 +1,64 @@
+"""ros_numpy.registry: which function converts which type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+__all__ = ["converts_from_numpy", "converts_to_numpy", "msgify", "numpify"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+_to_numpy: dict[tuple[str, bool], Callable[..., Any]] = {}
+_from_numpy: dict[tuple[str, bool], Callable[..., Any]] = {}
+"""By the name of the type: a message of a bag is of another class. And whether a list of messages is meant."""
+
+
+def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
+    """Return a decorator: the function gets a message of a type, or with ``plural`` a list of them."""
+
+    def register(function: _F) -> _F:
+        _to_numpy[msgtype._type, plural] = function
+        return function
+
+    return register
+
+
+def converts_from_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
+    """Return a decorator: the function gets an array, and returns a message of a type, or a list of them."""
+
+    def register(function: _F) -> _F:
+        _from_numpy[msgtype._type, plural] = function
+        return function
+
+    return register
+
+
+def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
+    """Return a message, or a list of messages, as an array; None for None. Raises ValueError where there is no conversion."""
+    if msg is None:
+        return None
+    plural = isinstance(msg, Sequence)
+    if plural and not msg:
+        raise ValueError("Cannot determine the type of an empty Collection")
+    name = getattr(msg[0] if plural else msg, "_type", None)
+    function = _to_numpy.get((name or "", plural))
+    if function is None:
+        raise ValueError(
+            f"Unable to convert message {name or type(msg).__name__} - only supports {_known(_to_numpy)}"
+        )
+    return function(msg, *args, **kwargs)
+
+
+def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
+    """Return an array as a message of a type, with ``plural`` as a list. Raises ValueError where there is no conversion."""
+    function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
+    if function is None:
+        raise ValueError(
+            f"Unable to build message {getattr(msg_type, '_type', msg_type)} - only supports {_known(_from_numpy)}"
+        )
+    return function(numpy_obj, *args, **kwargs)
+
+
+def _known(table: dict[tuple[str, bool], Callable[..., Any]]) -> str:
+    return ", ".join(f"{name}[]" if plural else name for name, plural in table)

@@ -1,0 +1,11 @@
+"""ros_numpy.image, provided by minirospy. Source: http://wiki.ros.org/ros_numpy."""
+
+from minirospy.compat.ros_numpy.image import (
+    image_to_numpy,
+    numpy_to_image,
+)
+
+__all__ = [
+    "image_to_numpy",
+    "numpy_to_image",
+]

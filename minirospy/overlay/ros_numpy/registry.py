@@ -1,0 +1,15 @@
+"""ros_numpy.registry, provided by minirospy. Source: http://wiki.ros.org/ros_numpy."""
+
+from minirospy.compat.ros_numpy.registry import (
+    converts_from_numpy,
+    converts_to_numpy,
+    msgify,
+    numpify,
+)
+
+__all__ = [
+    "converts_from_numpy",
+    "converts_to_numpy",
+    "msgify",
+    "numpify",
+]
