@@ -9,7 +9,7 @@ from collections.abc import Callable
 from minirospy.bag.mcap_writer import McapWriter
 from minirospy.bag.writer import BagWriter
 from minirospy.errors import BagError, UsageError
-from minirospy.introspect.bags import open_reader
+from minirospy.introspect.bags import naming_full_disk, open_reader
 
 __all__ = ["convert"]
 
@@ -20,6 +20,8 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
     ``step`` is called with the bytes of messages that are done. ``force``: replace a file. A file that was not completed is
     removed. Raise UsageError if ``target`` exists, BagError, OSError.
     """
+    if not target.endswith((".bag", ".mcap")):
+        raise UsageError(f"{target} must end with .bag or .mcap")
     if os.path.exists(target) and not force:
         raise UsageError(f"{target} exists already: remove it, or add -f")
     if os.path.exists(target) and os.path.samefile(source, target):
@@ -30,7 +32,7 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
     with open_reader(source) as reader:
         reader.prepare()
         try:
-            with open(partial, "w+b", buffering=0) as stream:
+            with naming_full_disk(target), open(partial, "w+b", buffering=0) as stream:
                 is_mcap = target.endswith(".mcap")
                 writer: BagWriter | McapWriter = (
                     McapWriter(stream, compression=compression)

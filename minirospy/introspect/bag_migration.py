@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from minirospy.bag.compression import NONE
-from minirospy.introspect.bags import class_of_connection, new_bag, open_reader
+from minirospy.introspect.bags import class_of_connection, naming_full_disk, new_bag, open_reader
 from minirospy.introspect.migration import MessageMigrator, Migration
 from minirospy.introspect.migration_rules import MessageClass, get_message_key
 
@@ -51,7 +51,7 @@ def fix_bag(
     missing = [each for each in check_bag(migrator, source, warn) if each.missing]
     if missing and not force:
         return missing
-    with open_reader(source) as reader, new_bag(target, NONE) as writer:
+    with open_reader(source) as reader, naming_full_disk(target), new_bag(target, NONE) as writer:
         connections = list(reader.connections.values())
         classes: dict[int, tuple[MessageClass, MessageClass]] = {}
         numbers: dict[int, int] = {}

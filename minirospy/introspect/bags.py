@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import errno
 import os
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
@@ -35,6 +36,7 @@ __all__ = [
     "copy_bag",
     "data_size",
     "filter_bag",
+    "naming_full_disk",
     "new_bag",
     "open_reader",
     "reindex",
@@ -172,7 +174,11 @@ def filter_bag(
     """
     needs_message = keep.needs_message or (show is not None and show.needs_message)
     kept = read = done = 0
-    with open_reader(source) as reader, new_bag(target, compressions.NONE) as writer:
+    with (
+        open_reader(source) as reader,
+        naming_full_disk(target),
+        new_bag(target, compressions.NONE) as writer,
+    ):
         numbers: dict[int, int] = {}
         classes: dict[int, type[Message]] = {}
         connections = list(reader.connections.values())
@@ -245,6 +251,18 @@ def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
             writer.close()
             raise
         writer.close()
+
+
+@contextlib.contextmanager
+def naming_full_disk(path: str) -> Iterator[None]:
+    """Add the name of the file that is written to the OSError of a disk, or a quota, that is full."""
+    try:
+        yield
+    except OSError as error:
+        full = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
+        if error.errno in full and error.filename is None:
+            error.filename = path
+        raise
 
 
 def _add(writer: BagWriter, connection: Connection) -> int:

@@ -298,3 +298,21 @@ def test_terminal_shows_a_bar(bag: Path) -> None:
     assert b"\x1b[" in shown
     assert b"\\x1b" not in shown
     assert compressions(bag) == {"bz2"}
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="Linux has a disk that is full")
+def test_full_disk_is_named_by_filter_and_fix(bag: Path, command: Command) -> None:
+    os.symlink("/dev/full", "full.bag")
+    os.symlink("/dev/full", "fixed.bag.tmp")
+    wrong = "ERROR: {}: No space left on device\n"
+
+    status, _, err = command("rosbag", "filter", "a.bag", "full.bag", "True")
+    assert (status, err) == (1, "rosbag: " + wrong.format("full.bag"))
+    status, _, err = command("rosbag", "fix", "a.bag", "fixed.bag")
+    assert (status, err) == (1, "rosbag: " + wrong.format("fixed.bag"))
+
+
+def test_convert_refuses_a_name_of_neither_format(bag: Path, command: Command) -> None:
+    status, _, err = command("rosbag", "convert", "-q", "a.bag", "b.txt")
+    assert (status, err) == (2, "rosbag: ERROR: b.txt must end with .bag or .mcap\n")
+    assert not os.path.exists("b.txt")

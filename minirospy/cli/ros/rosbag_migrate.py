@@ -189,6 +189,9 @@ def _fix(words: list[str], noplugins: bool, force: bool) -> int:
         if not missing:
             os.replace(temporary, target)
     except (BagError, OSError) as error:
+        if isinstance(error, OSError) and error.filename == temporary:
+            error.filename = target
+            raise
         report(unreadable(source, error))
         return 0 if isinstance(error, BagEncryptedError) else 1
     except (BagMigrationException, MessageException) as error:
