@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from minirospy.compat.tf.euler import EPSILON, euler_matrix
 from minirospy.compat.tf.vectors import (
@@ -21,6 +22,9 @@ from minirospy.compat.tf.vectors import (
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
+
+    Floats: TypeAlias = NDArray[numpy.float64]
+    """Vectors and matrices."""
 
 __all__ = [
     "Arcball",
@@ -36,19 +40,21 @@ __all__ = [
     "superimposition_matrix",
 ]
 
+_Axis = TypeVar("_Axis", bound="ArrayLike")
 
-def concatenate_matrices(*matrices: ArrayLike) -> NDArray[numpy.float64]:
+
+def concatenate_matrices(*matrices: ArrayLike) -> Floats:
     """Return the product of matrices: the last is done first."""
     import numpy
 
     return functools.reduce(numpy.dot, matrices, numpy.identity(4))
 
 
-def inverse_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
+def inverse_matrix(matrix: ArrayLike) -> Floats:
     """Return the inverse. Raise LinAlgError."""
     import numpy
 
-    inverse: NDArray[numpy.float64] = numpy.linalg.inv(numpy.asarray(matrix))
+    inverse: Floats = numpy.linalg.inv(numpy.asarray(matrix))
     return inverse
 
 
@@ -60,7 +66,7 @@ def is_same_transform(matrix0: ArrayLike, matrix1: ArrayLike) -> bool:
     return bool(numpy.allclose(first / first[3, 3], second / second[3, 3]))
 
 
-def decompose_matrix(matrix: ArrayLike) -> tuple[Any, Any, Any, Any, Any]:
+def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float], Floats, Floats]:
     """Return scale, shear (x-y, x-z, y-z), angles about the static axes, translation and perspective.
 
     Raise ValueError where the matrix cannot be taken apart. Source: Thomas, "Decomposing a matrix into simple
@@ -118,7 +124,7 @@ def compose_matrix(
     angles: ArrayLike | None = None,
     translate: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
-) -> NDArray[numpy.float64]:
+) -> Floats:
     """Return the matrix of what :func:`decompose_matrix` returns."""
     import numpy
 
@@ -144,7 +150,7 @@ def compose_matrix(
     return matrix
 
 
-def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> NDArray[numpy.float64]:
+def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
     """Return the matrix from a crystal cell's coordinates to orthogonal ones; angles in degrees."""
     import numpy
 
@@ -165,7 +171,7 @@ def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> NDArray[n
 
 def superimposition_matrix(
     v0: ArrayLike, v1: ArrayLike, scaling: bool = False, usesvd: bool = True
-) -> NDArray[numpy.float64]:
+) -> Floats:
     r"""Return the rotation, translation and, on demand, scaling that moves points ``v0`` nearest to ``v1``.
 
     Both have the shape (3, \*) or (4, \*), three points at least. By Kabsch's method of singular values (1976), or by Horn's
@@ -197,7 +203,7 @@ def superimposition_matrix(
     return matrix
 
 
-def _horn(first: NDArray[numpy.float64], second: NDArray[numpy.float64]) -> NDArray[numpy.float64]:
+def _horn(first: Floats, second: Floats) -> Floats:
     """Return the quaternion of the best rotation: the eigenvector of the largest eigenvalue of Horn's matrix."""
     import numpy
 
@@ -213,7 +219,7 @@ def _horn(first: NDArray[numpy.float64], second: NDArray[numpy.float64]) -> NDAr
     )
     values, vectors = numpy.linalg.eigh(n)
     w, x, y, z = vectors[:, values.argmax()]
-    return unit_vector((x, y, z, w))  # type: ignore[no-any-return]
+    return unit_vector((x, y, z, w))
 
 
 class Arcball:
@@ -225,10 +231,10 @@ class Arcball:
 
         from minirospy.compat.tf.vectors import quaternion_from_matrix
 
-        self._axes: list[Any] | None = None
-        self._axis: Any = None
+        self._axes: list[Floats] | None = None
+        self._axis: Floats | None = None
         self._radius = 1.0
-        self._center: Any = [0.0, 0.0]
+        self._center: ArrayLike = [0.0, 0.0]
         self._vdown = numpy.array([0.0, 0.0, 1.0])
         self._constrain = False
         if initial is None:
@@ -294,12 +300,12 @@ class Arcball:
             quaternion_slerp(self._qpre, self._qnow, 2.0 + acceleration, 0, False),
         )
 
-    def matrix(self) -> NDArray[numpy.float64]:
+    def matrix(self) -> Floats:
         """Return the rotation as a 4x4 matrix."""
         return quaternion_matrix(self._qnow)
 
 
-def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> NDArray[numpy.float64]:
+def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> Floats:
     """Return the point of the unit sphere under a point of the window; beside the ball, that of its rim."""
     import numpy
 
@@ -312,7 +318,7 @@ def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) ->
     return numpy.array((x, y, math.sqrt(1.0 - square)))
 
 
-def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> NDArray[numpy.float64]:
+def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> Floats:
     """Return the point of the sphere at right angles to an axis that is nearest to a point."""
     import numpy
 
@@ -327,10 +333,10 @@ def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> NDArray[nump
         return moved
     if along[2] == 1.0:
         return numpy.array([1.0, 0.0, 0.0])
-    return unit_vector([-along[1], along[0], 0.0])  # type: ignore[no-any-return]
+    return unit_vector([-along[1], along[0], 0.0])
 
 
-def arcball_nearest_axis(point: ArrayLike, axes: Any) -> Any:
+def arcball_nearest_axis(point: ArrayLike, axes: Iterable[_Axis]) -> _Axis:
     """Return that of the axes whose circle is nearest to a point."""
     import numpy
 

@@ -6,7 +6,7 @@ What needs matrices imports numpy when it is called.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import geometry_msgs.msg
 import sensor_msgs.msg
@@ -35,15 +35,16 @@ __all__ = [
 
 Tuples = tuple[list[float], list[float]]
 Vector = tuple[float, float, float]
+_Point: TypeAlias = "geometry_msgs.msg.Point | geometry_msgs.msg.Point32 | geometry_msgs.msg.Vector3"
 _WITHOUT_THREAD = "cannot wait for transform without a dedicated thread that listens to incoming TF messages"
 
 
-def xyz_to_mat44(pos: Any) -> NDArray[numpy.float64]:
+def xyz_to_mat44(pos: _Point) -> NDArray[numpy.float64]:
     """Return the 4x4 matrix of a Point or Vector3."""
     return transformations.translation_matrix((pos.x, pos.y, pos.z))
 
 
-def xyzw_to_mat44(ori: Any) -> NDArray[numpy.float64]:
+def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
     """Return the 4x4 matrix of a Quaternion message."""
     return transformations.quaternion_matrix((ori.x, ori.y, ori.z, ori.w))
 
@@ -342,7 +343,7 @@ def _header(frame: str, header: Header) -> Header:
     return Header(stamp=header.stamp, frame_id=frame)
 
 
-def _moved(matrix: NDArray[numpy.float64], point: Any) -> list[float]:
+def _moved(matrix: NDArray[numpy.float64], point: _Point) -> list[float]:
     import numpy
 
     moved: list[float] = numpy.dot(matrix, (point.x, point.y, point.z, 1.0))[:3].tolist()

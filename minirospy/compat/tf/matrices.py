@@ -6,7 +6,7 @@ A plane is given by a point and a normal. numpy is imported when a function is c
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from minirospy.compat.tf.euler import EPSILON
 from minirospy.compat.tf.vectors import unit_vector, vector_norm
@@ -14,6 +14,9 @@ from minirospy.compat.tf.vectors import unit_vector, vector_norm
 if TYPE_CHECKING:
     import numpy
     from numpy.typing import ArrayLike, NDArray
+
+    Floats: TypeAlias = NDArray[numpy.float64]
+    """Vectors and matrices."""
 
 __all__ = [
     "clip_matrix",
@@ -35,14 +38,14 @@ __all__ = [
 _NEAR = 1e-8
 
 
-def identity_matrix() -> NDArray[numpy.float64]:
+def identity_matrix() -> Floats:
     """Return the 4x4 identity."""
     import numpy
 
     return numpy.identity(4, dtype=numpy.float64)
 
 
-def translation_matrix(direction: ArrayLike) -> NDArray[numpy.float64]:
+def translation_matrix(direction: ArrayLike) -> Floats:
     """Return the matrix that moves by a vector."""
     import numpy
 
@@ -51,15 +54,15 @@ def translation_matrix(direction: ArrayLike) -> NDArray[numpy.float64]:
     return matrix
 
 
-def translation_from_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
+def translation_from_matrix(matrix: ArrayLike) -> Floats:
     """Return the vector that a matrix moves by."""
     import numpy
 
-    moved: NDArray[numpy.float64] = numpy.array(matrix)[:3, 3].copy()
+    moved: Floats = numpy.array(matrix)[:3, 3].copy()
     return moved
 
 
-def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> NDArray[numpy.float64]:
+def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> Floats:
     """Return the matrix that mirrors at a plane."""
     import numpy
 
@@ -70,7 +73,7 @@ def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> NDArray[numpy.floa
     return matrix
 
 
-def reflection_from_matrix(matrix: ArrayLike) -> tuple[Any, Any]:
+def reflection_from_matrix(matrix: ArrayLike) -> tuple[Floats, Floats]:
     """Return a point and the normal of the plane that a matrix mirrors at. Raise ValueError."""
     import numpy
 
@@ -80,9 +83,7 @@ def reflection_from_matrix(matrix: ArrayLike) -> tuple[Any, Any]:
     return point / point[3], normal
 
 
-def rotation_matrix(
-    angle: float, direction: ArrayLike, point: ArrayLike | None = None
-) -> NDArray[numpy.float64]:
+def rotation_matrix(angle: float, direction: ArrayLike, point: ArrayLike | None = None) -> Floats:
     """Return the matrix that turns by ``angle`` radians about an axis, which passes through ``point``."""
     import numpy
 
@@ -98,7 +99,7 @@ def rotation_matrix(
     return matrix
 
 
-def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any]:
+def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
     """Return the angle, the axis, and a point of the axis. Raise ValueError."""
     import numpy
 
@@ -120,7 +121,7 @@ def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any]:
 
 def scale_matrix(
     factor: float, origin: ArrayLike | None = None, direction: ArrayLike | None = None
-) -> NDArray[numpy.float64]:
+) -> Floats:
     """Return the matrix that scales about ``origin``, in all directions or along one; -1: point symmetry."""
     import numpy
 
@@ -138,7 +139,7 @@ def scale_matrix(
     return matrix
 
 
-def scale_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any]:
+def scale_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats | None]:
     """Return the factor, the origin and the direction (None: all) of a scaling. Raise ValueError."""
     import numpy
 
@@ -162,7 +163,7 @@ def projection_matrix(
     direction: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
     pseudo: bool = False,
-) -> NDArray[numpy.float64]:
+) -> Floats:
     """Return the matrix that projects onto a plane: from a perspective point, along a direction, or at right angles.
 
     ``pseudo``: a perspective projection keeps the relative depths.
@@ -195,7 +196,9 @@ def projection_matrix(
     return matrix
 
 
-def projection_from_matrix(matrix: ArrayLike, pseudo: bool = False) -> tuple[Any, Any, Any, Any, bool]:
+def projection_from_matrix(
+    matrix: ArrayLike, pseudo: bool = False
+) -> tuple[Floats, Floats, Floats | None, Floats | None, bool]:
     """Return the arguments of :func:`projection_matrix` that make the matrix. Raise ValueError."""
     import numpy
 
@@ -225,7 +228,7 @@ def projection_from_matrix(matrix: ArrayLike, pseudo: bool = False) -> tuple[Any
 
 def clip_matrix(
     left: float, right: float, bottom: float, top: float, near: float, far: float, perspective: bool = False
-) -> NDArray[numpy.float64]:
+) -> Floats:
     """Return the matrix from a view's volume to the cube from -1 to 1; ``perspective``: from a frustum. Raise ValueError."""
     import numpy
 
@@ -253,9 +256,7 @@ def clip_matrix(
     )
 
 
-def shear_matrix(
-    angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike
-) -> NDArray[numpy.float64]:
+def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike) -> Floats:
     """Return the matrix that shears by ``angle`` radians along a direction in a plane.
 
     Raise ValueError where the direction is not in the plane.
@@ -273,7 +274,7 @@ def shear_matrix(
     return matrix
 
 
-def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any, Any]:
+def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]:
     """Return the angle, the direction, a point and the normal of the plane. Raise ValueError."""
     import numpy
 
@@ -283,7 +284,7 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any, Any]:
     if len(found) < 2:
         raise ValueError(f"no two linear independent eigenvectors found {values}")
     in_plane = numpy.real(vectors[:, found]).squeeze().T
-    normal: Any = None
+    normal = numpy.zeros(3)
     longest = -1.0
     for first, second in ((0, 1), (0, 2), (1, 2)):
         if second >= len(in_plane):
@@ -300,7 +301,7 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Any, Any, Any]:
     return math.atan(slope), direction / slope, point / point[3], normal
 
 
-def _eigenvector(matrix: Any, value: float, missing: str, *, last: bool = True) -> Any:
+def _eigenvector(matrix: Floats, value: float, missing: str, *, last: bool = True) -> Floats:
     """Return the real part of the last (or first) eigenvector of an eigenvalue. Raise ValueError(missing)."""
     import numpy
 

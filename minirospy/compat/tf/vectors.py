@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, overload
 
 from minirospy.compat.tf.euler import EPSILON, rotation_rows
 
@@ -42,6 +43,14 @@ def vector_norm(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.flo
     return None
 
 
+@overload
+def unit_vector(data: ArrayLike, axis: int | None = None, out: None = None) -> NDArray[numpy.float64]: ...
+@overload
+def unit_vector(data: ArrayLike, axis: int | None = None, *, out: NDArray[numpy.float64]) -> None: ...
+@overload
+def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) -> None: ...
+
+
 def unit_vector(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
     """Return vectors divided by their lengths; with ``out``, put them there and return None."""
     import numpy
@@ -58,7 +67,7 @@ def unit_vector(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.flo
     return None
 
 
-def random_vector(size: Any) -> NDArray[numpy.float64]:
+def random_vector(size: int | Sequence[int]) -> NDArray[numpy.float64]:
     """Return random numbers from 0 to below 1 in the given shape."""
     import numpy
 
