@@ -13,7 +13,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import islice, pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from genpy import Message
 from sensor_msgs.msg import PointCloud2, PointField
@@ -21,6 +21,9 @@ from std_msgs.msg import Header
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    Values: TypeAlias = NDArray[Any]
+    """The values of points, of any of the types that fields have."""
 
 __all__ = [
     "create_cloud",
@@ -113,7 +116,7 @@ def read_points_numpy(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] | None = None,
     reshape_organized_cloud: bool = False,
-) -> NDArray[Any]:
+) -> Values:
     """Return the points as an array of shape (points, values), in the order of ``field_names``.
 
     With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
@@ -143,7 +146,7 @@ def read_points_numpy(
 
 
 def create_cloud(
-    header: Header, fields: Sequence[PointField], points: Sequence[Iterable[Any]] | NDArray[Any]
+    header: Header, fields: Sequence[PointField], points: Sequence[Iterable[float]] | Values
 ) -> PointCloud2:
     """Return a cloud of these points, each with one value for each of its fields; an array's rows are points.
 
@@ -170,7 +173,7 @@ def create_cloud(
     )
 
 
-def create_cloud_xyz32(header: Header, points: Sequence[Iterable[float]] | NDArray[Any]) -> PointCloud2:
+def create_cloud_xyz32(header: Header, points: Sequence[Iterable[float]] | Values) -> PointCloud2:
     """Return a cloud of points with x, y and z as 32 bit floats. Raises struct.error."""
     return create_cloud(
         header, [PointField(name, 4 * at, PointField.FLOAT32, 1) for at, name in enumerate("xyz")], points
@@ -256,7 +259,7 @@ def _without_nans(
         yield chunk if good.all() else np.frombuffer(chunk, f"V{step}")[good].data.cast("B")
 
 
-def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> NDArray[Any]:
+def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
     """Return an array of shape (height, width, values)."""
     import numpy as np
 
@@ -282,7 +285,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> NDArray[Any]:
     strides = cloud.row_step, cloud.point_step
     if len(dtypes) == 1 and len(steps) <= 1:
         step = steps.pop() if steps else 0
-        view: NDArray[Any] = np.ndarray(
+        view: Values = np.ndarray(
             (*shape, len(values)), dtypes.pop(), cloud.data, values[0][1], (*strides, step)
         )
         return view

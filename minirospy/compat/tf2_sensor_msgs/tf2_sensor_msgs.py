@@ -5,7 +5,7 @@ Importing it registers PointCloud2 with tf2_ros. numpy is imported by the first 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import PointCloud2, PointField
@@ -72,7 +72,7 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
     order = ">" if cloud.is_bigendian else "<"
     known = [field for field in cloud.fields if field.datatype in _FORMATS]
     try:
-        layout: Any = numpy.dtype(
+        layout: numpy.dtype[numpy.void] = numpy.dtype(
             {
                 "names": [field.name for field in known],
                 "formats": [_format(order, field) for field in known],
@@ -87,7 +87,7 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
     return numpy.ascontiguousarray(rows).reshape(-1).view(layout)
 
 
-def _format(order: str, field: PointField) -> Any:
+def _format(order: str, field: PointField) -> str | tuple[str, tuple[int]]:
     kind = order + _FORMATS[field.datatype]
     return (kind, (field.count,)) if field.count > 1 else kind
 
