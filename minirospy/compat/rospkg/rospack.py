@@ -42,7 +42,7 @@ class ManifestManager:
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
         self._tree = Dependencies(Packages.below(*map(Path, self._ros_paths)), os.environ)
-        self._custom: dict[Hashable, Any] = {}
+        self._custom: dict[Hashable, object] = {}
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:

@@ -9,6 +9,7 @@ from minirospy.compat.rospy_message_converter.message_converter import (
     convert_dictionary_to_ros_message,
     convert_ros_message_to_dictionary,
 )
+from minirospy.idl.protocols import Message
 
 __all__ = ["convert_json_to_ros_message", "convert_ros_message_to_json"]
 
@@ -32,6 +33,6 @@ def convert_json_to_ros_message(
     )
 
 
-def convert_ros_message_to_json(message: Any, binary_array_as_bytes: bool = True) -> str:
+def convert_ros_message_to_json(message: Message, binary_array_as_bytes: bool = True) -> str:
     """Return the fields of a message as a JSON object."""
     return json.dumps(convert_ros_message_to_dictionary(message, binary_array_as_bytes))

@@ -13,6 +13,7 @@ from typing import Any
 
 from minirospy import client as rospy
 from minirospy.idl.load import message_class, service_class
+from minirospy.idl.protocols import Message
 
 __all__ = ["convert_dictionary_to_ros_message", "convert_ros_message_to_dictionary"]
 
@@ -36,7 +37,7 @@ _LOGGERS: dict[str, Callable[[str], object]] = {
 
 def convert_dictionary_to_ros_message(
     message_type: str,
-    dictionary: Mapping[str, Any],
+    dictionary: Mapping[str, object],
     kind: str = "message",
     strict_mode: bool = True,
     check_missing_fields: bool = False,
@@ -50,7 +51,7 @@ def convert_dictionary_to_ros_message(
     another type TypeError. Raises NotFoundError where the type is unknown.
     """
     if kind == "message":
-        message: Any = message_class(message_type)()
+        message = message_class(message_type)()
     elif kind in ("request", "response"):
         service = service_class(message_type)
         message = (service._request_class if kind == "request" else service._response_class)()
@@ -72,7 +73,9 @@ def convert_dictionary_to_ros_message(
     return message
 
 
-def convert_ros_message_to_dictionary(message: Any, binary_array_as_bytes: bool = True) -> dict[str, Any]:
+def convert_ros_message_to_dictionary(
+    message: Message, binary_array_as_bytes: bool = True
+) -> dict[str, object]:
     """Return the fields of a message as a dict; with ``binary_array_as_bytes`` arrays of bytes are base64 texts, else lists."""
     return {
         name: _from_ros(type_, getattr(message, name), binary_array_as_bytes)
@@ -80,7 +83,7 @@ def convert_ros_message_to_dictionary(message: Any, binary_array_as_bytes: bool 
     }
 
 
-def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> Any:
+def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
     """Return a value of a dict as a field has it. Raises TypeError, ValueError."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
@@ -114,7 +117,7 @@ def _bytes_of(name: str, value: Any) -> bytes:
         raise ValueError(f"Field '{name}' is not an array of bytes: {error}") from error
 
 
-def _time_of(name: str, type_: str, value: Any) -> Any:
+def _time_of(name: str, type_: str, value: object) -> object:
     if type_ == "time" and isinstance(value, str) and value == "now":
         return rospy.get_rostime()
     if not isinstance(value, Mapping):
@@ -123,7 +126,7 @@ def _time_of(name: str, type_: str, value: Any) -> Any:
     return made(int(value.get("secs", 0)), int(value.get("nsecs", 0)))
 
 
-def _from_ros(type_: str, value: Any, as_text: bool) -> Any:
+def _from_ros(type_: str, value: Any, as_text: bool) -> object:
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             data = bytes(value)
