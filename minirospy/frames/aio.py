@@ -231,7 +231,7 @@ class Broadcaster:
 
 async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
     """Return when the event is set, or the future is done."""
-    arrival: asyncio.Future[Any] = asyncio.ensure_future(changed.wait())
+    arrival = asyncio.ensure_future(changed.wait())
     waits: list[asyncio.Future[Any]] = [arrival, end]
     try:
         await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)

@@ -12,7 +12,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.introspect.migration_plugins import plugin_rule_files
 from minirospy.introspect.migration_rules import (
@@ -256,7 +256,7 @@ class MessageMigrator:
 
     def _load(self, path: Path, name: str) -> None:
         """Execute a rule file, which is Python, and add its rules."""
-        scope: dict[str, Any] = {"MessageUpdateRule": MessageUpdateRule}
+        scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)
         except Exception as error:  # noqa: BLE001 the program of a user: what it raises concerns this file alone

@@ -6,7 +6,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.cli.command import complain
 from minirospy.cli.parser import Misuse, Parser
@@ -15,6 +15,7 @@ from minirospy.cli.verbs import Verb
 from minirospy.errors import BagEncryptedError, BagError, MessageException, MinirospyError
 
 if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
     from minirospy.introspect.migration import MessageMigrator, Migration
     from minirospy.introspect.migration_rules import MessageUpdateRule
 
@@ -127,7 +128,7 @@ def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpd
     return 0
 
 
-def _ask_new_class(old_type: str) -> Any:
+def _ask_new_class(old_type: str) -> type[Message] | None:
     """Return the class of the type that is typed; None at the end of the input."""
     from minirospy.idl.load import get_message_class
 
@@ -234,7 +235,7 @@ def print_migrations(migrations: Sequence[Migration]) -> list[MessageUpdateRule]
     return rules
 
 
-def _print_change(old: Any, new: Any, indent: int) -> None:
+def _print_change(old: type[Message], new: type[Message] | None, indent: int) -> None:
     print("    " * indent + f" * From: {old._type} [{old._md5sum}]")
     print("    " * indent + "   To:   " + (f"{new._type} [{new._md5sum}]" if new else "Unknown"))
 

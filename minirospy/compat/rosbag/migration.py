@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy.compat.rosbag.exceptions import as_ros_errors
 from minirospy.introspect.bag_migration import check_bag, check_classes, fix_bag
@@ -24,6 +24,9 @@ from minirospy.introspect.migration_rules import (
     migration_default_value,
     qualified_name,
 )
+
+if TYPE_CHECKING:
+    from minirospy.idl.protocols import Message
 
 __all__ = [
     "BagMigrationException",
@@ -50,7 +53,7 @@ def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
         return check_bag(migrator, inbag, _warn)
 
 
-def checkmessages(migrator: MessageMigrator, messages: Iterable[Any]) -> list[Migration]:
+def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
     """Return the same for message classes."""
     return check_classes(migrator, messages)
 
