@@ -10,7 +10,7 @@ import threading
 import time
 import unittest
 from collections.abc import Callable, Container
-from typing import Any
+from typing import Any, TypeAlias
 
 from minirospy import client as rospy
 from minirospy.environment import Environment
@@ -24,6 +24,9 @@ __all__ = ["AdvertiseTest", "HzTest", "ParamTest", "PublishTest", "SubscribeTest
 _WAIT_SECONDS = 20.0
 _POLL_SECONDS = 0.1
 _UNSET = object()
+
+_Item: TypeAlias = dict[str, Any]
+"""An item of a parameter that is a list: a name, and what is to hold of it."""
 
 
 def main(name: str) -> None:
@@ -63,7 +66,7 @@ class _NodeTest(unittest.TestCase):
             self.fail(f"bad parameter ({name}): [{value}] is not a number of seconds")
         return float(value)
 
-    def listed(self, name: str) -> list[dict[str, Any]]:
+    def listed(self, name: str) -> list[_Item]:
         """Return a private parameter that is a list of dictionaries, each with a name."""
         value = self.param(name, [])
         if not isinstance(value, list) or not all(
@@ -72,7 +75,7 @@ class _NodeTest(unittest.TestCase):
             self.fail(f"bad parameter ({name}): it is a list as [{{name: /chatter, timeout: 5}}]")
         return [{**each, "name": rospy.resolve_name(str(each["name"]))} for each in value]
 
-    def limits(self, name: str) -> list[tuple[str, float, bool, dict[str, Any]]]:
+    def limits(self, name: str) -> list[tuple[str, float, bool, _Item]]:
         """(name, timeout, negative, all) of such a list, the shortest timeout first."""
         found = [
             (each["name"], float(each.get("timeout", _WAIT_SECONDS)), bool(each.get("negative")), each)
@@ -156,9 +159,7 @@ class _GraphTest(_NodeTest):
         self.master = MasterProxy(Environment.read().master_uri, rospy.get_name())
         self.addCleanup(self.master.close)
 
-    def check(
-        self, parameter: str, known: Callable[[SystemState], Container[str]], text: str
-    ) -> list[dict[str, Any]]:
+    def check(self, parameter: str, known: Callable[[SystemState], Container[str]], text: str) -> list[_Item]:
         """Wait for each name of a list, the shortest timeout first; those that came."""
         started = time.monotonic()
         came = []
