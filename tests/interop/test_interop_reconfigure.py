@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -140,6 +141,54 @@ def test_server_and_client_behave_as_real_ones(
         pytest.skip("recorded")
     expected = (HERE / "reconfigure.txt").read_text(encoding="utf-8")
     assert played(serve, real_master, server, client, modules[client]) == expected
+
+
+@pytest.fixture
+def cpp_server(modules: dict[str, Path], real_master: str, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start a server in C++, with the header of the real generator."""
+    compiler = shutil.which("g++")
+    assert compiler
+    program = tmp_path / "server"
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "roscpp", "dynamic_reconfigure"],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.split()
+    include = f"-I{modules['rospy'].parent / 'include'}"
+    subprocess.run(
+        [compiler, include, "-o", str(program), str(HERE / "reconfigure_peer.cpp"), *flags], check=True
+    )
+    server = start([str(program)], real_master, "roscpp")
+    yield server
+    stop(server)
+
+
+def test_client_and_dynparam_of_ours_drive_a_server_in_cpp(
+    cpp_server: subprocess.Popen[str], real_master: str, modules: dict[str, Path]
+) -> None:
+    lines_until(cpp_server, "ready")
+    done = subprocess.run(
+        [sys.executable, str(HERE / "reconfigure_peer.py"), "change", str(modules["ours"])],
+        env=environment(real_master, "ours"),
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert any(line.startswith("{'brightness': 0.25} -> ({'angle'") for line in lines)
+    assert any("'color': '#0f0'" in line and "'hue': 0.125" in line for line in lines)
+    assert any("{'mode': 'Morse', 'is_on': 1} -> " in line and "'brightness': 0.75" in line for line in lines)
+    assert "('inner', False" in done.stdout
+    assert dynparam("ours", real_master, "set", "/lamp", "{'power': 1000, 'groups': {'inner': true}}") == (
+        "",
+        0,
+    )
+    shown = eval(dynparam("ours", real_master, "get", "/lamp")[0])
+    assert shown["power"] == 60
+    assert shown["groups"]["groups"]["Color_Choice"]["groups"]["inner"]["state"] is True
 
 
 def dynparam(stack: str, uri: str, *words: str, share: Path = OUR_SHARE) -> tuple[str, int]:
