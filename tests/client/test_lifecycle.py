@@ -290,6 +290,9 @@ def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: s
         # The call of C code returns.
         assert process.stdin
         process.stdin.write("\n")
+    else:
+        # communicate() closes its input, and so would end the call of C code.
+        process.wait(timeout=GUARD)
     output, errors = process.communicate(timeout=GUARD)
     assert (process.returncode, errors) == (status, "")
     assert ["motors stopped", *output.splitlines()] == prints.split(", ")
