@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from sensor_msgs.msg import Image
 
 from minirospy.compat.cv_bridge.core import CvBridge, CvBridgeError
 from minirospy.compat.ros_numpy.registry import converts_from_numpy, converts_to_numpy
 
+if TYPE_CHECKING:
+    from minirospy.compat.ros_numpy.registry import Array
+
 __all__ = ["image_to_numpy", "numpy_to_image"]
 
 
 @converts_to_numpy(Image)
-def image_to_numpy(msg: Image) -> NDArray[Any]:
+def image_to_numpy(msg: Image) -> Array:
     """Return an image, a read-only view of the message where its bytes are in this machine's order. Raises TypeError."""
     return CvBridge().imgmsg_to_cv2(msg)
 
 
 @converts_from_numpy(Image)
-def numpy_to_image(arr: NDArray[Any], encoding: str) -> Image:
+def numpy_to_image(arr: Array, encoding: str) -> Image:
     """Return an array as an image of an encoding. Raises TypeError where the encoding has another type."""
     dtype, channels = CvBridge().encoding_to_dtype_with_channels(encoding)
     if arr.ndim not in (2, 3):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nav_msgs.msg import MapMetaData, OccupancyGrid
-from numpy.typing import NDArray
 
 from minirospy.compat.ros_numpy.registry import converts_from_numpy, converts_to_numpy
+
+if TYPE_CHECKING:
+    from minirospy.compat.ros_numpy.registry import Array
 
 __all__ = ["numpy_to_occupancy_grid", "occupancygrid_to_numpy"]
 
@@ -22,7 +24,7 @@ def occupancygrid_to_numpy(msg: OccupancyGrid) -> np.ma.MaskedArray[Any, Any]:
 
 
 @converts_from_numpy(OccupancyGrid)
-def numpy_to_occupancy_grid(arr: NDArray[Any], info: MapMetaData | None = None) -> OccupancyGrid:
+def numpy_to_occupancy_grid(arr: Array, info: MapMetaData | None = None) -> OccupancyGrid:
     """Return an array of int8 as a map; masked cells are unknown. Raises TypeError."""
     if arr.ndim != 2:
         raise TypeError("Array must be 2D")

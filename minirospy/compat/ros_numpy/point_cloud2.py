@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike
 from sensor_msgs.msg import PointCloud2, PointField
 
 from minirospy.compat.ros_numpy.registry import converts_from_numpy, converts_to_numpy
 from minirospy.times import Time
+
+if TYPE_CHECKING:
+    from minirospy.compat.ros_numpy.registry import Array
 
 __all__ = [
     "array_to_pointcloud2",
@@ -36,7 +39,9 @@ _DATATYPES = {np.dtype(dtype): datatype for datatype, dtype in _DTYPES.items()}
 
 
 @converts_to_numpy(PointField, plural=True)
-def fields_to_dtype(fields: list[PointField], point_step: int, is_bigendian: bool = False) -> np.dtype[Any]:
+def fields_to_dtype(
+    fields: list[PointField], point_step: int, is_bigendian: bool = False
+) -> np.dtype[np.void]:
     """Return the type of a point. Raises ValueError where a field's type is unknown."""
     ordered = sorted(fields, key=lambda each: each.offset)
     for each in ordered:
@@ -60,7 +65,7 @@ def fields_to_dtype(fields: list[PointField], point_step: int, is_bigendian: boo
 
 
 @converts_from_numpy(PointField, plural=True)
-def dtype_to_fields(dtype: np.dtype[Any]) -> list[PointField]:
+def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
     """Return the fields of a structured type. Raises KeyError where a point cannot have a type."""
     fields = []
     for name in dtype.names or ():
@@ -71,7 +76,7 @@ def dtype_to_fields(dtype: np.dtype[Any]) -> list[PointField]:
 
 
 @converts_to_numpy(PointCloud2)
-def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> NDArray[Any]:
+def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
     """Return the points as a read-only view of the message: (height, width), or (width,) of one row with ``squeeze``.
 
     Raises ValueError where the message has less data than its size needs.
@@ -86,7 +91,7 @@ def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> NDArra
     if len(cloud_msg.data) < needed:
         raise ValueError(f"the cloud needs {needed} bytes, its data has {len(cloud_msg.data)}")
     if not needed:
-        cloud: NDArray[Any] = np.empty(shape, dtype)
+        cloud: Array = np.empty(shape, dtype)
     else:
         cloud = np.ndarray(shape, dtype, cloud_msg.data, 0, (cloud_msg.row_step, cloud_msg.point_step))
     return cloud[0] if squeeze and cloud_msg.height == 1 else cloud
@@ -94,7 +99,7 @@ def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> NDArra
 
 @converts_from_numpy(PointCloud2)
 def array_to_pointcloud2(
-    cloud_arr: NDArray[Any], stamp: Time | None = None, frame_id: str | None = None
+    cloud_arr: Array, stamp: Time | None = None, frame_id: str | None = None
 ) -> PointCloud2:
     """Return a structured array as a cloud. It is dense where all its values are finite."""
     cloud_arr = np.atleast_2d(cloud_arr)
@@ -113,7 +118,7 @@ def array_to_pointcloud2(
     return cloud
 
 
-def merge_rgb_fields(cloud_arr: NDArray[Any]) -> NDArray[Any]:
+def merge_rgb_fields(cloud_arr: Array) -> Array:
     """Return an array whose fields r, g and b are one field rgb, a float whose bits are the colors, as PCL has it."""
     red, green, blue = (np.asarray(cloud_arr[name], np.uint32) for name in "rgb")
     merged = _without(cloud_arr, ("r", "g", "b"), [("rgb", np.float32)])
@@ -121,7 +126,7 @@ def merge_rgb_fields(cloud_arr: NDArray[Any]) -> NDArray[Any]:
     return merged
 
 
-def split_rgb_field(cloud_arr: NDArray[Any]) -> NDArray[Any]:
+def split_rgb_field(cloud_arr: Array) -> Array:
     """Return an array whose field rgb is three fields r, g and b of bytes."""
     bits = np.ascontiguousarray(cloud_arr["rgb"], np.float32).view(np.uint32)
     split = _without(cloud_arr, ("rgb",), [(name, np.uint8) for name in "rgb"])
@@ -130,7 +135,7 @@ def split_rgb_field(cloud_arr: NDArray[Any]) -> NDArray[Any]:
     return split
 
 
-def _without(cloud: NDArray[Any], left_out: tuple[str, ...], added: list[tuple[str, type]]) -> NDArray[Any]:
+def _without(cloud: Array, left_out: tuple[str, ...], added: list[tuple[str, type]]) -> Array:
     kept = [name for name in cloud.dtype.names or () if name not in left_out]
     dtype: list[Any] = [*((name, cloud.dtype[name]) for name in kept), *added]
     made = np.zeros(cloud.shape, dtype)
@@ -139,7 +144,7 @@ def _without(cloud: NDArray[Any], left_out: tuple[str, ...], added: list[tuple[s
     return made
 
 
-def get_xyz_points(cloud_array: NDArray[Any], remove_nans: bool = True, dtype: Any = float) -> NDArray[Any]:
+def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLike = float) -> Array:
     """Return x, y and z as an array whose last axis has three values; without points that are not finite."""
     if remove_nans:
         good = np.isfinite(cloud_array["x"]) & np.isfinite(cloud_array["y"]) & np.isfinite(cloud_array["z"])
@@ -147,6 +152,6 @@ def get_xyz_points(cloud_array: NDArray[Any], remove_nans: bool = True, dtype: A
     return np.stack([cloud_array[name] for name in "xyz"], axis=-1).astype(dtype)
 
 
-def pointcloud2_to_xyz_array(cloud_msg: PointCloud2, remove_nans: bool = True) -> NDArray[Any]:
+def pointcloud2_to_xyz_array(cloud_msg: PointCloud2, remove_nans: bool = True) -> Array:
     """Return x, y and z of a cloud as ``get_xyz_points`` does."""
     return get_xyz_points(pointcloud2_to_array(cloud_msg), remove_nans=remove_nans)

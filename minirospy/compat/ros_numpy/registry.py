@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+from minirospy.idl.protocols import Message
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array: TypeAlias = NDArray[Any]
+    """An array of any type and shape."""
 
 __all__ = ["converts_from_numpy", "converts_to_numpy", "msgify", "numpify"]
 
-_F = TypeVar("_F", bound=Callable[..., Any])
+_Function: TypeAlias = Callable[..., Any]
+_F = TypeVar("_F", bound=_Function)
 
-_to_numpy: dict[tuple[str, bool], Callable[..., Any]] = {}
-_from_numpy: dict[tuple[str, bool], Callable[..., Any]] = {}
+_to_numpy: dict[tuple[str, bool], _Function] = {}
+_from_numpy: dict[tuple[str, bool], _Function] = {}
 """By the name of the type: a message of a bag is of another class. And whether a list of messages is meant."""
 
 
-def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
+def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
     """Return a decorator: the function gets a message of a type, or with ``plural`` a list of them."""
 
     def register(function: _F) -> _F:
@@ -24,7 +33,7 @@ def converts_to_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F]
     return register
 
 
-def converts_from_numpy(msgtype: type[Any], plural: bool = False) -> Callable[[_F], _F]:
+def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
     """Return a decorator: the function gets an array, and returns a message of a type, or a list of them."""
 
     def register(function: _F) -> _F:
@@ -60,5 +69,5 @@ def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False
     return function(numpy_obj, *args, **kwargs)
 
 
-def _known(table: dict[tuple[str, bool], Callable[..., Any]]) -> str:
+def _known(table: dict[tuple[str, bool], _Function]) -> str:
     return ", ".join(f"{name}[]" if plural else name for name, plural in table)
