@@ -11,7 +11,6 @@ import importlib
 import sys
 from collections.abc import Callable
 from types import CodeType, ModuleType
-from typing import Any
 
 from std_msgs.msg import Header
 
@@ -70,7 +69,9 @@ def _transform_parser() -> argparse.ArgumentParser:
 
 
 def _run(
-    name: str, parser: argparse.ArgumentParser, start: Callable[[argparse.Namespace], rospy.Subscriber[Any]]
+    name: str,
+    parser: argparse.ArgumentParser,
+    start: Callable[[argparse.Namespace], rospy.Subscriber[Message]],
 ) -> int:
     try:
         rospy.init_node(name, anonymous=True)
@@ -85,7 +86,7 @@ def _run(
     return 0
 
 
-def _transform(options: argparse.Namespace) -> rospy.Subscriber[Any]:
+def _transform(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
@@ -95,7 +96,7 @@ def _transform(options: argparse.Namespace) -> rospy.Subscriber[Any]:
         except ImportError as error:
             print(f"Failed to import module: {name} ({error})", file=sys.stderr)
     code = _compiled(options.expression)
-    publisher: rospy.Publisher[Any] = rospy.Publisher(
+    publisher: rospy.Publisher[Message] = rospy.Publisher(
         options.output_topic, message_class(options.output_type), queue_size=1, latch=options.latch
     )
 
@@ -106,7 +107,7 @@ def _transform(options: argparse.Namespace) -> rospy.Subscriber[Any]:
     return _subscribe(options, convert)
 
 
-def _relay(options: argparse.Namespace) -> rospy.Subscriber[Any]:
+def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     import yaml
 
     try:
@@ -116,7 +117,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Any]:
     if not isinstance(template, dict):
         raise MinirospyError(f"the expression is not a dictionary of fields: {options.expression!r}")
     cls = message_class(options.output_type)
-    publisher: rospy.Publisher[Any] = rospy.Publisher(options.output_topic, cls, queue_size=1)
+    publisher: rospy.Publisher[Message] = rospy.Publisher(options.output_topic, cls, queue_size=1)
 
     def convert(value: object) -> None:
         now = rospy.get_rostime()
@@ -127,7 +128,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Any]:
     return _subscribe(options, convert)
 
 
-def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Any]:
+def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:
     """Call a function with each message, or with the field of it that is named. Raises MinirospyError without the topic."""
     name = rospy.resolve_name(options.input)
     cls, topic, field = rostopic.get_topic_class(name, blocking=options.wait_for_start)
@@ -150,9 +151,9 @@ def _compiled(expression: str) -> CodeType:
         raise MinirospyError(f"{expression!r} is not an expression of Python: {error}") from error
 
 
-def _evaluated(template: dict[str, Any], value: object) -> dict[str, Any]:
+def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
     """Return the fields with their texts evaluated; a text that is not an expression, or names nothing, stays."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):
             found[name] = _evaluated(each, value)
