@@ -11,9 +11,14 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 
 from minirospy.errors import ValueTextError
+
+if TYPE_CHECKING:
+    import yaml
+
+    _Loader: TypeAlias = yaml.SafeLoader | yaml.FullLoader | yaml.Loader
 
 __all__ = [
     "add_angles",
@@ -91,7 +96,7 @@ def check_yaml(text: str) -> None:
     anchors: list[str | None] = []
     sizes: dict[str, int | None] = {}
     """Anchor -> the values in what it names; None while that is open."""
-    loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     for event in yaml.parse(text, Loader=loader):
         match event:
             case yaml.AliasEvent(anchor=name):
@@ -221,7 +226,7 @@ def _complaint(error: Exception) -> str:
 
 
 @lru_cache(maxsize=1)
-def _loader() -> type[Any]:
+def _loader() -> type[yaml.SafeLoader]:
     """Return a safe YAML loader that knows angles."""
     import yaml
 
@@ -232,14 +237,14 @@ def _loader() -> type[Any]:
     return AngleLoader
 
 
-def add_angles(loader_class: Any) -> None:
+def add_angles(loader_class: type[_Loader]) -> None:
     """Teach a YAML loader angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
     import yaml
 
     in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
 
-    def construct(unit: float) -> Callable[[Any, Any], float]:
-        def angle(loader: Any, node: Any) -> float:
+    def construct(unit: float) -> Callable[[_Loader, yaml.ScalarNode], float]:
+        def angle(loader: _Loader, node: yaml.ScalarNode) -> float:
             text = loader.construct_scalar(node)
             match = in_brackets.match(text)
             try:
