@@ -144,7 +144,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
-) -> tuple[Any, type[Message]]:
+) -> tuple[Publisher[Message], type[Message]]:
     """Return (publisher, message class) for a topic, by the type's name; initializes a node, unless there is one.
 
     Raises ROSTopicException where the type is not installed.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.introspect.rates import (
     BandwidthWindow,
@@ -35,7 +35,7 @@ class ROSTopicHz:
     def __init__(
         self,
         window_size: float,
-        filter_expr: Callable[[Any], bool] | None = None,
+        filter_expr: Callable[[object], bool] | None = None,
         use_wtime: bool = False,
     ) -> None:
         self.lock = threading.Lock()

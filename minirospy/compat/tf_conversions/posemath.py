@@ -48,7 +48,7 @@ def toMsg(f: Frame) -> Pose:
     return Pose(Point(f.p[0], f.p[1], f.p[2]), Quaternion(*f.M.GetQuaternion()))
 
 
-def fromMatrix(m: NDArray[Any]) -> Frame:
+def fromMatrix(m: NDArray[numpy.floating]) -> Frame:
     """Return a 4x4 matrix as a Frame."""
     rotation = [float(m[row, column]) for row in range(3) for column in range(3)]
     return Frame(Rotation(*rotation), Vector(float(m[0, 3]), float(m[1, 3]), float(m[2, 3])))
