@@ -124,7 +124,7 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
     ) -> Pixels:
-        """Return the image of a compressed message. Raises CvBridgeError where it is not one, or there is no such conversion."""
+        """Return the image of a compressed message. Raises CvBridgeError (not an image; unknown conversion)."""
         try:
             image = decode(bytes(cmprs_img_msg.data))
         except ValueError as error:

@@ -64,7 +64,7 @@ def is_converted_by_opencv(source: str, wanted: str) -> bool:
 def converted(image: Pixels, source: str, wanted: str) -> Pixels:
     """Return an image in another encoding; the same array where nothing changes.
 
-    Raises ValueError where there is no such conversion, in the words of ROS.
+    Raises ValueError, with ROS's text, where the conversion does not exist.
     """
     channels = type_of_encoding(source) // 8
     if wanted in ("", source):

@@ -67,7 +67,7 @@ class ConfigType(Protocol):
 
 
 def find_reconfigure_services() -> list[str]:
-    """Return the names of all servers, sorted. Raises ROSServiceIOException where there is no master."""
+    """Return the names of all servers, sorted. Raises ROSServiceIOException without a master."""
     from minirospy.compat import rosservice
 
     names = rosservice.get_service_list()

@@ -90,7 +90,7 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 
 
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
-    """Return the message of a configuration. Values that are no bool, int, float or str are left out, groups apart.
+    """Return the message of a configuration. Values other than bool, int, float, str and groups are left out.
 
     With ``flat`` a group is a tree; without, its values are the groups.
     """

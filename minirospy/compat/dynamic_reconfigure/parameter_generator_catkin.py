@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.parameter_generator_catkin: what a .cfg file, a program of its own, describes parameters with.
+"""dynamic_reconfigure.parameter_generator_catkin: what a .cfg file, which is a program, describes parameters with.
 
 catkin_make runs it with four folders: of dynamic_reconfigure, and for documents, C++ headers and Python modules.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
