@@ -42,15 +42,9 @@ class DiskThread:
         self._queue.put((function, size))
 
     def close(self) -> None:
-        """Wait until all is done, and end. A signal's exception in the waiting thread leaves the thread at work."""
+        """Wait until all is done, and end."""
         self._queue.put(None)
-        self.join()
-
-    def join(self) -> None:
-        """Wait again for :meth:`close`."""
-        while self._thread.is_alive():
-            # In slices: on Windows no signal interrupts a wait.
-            self._thread.join(0.2)
+        self._thread.join()
 
     def _run(self) -> None:
         while (item := self._queue.get()) is not None:

@@ -65,6 +65,7 @@ class Recorder:
         self._lock = threading.Lock()
         self._stop = SignalSafeEvent()
         self._file: BagFile | None = None
+        self._is_complete = False
         self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
         self._has_space = True
         self._reported: Counter[str] = Counter()
@@ -89,15 +90,19 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread()
         self._splits = Splits(self.options, self._clock())
+        # In a thread, which no Ctrl-C interrupts, and which the process waits for in any case.
+        finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
+        finisher.start()
         try:
             with self._lock:
                 self._open(self._clock())
             if self._file and self._check_space():
                 self._record()
-        except client.ROSInterruptException:
-            pass  # a registration was ended by the shutdown
+        except KeyboardInterrupt:
+            pass  # a second Ctrl-C, or a registration was ended by the shutdown
         finally:
-            self._finish()
+            self._stop.set()
+            self._wait_for(finisher)
         return self.status
 
     # --- the main thread
@@ -214,24 +219,29 @@ class Recorder:
         if self._topics and not any(topic.left for topic in self._topics.values()):
             self._stop.set()
 
-    def _finish(self) -> None:
-        """Complete the file; further Ctrl-C do not end that, until the third ends the process."""
-        self._stop.set()
-        # What this thread does from now on is its clean-up: a shutdown does not interrupt it.
-        client.is_shutdown()
+    def _wait_for(self, finisher: threading.Thread) -> None:
+        """Wait until the file is complete; further Ctrl-C do not end that, until the third ends the process."""
+        is_interrupted = False
+        while finisher.is_alive():
+            try:
+                # What this thread does is its clean-up: a shutdown need not interrupt it.
+                client.is_shutdown()
+                if is_interrupted:
+                    is_interrupted = False
+                    client.logwarn("%d MB are still to be written", self._disk.pending // 10**6)
+                finisher.join(_TICK_SECONDS)
+            except KeyboardInterrupt:
+                is_interrupted = True
 
+    # --- the finisher's thread
+
+    def _finish(self) -> None:
+        """Complete the file when the recording ends."""
+        self._stop.wait()
         with self._lock:
             self._close()
-
-        closing = self._disk.close
-        while True:
-            try:
-                closing()
-                break
-            except KeyboardInterrupt:
-                client.logwarn("%d MB are still to be written", self._disk.pending // 10**6)
-                closing = self._disk.join
-
+            self._is_complete = True
+        self._disk.close()
         if self._executor:
             self._executor.shutdown()
         self._report_drops()
@@ -241,6 +251,8 @@ class Recorder:
     # --- with the lock
 
     def _open(self, now: int) -> None:
+        if self._is_complete:
+            return
         name = file_name(self.options, self._splits.count, time.time())
         try:
             self._file = BagFile(

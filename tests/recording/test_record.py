@@ -435,3 +435,28 @@ def test_launch_files_start_both_programs(talker: Talker, tmp_path: Path) -> Non
 
     assert [said(one.body) for one in messages(tmp_path / "out.bag")] == ["one"]
     assert said(heard[0]) == "ok"
+
+
+@POSIX_ONLY
+def test_a_second_ctrl_c_does_not_cost_the_file(talker: Talker, start: Start, tmp_path: Path) -> None:
+    chatter = talker.advertise("/chatter")
+    slow = (
+        "from minirospy.recording.disk import QueuedFile\n"
+        "write = QueuedFile._write_all\n"
+        "QueuedFile._write_all = lambda self, data: (sys.stdin.read(), write(self, data))\n"
+    )
+    process = start("record", "-O", "out", "/chatter", prelude=slow, stdin=subprocess.PIPE)
+    connected(chatter)
+    for i in range(20):
+        say(chatter, f"{i:02}" + "x" * 999_998)
+    process.send_signal(signal.SIGINT)
+    read_until(process, "Closing 'out.bag'.")
+    process.send_signal(signal.SIGINT)
+    assert process.stdin
+    process.stdin.close()
+    process.stdin = None
+    process.communicate(timeout=GUARD)
+
+    assert process.returncode == 0
+    found = [said(one.body)[:2] for one in messages(tmp_path / "out.bag")]
+    assert found == [f"{i:02}" for i in range(len(found))]
