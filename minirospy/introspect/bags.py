@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.bag import compression as compressions
 from minirospy.bag.base import BagReader
-from minirospy.bag.mcap_reader import open_bag_or_mcap
+from minirospy.bag.mcap_reader import MAGIC, open_bag_or_mcap
 from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import Connection, read_version
 from minirospy.bag.repair import Repair
 from minirospy.bag.writer import BagWriter, Continued
-from minirospy.errors import BagFormatError, DefinitionError, ValueTextError
+from minirospy.errors import BagFormatError, DefinitionError, UsageError, ValueTextError
 from minirospy.times import Time
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ __all__ = [
     "Expression",
     "Progress",
     "backup_path",
+    "check_bag_name",
     "class_of",
     "class_of_connection",
     "compress",
@@ -36,6 +37,7 @@ __all__ = [
     "copy_bag",
     "data_size",
     "filter_bag",
+    "is_mcap",
     "naming_full_disk",
     "new_bag",
     "open_reader",
@@ -60,6 +62,12 @@ def version_of(path: str) -> int:
     """Return a bag's version, 200 for 2.0, also where it has no index. Raise BagFormatError, OSError."""
     with open(path, "rb") as stream:
         return read_version(stream)
+
+
+def is_mcap(path: str) -> bool:
+    """Return whether a file is an MCAP file, by its first bytes. Raise OSError."""
+    with open(path, "rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
 
 
 def data_size(reader: BagReader) -> int:
@@ -232,9 +240,21 @@ def convert12(source: str, target: str, progress: Progress) -> None:
             writer.write(numbers[number], message.time, message.body)
 
 
+def check_bag_name(path: str) -> None:
+    """Raise UsageError where the name of a bag that is to be written is that of an MCAP file."""
+    if path.endswith(".mcap"):
+        raise UsageError(
+            f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
+        )
+
+
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield the writer of a new file; chunks are compressed in parallel. After an error it is a bag of what was written."""
+    """Yield the writer of a new file; chunks are compressed in parallel. After an error it is a bag of what was written.
+
+    Raise UsageError where the name is that of an MCAP file, before anything is written.
+    """
+    check_bag_name(path)
     with contextlib.ExitStack() as stack:
         executor = None
         if compression != compressions.NONE:

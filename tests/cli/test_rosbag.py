@@ -316,3 +316,24 @@ def test_convert_refuses_a_name_of_neither_format(bag: Path, command: Command) -
     status, _, err = command("rosbag", "convert", "-q", "a.bag", "b.txt")
     assert (status, err) == (2, "rosbag: ERROR: b.txt must end with .bag or .mcap\n")
     assert not os.path.exists("b.txt")
+
+
+@pytest.mark.parametrize("verb", ["compress", "decompress"])
+def test_compress_leaves_mcap_files_as_they_are(bag: Path, command: Command, verb: str) -> None:
+    assert command("rosbag", "convert", "-q", "a.bag", "r.mcap").status == 0
+    before = Path("r.mcap").read_bytes()
+
+    status, out, err = command("rosbag", verb, "-q", "r.mcap")
+
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("ERROR: r.mcap is an MCAP file, and the result would be a bag: `rosbag convert")
+    assert Path("r.mcap").read_bytes() == before
+    assert sorted(os.listdir()) == ["a.bag", "r.mcap"]
+
+
+def test_filter_writes_no_bag_named_as_an_mcap_file(bag: Path, command: Command) -> None:
+    status, out, err = command("rosbag", "filter", "a.bag", "r.mcap", "True")
+
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("rosbag: ERROR: r.mcap would be a bag: ")
+    assert os.listdir() == ["a.bag"]

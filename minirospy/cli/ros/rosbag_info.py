@@ -134,6 +134,8 @@ def _filter(words: list[str], print: str | None) -> int:
     from minirospy.cli.ros.rosbag_progress import showing_progress
     from minirospy.introspect import bags
 
+    # Before the progress is shown.
+    bags.check_bag_name(target)
     keep = bags.Expression(text)
     show = bags.Expression(print) if print else None
     try:

@@ -50,15 +50,15 @@ def _compress_parser() -> Parser:
     return parser
 
 
-def _compress(bags: list[str], output_dir: str | None, force: bool, quiet: bool, compression: str) -> None:
+def _compress(bags: list[str], output_dir: str | None, force: bool, quiet: bool, compression: str) -> int:
     def write(source: str, target: str) -> None:
         _change_compression(source, target, compression, quiet)
 
-    _rewrite(bags, output_dir, force, quiet, write)
+    return _rewrite(bags, output_dir, force, quiet, write)
 
 
-def _decompress(bags: list[str], output_dir: str | None, force: bool, quiet: bool) -> None:
-    _compress(bags, output_dir, force, quiet, compression.NONE)
+def _decompress(bags: list[str], output_dir: str | None, force: bool, quiet: bool) -> int:
+    return _compress(bags, output_dir, force, quiet, compression.NONE)
 
 
 def _change_compression(source: str, target: str, name: str, quiet: bool) -> None:
@@ -71,8 +71,8 @@ def _change_compression(source: str, target: str, name: str, quiet: bool) -> Non
         bags.compress(source, target, name, progress)
 
 
-def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) -> None:
-    _rewrite(
+def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) -> int:
+    return _rewrite(
         bags,
         output_dir,
         force,
@@ -108,14 +108,25 @@ def _rewrite(
     write: Callable[[str, str], None],
     *,
     unindexed: bool = False,
-) -> None:
-    """Have ``write(source, target)`` write each bag again: into a folder, or in its place, the original kept beside it."""
+) -> int:
+    """Have ``write(source, target)`` write each bag again: into a folder, or in its place, the original kept beside it.
+
+    Return the exit status.
+    """
     if not paths:
         raise Misuse("a bag file is missing", "You must specify at least one bag file.")
-    from minirospy.introspect.bags import backup_path
+    from minirospy.introspect.bags import backup_path, is_mcap
 
+    status = 0
     for path in paths:
         if not _is_readable(path, unindexed=unindexed):
+            continue
+        if is_mcap(path):
+            report(
+                f"ERROR: {path} is an MCAP file, and the result would be a bag: "
+                f"`rosbag convert -c lz4 {path} OTHER.mcap` changes its compression"
+            )
+            status = 1
             continue
         if output_dir is not None:
             target = os.path.join(output_dir, os.path.basename(path))
@@ -140,6 +151,7 @@ def _rewrite(
             with contextlib.suppress(OSError):
                 os.replace(backup, path)
             raise
+    return status
 
 
 def _is_readable(path: str, *, unindexed: bool) -> bool:
