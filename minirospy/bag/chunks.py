@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 import struct
+from array import array
 from collections import OrderedDict
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple, Protocol
 
 from minirospy.bag import compression, encoding, records
@@ -57,6 +58,7 @@ class ChunkStream:
         self._headers: dict[int, StoredChunk] = {}
         self._ahead: OrderedDict[int, Future[bytes]] = OrderedDict()
         self._executor: Executor | None = None
+        self._compared: set[int] = set()
 
     def header(self, position: int) -> StoredChunk:
         """Return the header of the chunk at a position. Raise BagFormatError."""
@@ -83,19 +85,22 @@ class ChunkStream:
         except BagFormatError as error:
             raise BagFormatError(error.why, position) from error
 
-    def pick(self, info: ChunkInfo, ranks: Ranks) -> tuple[bytes, list[Found]] | None:
+    def pick(
+        self, info: ChunkInfo, ranks: Ranks, known: Mapping[int, Connection]
+    ) -> tuple[bytes, list[Found]] | None:
         """Return bodies and places of the few messages that are wanted of a chunk, without reading the rest of it.
 
-        None if that does not pay, or if the chunk's index is damaged: then the chunk is to be scanned.
+        ``known``: see :func:`scan`. None if that does not pay, or if an index is damaged: then the chunk is to be scanned.
         """
         chunk, data_position = header = self.header(info.position)
         wanted = sum(count for number, count in info.counts.items() if ranks.get(number) is not None)
         if chunk.compression != compression.NONE or wanted * PICK_SIZE > chunk.size:
             return None
         try:
-            entries = self._entries(header, info, ranks)
+            entries, offsets = self._entries(header, info, ranks)
             if len(entries) != wanted:
                 return None
+            self._compare(data_position, entries, offsets, known)
             return self._picked(data_position, chunk.size, entries)
         except BagFormatError:
             return None
@@ -134,19 +139,55 @@ class ChunkStream:
             )
         return data
 
-    def _entries(self, header: StoredChunk, info: ChunkInfo, ranks: Ranks) -> list[tuple[int, int, int, int]]:
-        """Return offset, time, rank and connection of the messages that are wanted, from a chunk's index records."""
+    def _entries(
+        self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
+    ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
+        """Return offset, time, rank and connection of the messages that are wanted, from a chunk's index records.
+
+        And the offsets of all messages, by connection.
+        """
         limit = size_of(self.stream)
         self.stream.seek(header.end)
         found: list[tuple[int, int, int, int]] = []
+        all_offsets: list[array[int]] = []
         for _ in info.counts:
             record = records.read_record(self.stream, limit)
             times, offsets = read_entries(self.stream, record)
             number = record.uint32("conn")
+            all_offsets.append(offsets)
             rank = ranks.get(number)
             if rank is not None:
                 found += [(at, time, rank, number) for time, at in zip(times, offsets, strict=True)]
-        return sorted(found)
+        return sorted(found), all_offsets
+
+    def _compare(
+        self,
+        start: int,
+        entries: list[tuple[int, int, int, int]],
+        all_offsets: list[array[int]],
+        known: Mapping[int, Connection],
+    ) -> None:
+        """Compare the record of each connection, which is in front of its first message, with that of the index.
+
+        Once for each connection. Raise BagFormatError where they differ, or where the index of the chunk is wrong.
+        """
+        limit = size_of(self.stream)
+        for first, _, _, number in entries:
+            if number in self._compared:
+                continue
+            self._compared.add(number)
+            before = max((at for offsets in all_offsets for at in offsets if at < first), default=None)
+            after = 0
+            if before is not None:
+                self.stream.seek(start + before)
+                after = records.read_record(self.stream, limit).end - start
+            if after > first:
+                raise BagFormatError("an index entry does not point to its message", start + first)
+            self.stream.seek(start + after)
+            for record in records.parse_records(data := self.stream.read(first - after)):
+                if record.op == records.OP_CONNECTION:
+                    content = data[record.data_position : record.end]
+                    _check_connection(records.parse_connection(record, content), known)
 
     def _picked(
         self, start: int, size: int, entries: list[tuple[int, int, int, int]]
@@ -210,13 +251,17 @@ _HEAD = 46
 _STAMP_AND_SIZE = struct.Struct("<III")
 
 
-def scan(data: bytes, ranks: Ranks, known: Container[int]) -> list[Found]:
+def scan(data: bytes, ranks: Ranks, known: Mapping[int, Connection]) -> list[Found]:
     """Return the messages of a chunk's data whose connections have ``ranks``, in the order of the data.
 
-    ``known`` are all connections of the bag: a message of another one is damage. Raise BagFormatError.
+    ``known`` are all connections of the bag, by its index: a message of another one is damage, and so is a connection that
+    has another topic or type in the data. Raise BagFormatError.
     """
     found: list[Found] = []
-    scan_into(found, data, ranks, known)
+    connections: dict[int, Connection] = {}
+    scan_into(found, data, ranks, known, connections)
+    for connection in connections.values():
+        _check_connection(connection, known)
     return found
 
 
@@ -271,3 +316,23 @@ def scan_into(
             connections.setdefault(connection.id, connection)
         at = record.end
     return end
+
+
+_COMPARED = ("type", "md5sum", "message_definition")
+
+
+def _check_connection(stored: Connection, known: Mapping[int, Connection]) -> None:
+    """Raise BagFormatError where the index has another topic or type for a connection that was found in a chunk."""
+    indexed = known.get(stored.id, stored)
+    if indexed.topic == stored.topic and all(
+        indexed.header.get(name) == stored.header.get(name) for name in _COMPARED
+    ):
+        return
+    raise BagFormatError(
+        f"connection {stored.id} is {_described(stored)} in its chunk, and {_described(indexed)} in the index: "
+        "one of them is damaged; `rosbag reindex` takes that of the chunk"
+    )
+
+
+def _described(connection: Connection) -> str:
+    return f"{connection.topic} [{connection.type}, {connection.md5sum}]"

@@ -262,7 +262,7 @@ class _Merge:
             return self._loaded[run.position]
 
         info = self._chunks[run.number]
-        picked = self._stream.pick(info, self._ranks)
+        picked = self._stream.pick(info, self._ranks, self._known)
         if picked:
             data, found = picked
         else:

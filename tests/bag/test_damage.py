@@ -146,6 +146,25 @@ def test_flipped_byte_of_the_index_loses_no_message_without_an_error() -> None:
     assert silent == []
 
 
+@pytest.mark.parametrize("size", [30, 100_000])
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_topic_or_type_that_is_damaged_in_the_index_is_refused(compression: str, size: int) -> None:
+    given = [
+        [Given(number % 3, chunk * 100 + number, bytes(size)) for number in range(9)] for chunk in range(3)
+    ]
+    data = make_bag(given, compression=compression)
+    assert len(read(data)) == 27
+    reader = open_bag(io.BytesIO(data))
+    assert isinstance(reader, ChunkedReader)
+    for text in (b"topic=/topic1", b"type=std_msgs/String", b"md5sum=992c", b"message_definition=string"):
+        at = data.index(text, data.index(b"topic=/topic1", reader.index_position)) + len(text) - 1
+        damaged = data[:at] + bytes((data[at] ^ 1,)) + data[at + 1 :]
+        with pytest.raises(
+            BagFormatError, match=r"connection 1 is /topic1 .* in its chunk, and .* in the index"
+        ):
+            list(open_bag(io.BytesIO(damaged)).messages([1]))
+
+
 def test_damaged_chunk_costs_its_own_messages_alone() -> None:
     data = make_bag(GIVEN, compression="lz4")
     reader = open_bag(io.BytesIO(data))
