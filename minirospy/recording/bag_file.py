@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol, cast
 
 from minirospy.bag.writer import BagWriter, Buffer
+from minirospy.errors import BagFormatError
 from minirospy.recording.disk import DiskThread, QueuedFile
 from minirospy.recording.options import RecordOptions
 
@@ -51,8 +52,9 @@ class FileWriter(Protocol):
 class BagFile:
     """A bag that is being recorded. Methods are called under ``lock``.
 
-    ``on_error(file, error, lost)`` is called in the disk's thread when the disk has failed; by then the file is readable, has
-    its final name, and lacks ``lost`` messages (-1: it could not be completed). Raise OSError if it cannot be created.
+    ``on_error(file, error, lost)`` is called in the disk's thread when the disk, or a compression, has failed; by then the
+    file is readable, has its final name, and lacks ``lost`` messages (-1: it could not be completed). Raise OSError if it
+    cannot be created.
     """
 
     def __init__(
@@ -62,7 +64,7 @@ class BagFile:
         disk: DiskThread,
         lock: threading.Lock,
         executor: Executor | None,
-        on_error: Callable[[BagFile, OSError, int], object],
+        on_error: Callable[[BagFile, Exception, int], object],
     ) -> None:
         self.name = name
         self._path = Path(name)
@@ -98,12 +100,20 @@ class BagFile:
         # All messages of a link come with the same object.
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
-        self._writer.write(number, time, body, tail)
+        try:
+            self._writer.write(number, time, body, tail)
+        except BagFormatError:
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever ended a compression
+            self._give_up(error)
 
     def write_ready(self) -> None:
         """Write what has been compressed since the last message."""
         if not self._is_closed:
-            self._writer.write_ready()
+            try:
+                self._writer.write_ready()
+            except Exception as error:  # noqa: BLE001 - as above
+                self._give_up(error)
 
     def close(self) -> None:
         """Complete the file in the disk's thread, behind what is queued."""
@@ -130,10 +140,15 @@ class BagFile:
             self._writer.close()
             self._stream.close_file()
             self._active.replace(self._path)
-        except OSError as error:
+        except Exception as error:  # noqa: BLE001 - also of a chunk's compression: MemoryError, for example
             self._salvage(error)
 
-    def _failed(self, error: OSError) -> None:
+    def _give_up(self, error: Exception) -> None:
+        """End the file behind what is queued, as a chunk could not be compressed."""
+        self._is_closed = True
+        self._disk.submit(lambda: self._salvage(error))
+
+    def _failed(self, error: Exception) -> None:
         with self._lock:
             if self._is_closed:
                 return
@@ -141,9 +156,9 @@ class BagFile:
             self._is_closed = True
         self._salvage(error)
 
-    def _salvage(self, error: OSError) -> None:
+    def _salvage(self, error: Exception) -> None:
         lost = -1
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(Exception):
             lost = self._writer.salvage(self._stream.written())
         with contextlib.suppress(OSError):
             self._stream.close_file()

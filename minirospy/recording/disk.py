@@ -17,9 +17,13 @@ Buffer = bytes | bytearray | memoryview
 
 
 class DiskThread:
-    """Does what is queued, in order, in a thread that starts with it. ``close`` waits for the queue's end."""
+    """Does what is queued, in order, in a thread that starts with it. ``close`` waits for the queue's end.
 
-    def __init__(self) -> None:
+    ``on_error(error)`` is called in that thread with what a call raises; the next call follows.
+    """
+
+    def __init__(self, on_error: Callable[[Exception], object]) -> None:
+        self._on_error = on_error
         self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
         # Two counters, each changed by one side only: no lock.
         self._queued = self._done = 0
@@ -49,7 +53,10 @@ class DiskThread:
     def _run(self) -> None:
         while (item := self._queue.get()) is not None:
             function, size = item
-            function()
+            try:
+                function()
+            except Exception as error:  # noqa: BLE001 - the files behind the call have to be completed
+                self._on_error(error)
             self._done += size
 
 
@@ -58,11 +65,11 @@ class QueuedFile:
 
     Calls are queued, and done immediately if the disk's thread itself makes them.
 
-    ``on_error(error)`` is called in that thread at the first OSError; what is still queued for the file is dropped then.
+    ``on_error(error)`` is called in that thread at the first error; what is still queued for the file is dropped then.
     Raise OSError if the file cannot be created.
     """
 
-    def __init__(self, disk: DiskThread, path: Path, on_error: Callable[[OSError], object]) -> None:
+    def __init__(self, disk: DiskThread, path: Path, on_error: Callable[[Exception], object]) -> None:
         self.path = path
         self._disk = disk
         self._on_error = on_error
@@ -118,7 +125,7 @@ class QueuedFile:
             return
         try:
             call()
-        except OSError as error:
+        except Exception as error:  # noqa: BLE001 - reported, and the next file is written
             self.failed = True
             self._on_error(error)
 

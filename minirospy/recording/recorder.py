@@ -88,7 +88,7 @@ class Recorder:
 
         workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
-        self._disk = DiskThread()
+        self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
         # In a thread, which no Ctrl-C interrupts, and which the process waits for in any case.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
@@ -332,8 +332,13 @@ class Recorder:
 
     # --- the disk's thread
 
-    def _disk_failed(self, file: BagFile, error: OSError, lost: int) -> None:
-        why = error.strerror or str(error)
+    def _disk_thread_failed(self, error: Exception) -> None:
+        client.logerr("Error writing: %s. Recording ends", _reason(error))
+        self.status = 1
+        self._stop.set()
+
+    def _disk_failed(self, file: BagFile, error: Exception, lost: int) -> None:
+        why = _reason(error)
         if lost < 0:
             tool = "mcap recover" if self.options.mcap else "rosbag reindex"
             client.logerr("Error writing: %s: %s. `%s` may save it", file.active_name, why, tool)
@@ -349,6 +354,11 @@ class Recorder:
                 self._file = None
         self.status = 1
         self._stop.set()
+
+
+def _reason(error: Exception) -> str:
+    """Return why a file could not be written, in one line."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def _counts(counter: Counter[str]) -> str:

@@ -265,6 +265,37 @@ def test_a_full_disk_leaves_a_readable_bag(talker: Talker, start: Start, tmp_pat
     assert found == [f"{i:04}" for i in range(len(found))]
 
 
+@pytest.mark.parametrize("chunk", ["10", "4096"])
+def test_a_chunk_that_cannot_be_compressed_leaves_a_readable_bag(
+    talker: Talker, start: Start, tmp_path: Path, chunk: str
+) -> None:
+    """One of 10 KB fails while it records, one of 4 MB when the file is completed."""
+    chatter = talker.advertise("/chatter")
+    no_memory = (
+        "from minirospy.bag import writer\n"
+        "compress = writer.compress\n"
+        "def refuse(name, data):\n"
+        "    if b'0100x' in data:\n"
+        "        raise MemoryError\n"
+        "    return compress(name, data)\n"
+        "writer.compress = refuse\n"
+    )
+    process = start(
+        "record", "--lz4", "--chunksize", chunk, "-l", "300", "-O", "out", "/chatter", prelude=no_memory
+    )
+    connected(chatter)
+    for i in range(300):
+        say(chatter, f"{i:04}" + "x" * 1000)
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert process.returncode == 1
+    assert len(errors.splitlines()) == 1, errors
+    assert "Error writing: out.bag: MemoryError. Recording ends; " in errors
+    found = [said(one.body)[:4] for one in messages(tmp_path / "out.bag")]
+    assert (85 < len(found) <= 100) if chunk == "10" else not found
+    assert found == [f"{i:04}" for i in range(len(found))]
+
+
 def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Path) -> None:
     chatter = talker.advertise("/chatter")
     # A disk that takes nothing until the input ends.
