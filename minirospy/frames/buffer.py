@@ -22,8 +22,8 @@ class Buffer(BufferCore, BufferInterface):
     """The frames of the last ``cache_time`` (a Duration; 10 s), and lookups that wait for their data.
 
     ``debug``: offer the service ``~tf2_frames``, which lists the frames, where this node does not yet. A wait ends at
-    the insertion that makes the lookup possible; CAN_TRANSFORM_POLLING_SCALE is kept for compatibility, without effect.
-    Safe for threads.
+    the insertion that makes the lookup possible; CAN_TRANSFORM_POLLING_SCALE is the part of the timeout that a
+    jump of simulated time must reach back beyond to end the wait by an exception. Safe for threads.
     """
 
     def __init__(self, cache_time: Moment | None = None, debug: bool = True) -> None:
@@ -39,7 +39,8 @@ class Buffer(BufferCore, BufferInterface):
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest that all have.
 
         Wait for ``timeout`` (a Duration of ROS time) until there is one. Raise LookupException, ConnectivityException,
-        ExtrapolationException, InvalidArgumentException, and ROSInterruptException at a shutdown.
+        ExtrapolationException, InvalidArgumentException, ROSInterruptException at a shutdown, and
+        ROSTimeMovedBackwardsException where simulated time jumps back during the wait.
         """
         if nanoseconds(timeout) <= 0:
             return self.lookup_transform_core(target_frame, source_frame, time)
@@ -78,10 +79,16 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), after at most ``timeout``; as a tuple also why not."""
+        """Return whether there is a transform (1 or 0), after at most ``timeout``; as a tuple also why not.
+
+        Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
+        """
         if nanoseconds(timeout) > 0:
             wait_until(
-                self, lambda: bool(self.can_transform_core(target_frame, source_frame, time)[0]), timeout
+                self,
+                lambda: bool(self.can_transform_core(target_frame, source_frame, time)[0]),
+                timeout,
+                self.CAN_TRANSFORM_POLLING_SCALE,
             )
         result = self.can_transform_core(target_frame, source_frame, time)
         return result if return_debug_tuple else result[0]
@@ -104,7 +111,7 @@ class Buffer(BufferCore, BufferInterface):
             )
 
         if nanoseconds(timeout) > 0:
-            wait_until(self, lambda: bool(possible()[0]), timeout)
+            wait_until(self, lambda: bool(possible()[0]), timeout, self.CAN_TRANSFORM_POLLING_SCALE)
         result = possible()
         return result if return_debug_tuple else result[0]
 

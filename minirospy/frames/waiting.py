@@ -7,6 +7,7 @@ from collections.abc import Callable
 from minirospy import client as rospy
 from minirospy import times
 from minirospy.client.session import current_session
+from minirospy.client.time import ROSTimeMovedBackwardsException
 from minirospy.clock import SignalSafeEvent, wait_for_event
 from minirospy.frames.core import BufferCore
 from minirospy.frames.messages import Moment, nanoseconds
@@ -14,18 +15,21 @@ from minirospy.frames.messages import Moment, nanoseconds
 __all__ = ["wait_until"]
 
 _JUMP = times.Duration(3)
-"""A time that goes back by more ends a wait: a bag file that starts again."""
+"""A wall clock that goes back by more ends a wait."""
 _SIMULATED_SLICE = 0.01
 """Seconds. Nothing notifies a waiting thread of simulated time."""
 
 
-def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment) -> None:
+def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
     """Return when ``is_possible()``, looked at after each insertion, or after ``timeout`` of ROS time.
 
-    Raise ROSInterruptException where the node shuts down meanwhile, ROSInitException before init_node.
+    ``step`` is the part of the timeout for which the real one sleeps between its looks. Raise
+    ROSTimeMovedBackwardsException where simulated time jumps back to before the start of such a sleep,
+    ROSInterruptException where the node shuts down meanwhile, ROSInitException before init_node.
     """
-    start = rospy.get_rostime()
-    end = start + times.Duration(*divmod(nanoseconds(timeout), 1_000_000_000))
+    start = slept = rospy.get_rostime()
+    length = times.Duration(*divmod(nanoseconds(timeout), 1_000_000_000))
+    end, pause = start + length, length * step
     changed = SignalSafeEvent()
     stop_listening = core.on_change(changed.set)
 
@@ -35,9 +39,14 @@ def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Momen
                 if rospy.is_down():
                     raise current_session().lifecycle.interrupted("ROS shutdown request")
                 now = rospy.get_rostime()
+                is_simulated = not rospy.is_wallclock()
+                if is_simulated and now < slept:
+                    raise ROSTimeMovedBackwardsException((slept - now).to_sec())
                 if now >= end or now + _JUMP < start:
                     return
-                rest = (end - now).to_sec() if rospy.is_wallclock() else _SIMULATED_SLICE
+                if now >= slept + pause:
+                    slept = now
+                rest = _SIMULATED_SLICE if is_simulated else (end - now).to_sec()
                 wait_for_event(changed, rest)
                 changed.clear()
     finally:

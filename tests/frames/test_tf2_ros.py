@@ -220,13 +220,42 @@ except rospy.ROSInterruptException as error:
 """)
         assert said == "ROS shutdown request\n"
 
-    def test_simulated_time_that_jumps_back_ends_a_wait(self) -> None:
+    @pytest.mark.parametrize("jump", [50, 3.5, 2.5, 0.1])
+    def test_simulated_time_that_jumps_back_ends_a_wait(self, jump: float) -> None:
+        said = run(f"""
+import minirospy.frames.waiting as module
+import tf
+from minirospy.client.session import current_session
+from minirospy.clock import SimulatedClock
+def wait(event, seconds):
+    clock.set(next(times))
+module.wait_for_event = wait
+buffer, listener = tf2_ros.Buffer(), tf.TransformListener()
+arguments = "map", NOW, "base", NOW, "map"
+for call in (
+    lambda: buffer.can_transform("map", "base", NOW, rospy.Duration(5)),
+    lambda: buffer.lookup_transform("map", "base", NOW, rospy.Duration(5)),
+    lambda: buffer.can_transform_full(*arguments, rospy.Duration(5)),
+    lambda: buffer.lookup_transform_full(*arguments, rospy.Duration(5)),
+    lambda: listener.waitForTransform("map", "base", NOW, rospy.Duration(5)),
+):
+    clock = current_session().clock = SimulatedClock(100 * 10**9)
+    times = iter([101 * 10**9, 101 * 10**9 - {int(jump * 1e9)}])
+    try:
+        call()
+    except rospy.ROSTimeMovedBackwardsException as error:
+        print(error, error.time)
+""")
+        assert said == f"ROS time moved backwards {float(jump)}\n" * 5
+
+    def test_jump_back_within_a_polling_interval_is_waited_through(self) -> None:
         said = run("""
 import minirospy.frames.waiting as module
 from minirospy.client.session import current_session
 from minirospy.clock import SimulatedClock
 clock = current_session().clock = SimulatedClock(100 * 10**9)
-module.wait_for_event = lambda event, seconds: clock.set(96 * 10**9)
+times = iter([100_500_000_000, 100_200_000_000, 161 * 10**9])
+module.wait_for_event = lambda event, seconds: clock.set(next(times))
 print(tf2_ros.Buffer().can_transform("map", "base", NOW, LONG))
 """)
         assert said == "0\n"

@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/tf#tf_echo, http://wiki.ros.org/tf2_tools.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 
@@ -61,7 +62,8 @@ def _run_tf(words: Sequence[str]) -> None:
 
     buffer = Buffer()
     TransformListener(buffer)
-    buffer.can_transform(source, target, rospy.Time(), rospy.Duration(1))
+    with contextlib.suppress(rospy.ROSTimeMovedBackwardsException):
+        buffer.can_transform(source, target, rospy.Time(), rospy.Duration(1))
 
     def echo() -> bool:
         try:

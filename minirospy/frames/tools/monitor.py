@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by their names, which
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import threading
 import time
@@ -129,8 +130,9 @@ def _wait_for_chain(buffer: Buffer, source: str, target: str) -> None:
         f"Waiting for transform chain to become available between {source} and {target} ", end="", flush=True
     )
     while not rospy.is_shutdown():
-        if buffer.can_transform(source, target, rospy.Time(), rospy.Duration(1)):
-            break
+        with contextlib.suppress(rospy.ROSTimeMovedBackwardsException):
+            if buffer.can_transform(source, target, rospy.Time(), rospy.Duration(1)):
+                break
         print(".", end="", flush=True)
     print(flush=True)
 
