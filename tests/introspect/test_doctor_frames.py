@@ -94,6 +94,14 @@ def test_stamps_that_are_far_off_name_their_node(offset: float, words: str) -> N
     assert said(*seen, is_simulated=True) == [(Status.OK, "3 in one tree")]
 
 
+def test_stamps_of_one_node_ahead_and_behind_are_both_reported() -> None:
+    texts = [text for _, text in said(frame("b", "a", offset=5.0), frame("c", "b", offset=-60.0))]
+    assert [text.partition(":")[0] for text in texts] == [
+        "/n stamps its transforms ([b]) 5.0 s ahead",
+        "/n stamps its transforms ([c]) 60.0 s behind",
+    ]
+
+
 def test_transform_that_is_wrong_is_told_in_the_words_of_tf2() -> None:
     ((status, text),) = said(frame("b", "a", faults={"TF_NAN_INPUT: Ignoring transform ..."}))
     assert (status, text) == (Status.PROBLEM, "TF_NAN_INPUT: Ignoring transform ...")

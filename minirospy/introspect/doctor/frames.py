@@ -199,8 +199,8 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
 
 def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Stamps that are far from the time at which they come, by the node that sends them."""
-    worst: dict[str, tuple[float, str]] = {}
+    """Stamps that are far from the time at which they come: of each node the worst ahead, and the worst behind."""
+    worst: dict[tuple[str, bool], tuple[float, str]] = {}
     for each in sorted(seen, key=_child):
         if each.offset is None:
             continue
@@ -208,9 +208,10 @@ def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
         if -_OLD_SECONDS <= seconds <= _AHEAD_SECONDS:
             continue
         for sender in each.senders:
-            if abs(seconds) > abs(worst.get(sender, (0.0, ""))[0]):
-                worst[sender] = (seconds, each.child)
-    for sender, (seconds, child) in sorted(worst.items()):
+            key = sender, seconds < 0
+            if abs(seconds) > abs(worst.get(key, (0.0, ""))[0]):
+                worst[key] = (seconds, each.child)
+    for (sender, _), (seconds, child) in sorted(worst.items()):
         where = f"{sender} stamps its transforms ([{child}])"
         if seconds > 0:
             yield problem(
