@@ -1,6 +1,7 @@
 """The frames of a buffer as texts: YAML as view_frames reads it, and a graph in graphviz's language.
 
 Source: http://wiki.ros.org/tf2/view_frames; the texts are those of tf2's BufferCore, byte for byte.
+In the graph quotation marks and backslashes of names are escaped, as graphviz needs it; the real one does not.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from minirospy.tf2.buffer import TransformBuffer
 from minirospy.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
-__all__ = ["frames_as_dot", "frames_as_yaml"]
+__all__ = ["escaped_name", "frames_as_dot", "frames_as_yaml"]
 
 _SHORTEST = 0.0001
 """Seconds: the span that a single sample counts for in a rate."""
@@ -53,7 +54,8 @@ def _edge(frame: Frame, now: int) -> str:
         return ""
     age = f"( {seconds(now) - seconds(cache.newest):.3f} sec old)" if now else ""
     return (
-        f'"{sample[0].name}" -> "{frame.name}"[label="Broadcaster: {frame.authority}\\n'
+        f'"{escaped_name(sample[0].name)}" -> "{escaped_name(frame.name)}"'
+        f'[label="Broadcaster: {escaped_name(frame.authority)}\\n'
         f"Average rate: {_rate(cache):.3f} Hz\\nMost recent transform: {seconds(cache.newest):.3f} {age}\\n"
         f'Buffer length: {_span(cache):.3f} sec\\n"];\n'
     )
@@ -68,8 +70,13 @@ def _root(frame: Frame, now: int) -> str:
     return (
         "edge [style=invis];\n"
         ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";\n'
-        f'{recorded}}}->"{frame.name}";\n'
+        f'{recorded}}}->"{escaped_name(frame.name)}";\n'
     )
+
+
+def escaped_name(name: str) -> str:
+    """Return a name as it is written between quotation marks in graphviz's language."""
+    return name.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def _span(cache: TimeCache | StaticCache) -> float:

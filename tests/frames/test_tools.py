@@ -15,6 +15,8 @@ import pytest
 from minirospy.frames.tools import echo, monitor, static_publisher, view
 from minirospy.frames.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.frames.tools.monitor import Delays
+from minirospy.tf2.buffer import TransformBuffer
+from minirospy.tf2.listing import frames_as_dot
 from minirospy.urdf.poses import quaternion_from_rpy
 from tests.robots.conftest import SECONDS, Start, python
 
@@ -173,6 +175,16 @@ def test_frames_of_a_node_are_drawn(start: Start, tmp_path: Path, monkeypatch: p
 
 def test_graph_without_frames_says_so() -> None:
     assert view.tf2_graph([], 1.0) == 'digraph G { "No tf data received" }'
+
+
+@pytest.mark.parametrize("now", [0, 10**9])
+def test_names_with_quotation_marks_are_escaped_in_tfs_graph(now: int) -> None:
+    buffer = TransformBuffer()
+    buffer.insert('a"b', "c\\", 10**9, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "/n")
+    graph = frames_as_dot(buffer, now)
+    (edge,) = view.read_edges(graph)
+    assert (edge.parent, edge.child) == ('a"b', "c\\")
+    assert now == 0 or '->"a\\"b";' in graph
 
 
 def test_names_of_frames_stay_names() -> None:

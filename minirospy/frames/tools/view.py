@@ -21,6 +21,7 @@ from minirospy import client as rospy
 from minirospy.frames.buffer import Buffer
 from minirospy.frames.listener import TransformListener
 from minirospy.frames.tools.program import ToolError, run_program
+from minirospy.tf2.listing import escaped_name
 from minirospy.tree_svg import Edge, tree_svg
 
 __all__ = ["FrameRecord", "main_tf", "main_tf2", "read_edges", "read_records", "tf2_graph"]
@@ -161,23 +162,19 @@ def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
     lines = ["digraph G {"]
     for record in records:
         label = (
-            f" Broadcaster: {_quoted(record.broadcaster)}\\nAverage rate: {float(record.rate)}\\n"
+            f" Broadcaster: {escaped_name(record.broadcaster)}\\nAverage rate: {float(record.rate)}\\n"
             f"Buffer length: {float(record.length)}\\nMost recent transform: {float(record.most_recent)}\\n"
             f"Oldest transform: {float(record.oldest)}\\n"
         )
-        lines.append(f'"{_quoted(record.parent)}" -> "{_quoted(record.name)}"[label="{label}"];')
+        lines.append(f'"{escaped_name(record.parent)}" -> "{escaped_name(record.name)}"[label="{label}"];')
     lines += [
         "edge [style=invis];",
         ' subgraph cluster_legend { style=bold; color=black; label ="view_frames Result";',
         f'"Recorded at time: {now}"[ shape=plaintext ] ;',
-        f'}}->"{_quoted(root)}";',
+        f'}}->"{escaped_name(root)}";',
         "}",
     ]
     return "\n".join(lines)
-
-
-def _quoted(name: str) -> str:
-    return name.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def read_edges(dot: str) -> Iterator[Edge]:
