@@ -5,10 +5,13 @@ Source: http://wiki.ros.org/roslaunch/XML/param, http://wiki.ros.org/roslaunch/X
 
 from __future__ import annotations
 
+import contextlib
 import os
+import re
 import shlex
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,6 +26,12 @@ from minirospy.workspace.packages import Packages, built_in_roots, is_python
 __all__ = ["param_value", "rosparam_values"]
 
 _XACRO = ("xacro", "xacro.py")
+_STYLE = re.compile(r"\x1b\[[0-9;]*m")
+"""Colours of a terminal."""
+_ERROR = re.compile(r"\berror: ", re.IGNORECASE)
+_ERRORS_KEPT = 65_536
+"""Bytes of a command's standard error in which the reason is looked for."""
+_ERRORS_SECONDS = 1.0
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
@@ -95,14 +104,52 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 def _output_of(tag: Tag, command: str) -> str:
     """Return the output of a command, which is run without a shell."""
     try:
-        done = subprocess.run(_command_words(shlex.split(command)), stdout=subprocess.PIPE, check=False)
+        done, reason = _run(_command_words(shlex.split(command)))
     except ValueError as error:
         raise tag.error(f"command [{command}]: {error}") from None
     except (OSError, IndexError):
         raise tag.error(f"no such command [{command}]") from None
     if done.returncode:
-        raise tag.error(f"command [{command}] returned with code [{done.returncode}]")
+        why = f": {reason}" if reason else ""
+        raise tag.error(f"command [{command}] returned with code [{done.returncode}]{why}")
     return _decoded(tag, command, done.stdout)
+
+
+def _run(words: list[str]) -> tuple[subprocess.CompletedProcess[bytes], str]:
+    """Run a command; return its status and output, and the line of its standard error that gives the reason.
+
+    Standard error is passed on as it comes.
+    """
+    end = bytearray()
+    reading, writing = os.pipe()
+    reader = threading.Thread(target=_pass_on, args=(reading, end), daemon=True)
+    reader.start()
+
+    try:
+        done = subprocess.run(words, stdout=subprocess.PIPE, stderr=writing, check=False)
+    finally:
+        os.close(writing)
+        # What the command has left running may keep its end open.
+        reader.join(_ERRORS_SECONDS)
+    return done, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
+
+
+def _reason(errors: str) -> str:
+    """Return the first line that says that it is an error, as xacro's do; else the last, as that of a traceback."""
+    lines = [line.strip() for line in errors.splitlines() if line.strip()]
+    return next((line for line in lines if _ERROR.search(line)), lines[-1] if lines else "")
+
+
+def _pass_on(reading: int, end: bytearray) -> None:
+    """Copy what comes to standard error, until it is closed; keep its ``end``."""
+    with open(reading, "rb", buffering=0) as pipe:
+        while chunk := pipe.read(_ERRORS_KEPT):
+            end += chunk
+            del end[:-_ERRORS_KEPT]
+            # Without a standard error, another file may have its number.
+            if sys.__stderr__ is not None:
+                with contextlib.suppress(OSError), open(2, "wb", closefd=False) as errors:
+                    errors.write(chunk)
 
 
 def _command_words(words: list[str]) -> list[str]:

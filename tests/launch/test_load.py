@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -205,6 +206,41 @@ def test_errors_name_the_line(packages: Packages, body: str, says: str) -> None:
         load(packages, body)
     assert raised.value.file == "<stdin>"
     assert raised.value.line == (4 if "multiple" in says else 2)
+
+
+@pytest.mark.parametrize(
+    ("errors", "reason"),
+    [
+        ("warning\nerror: no macro\nwhen processing file: x\n", ": error: no macro"),
+        (
+            "XML parsing error: mismatched tag\n\nCheck that:\n - it is XML\n",
+            ": XML parsing error: mismatched tag",
+        ),
+        ("Traceback (most recent call last):\nValueError: no\n", ": ValueError: no"),
+        ("first\n\x1b[31mthe reason\x1b[0m\n\n", ": the reason"),
+        ("", ""),
+    ],
+)
+def test_command_that_fails_is_named_with_its_reason(
+    packages: Packages, tmp_path: Path, capfd: pytest.CaptureFixture[str], errors: str, reason: str
+) -> None:
+    program = tmp_path / "fails.py"
+    program.write_text(f"import sys\nsys.stderr.write({errors!r})\nsys.exit(2)\n", encoding="utf-8")
+    command = f"{Path(sys.executable).as_posix()} {program.as_posix()}"
+    with pytest.raises(LaunchError) as raised:
+        load(packages, f'<param name="p" command="{command}"/>')
+    assert str(raised.value) == f"<stdin>:2: command [{command}] returned with code [2]{reason}"
+    assert capfd.readouterr().err.replace("\r\n", "\n") == errors
+
+
+def test_errors_of_a_command_that_succeeds_are_passed_on(
+    packages: Packages, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    program = tmp_path / "warns.py"
+    program.write_text("import sys\nprint(5)\nsys.stderr.write('w' * 200_000)\n", encoding="utf-8")
+    command = f"{Path(sys.executable).as_posix()} {program.as_posix()}"
+    load(packages, f'<param name="p" command="{command}"/>')
+    assert capfd.readouterr().err == "w" * 200_000
 
 
 @pytest.mark.parametrize(
