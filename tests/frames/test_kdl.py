@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+import warnings
 
 import numpy
 import PyKDL
@@ -111,12 +113,26 @@ def cloud(*, rows: int = 2, pad: int = 4, order: str = "<") -> PointCloud2:
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_clouds_of_several_rows_keep_their_other_fields(order: str) -> None:
     moved = do_transform_cloud(cloud(order=order), transform())
-    assert (moved.height, moved.width, moved.row_step, len(moved.data)) == (1, 6, 96, 96)
-    points = numpy.frombuffer(moved.data, order + "f4").reshape(6, 4)
-    assert points[[0, 2, 3, 4, 5], 1].tolist() == pytest.approx([0, 2, 3, 4, 5], abs=1e-6)
-    assert points[0, 0] == pytest.approx(10)
-    assert numpy.isnan(points[1, :3]).all()
-    assert [moved.data[12 + 16 * n] for n in range(6)] == [7] * 6
+    assert (moved.height, moved.width, moved.point_step, moved.row_step) == (1, 6, 13, 78)
+    assert (moved.is_bigendian, moved.is_dense, len(moved.data)) == (False, False, 78)
+    layout = numpy.dtype({"names": ["xyz", "c"], "formats": [("<f4", 3), "u1"], "offsets": [0, 12]})
+    points = numpy.frombuffer(moved.data, layout)
+    assert points["xyz"][[0, 2, 3, 4, 5], 1].tolist() == pytest.approx([0, 2, 3, 4, 5], abs=1e-6)
+    assert points["xyz"][0, 0] == pytest.approx(10)
+    assert numpy.isnan(points["xyz"][1]).all()
+    assert points["c"].tolist() == [7] * 6
+
+
+def test_what_is_between_the_fields_of_a_cloud_becomes_zeros() -> None:
+    fields = [PointField(name, 4 * n, PointField.FLOAT32, 1) for n, name in enumerate("xyz")]
+    fields += [PointField("i", 16, PointField.UINT16, 1), PointField("none", 18, PointField.UINT8, 0)]
+    source = PointCloud2(height=1, width=1, fields=fields, point_step=24, row_step=24, is_dense=True)
+    source.data = struct.pack("<3fIHHI", 0, 0, math.inf, 0xFFFFFFFF, 5, 0xFFFF, 0xFFFFFFFF)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        moved = do_transform_cloud(source, transform())
+    assert (moved.point_step, moved.is_dense, moved.fields) == (18, False, fields)
+    assert moved.data[12:] == struct.pack("<IH", 0, 5)
 
 
 def test_clouds_that_do_not_fit_their_description_are_named() -> None:

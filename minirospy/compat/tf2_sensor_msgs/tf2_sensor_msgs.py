@@ -5,6 +5,7 @@ Importing it registers PointCloud2 with tf2_ros. numpy is imported by the first 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import TransformStamped
@@ -34,34 +35,44 @@ _FORMATS = {
 def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> PointCloud2:
     """Return a cloud whose x, y and z the transform has moved, with the transform's header.
 
-    The result has one row, as with the real one; the other fields and the points without a place (NaN) are kept. Raise
-    ValueError where the cloud has no x, y and z, or fewer bytes than it says.
+    As with the real one the result has one row, little-endian numbers, nothing behind a point's last field, zeros between
+    its fields, and is not marked as dense. The other fields, and the points without a place (NaN), are kept. x, y and z are
+    the fields of these names, where the real one takes the first three. Raise ValueError where the cloud has no x, y and z,
+    or fewer bytes than it says.
     """
     import numpy
 
-    points = _points(cloud).copy()
-    missing = {"x", "y", "z"} - set(points.dtype.names or ())
+    points = _points(cloud)
+    names = points.dtype.names or ()
+    missing = {"x", "y", "z"} - set(names)
     if missing:
         raise ValueError(
             f"the cloud has no field {', '.join(sorted(missing))}: there is nothing to transform"
         )
+    layout = _layout(cloud.fields, "<")
+    result = numpy.zeros(len(points), layout)
+    for name in names:
+        result[name] = points[name]
+
     frame = transform_to_kdl(transform)
     rotation = numpy.array(frame.M._m).reshape(3, 3)
     places = numpy.stack([points[name].astype(numpy.float64) for name in "xyz"], axis=-1)
-    moved = places @ rotation.T + numpy.array(frame.p._v)
-    for column, name in enumerate("xyz"):
-        points[name] = moved[:, column]
+    # Places may be infinite, or become too large.
+    with numpy.errstate(invalid="ignore", over="ignore"):
+        moved = places @ rotation.T + numpy.array(frame.p._v)
+        for column, name in enumerate("xyz"):
+            result[name] = moved[:, column]
 
     return PointCloud2(
         header=transform.header,
         height=1,
-        width=len(points),
+        width=len(result),
         fields=cloud.fields,
-        is_bigendian=cloud.is_bigendian,
-        point_step=cloud.point_step,
-        row_step=cloud.point_step * len(points),
-        data=points.tobytes(),
-        is_dense=cloud.is_dense,
+        is_bigendian=False,
+        point_step=layout.itemsize,
+        row_step=layout.itemsize * len(result),
+        data=result.tobytes(),
+        is_dense=False,
     )
 
 
@@ -69,17 +80,8 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
     """Return the points as a structured array, one after the other, without the rests of rows."""
     import numpy
 
-    order = ">" if cloud.is_bigendian else "<"
-    known = [field for field in cloud.fields if field.datatype in _FORMATS]
     try:
-        layout: numpy.dtype[numpy.void] = numpy.dtype(
-            {
-                "names": [field.name for field in known],
-                "formats": [_format(order, field) for field in known],
-                "offsets": [field.offset for field in known],
-                "itemsize": cloud.point_step,
-            }
-        )
+        layout = _layout(cloud.fields, ">" if cloud.is_bigendian else "<", cloud.point_step)
         rows = numpy.frombuffer(cloud.data, numpy.uint8, cloud.height * cloud.row_step)
     except ValueError as error:
         raise ValueError(f"the cloud does not fit its own description: {error}") from None
@@ -87,9 +89,27 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
     return numpy.ascontiguousarray(rows).reshape(-1).view(layout)
 
 
+def _layout(fields: Sequence[PointField], order: str, step: int | None = None) -> numpy.dtype[numpy.void]:
+    """Return the layout of a point of ``step`` bytes; by default it ends with its last field. Raise ValueError."""
+    import numpy
+
+    known = [field for field in fields if field.datatype in _FORMATS]
+    formats = [numpy.dtype(_format(order, field)) for field in known]
+    if step is None:
+        step = max((f.offset + kind.itemsize for f, kind in zip(known, formats, strict=True)), default=0)
+    return numpy.dtype(
+        {
+            "names": [field.name for field in known],
+            "formats": formats,
+            "offsets": [field.offset for field in known],
+            "itemsize": step,
+        }
+    )
+
+
 def _format(order: str, field: PointField) -> str | tuple[str, tuple[int]]:
     kind = order + _FORMATS[field.datatype]
-    return (kind, (field.count,)) if field.count > 1 else kind
+    return (kind, (field.count,)) if field.count != 1 else kind
 
 
 TransformRegistration().add(PointCloud2, do_transform_cloud)

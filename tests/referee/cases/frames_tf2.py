@@ -85,6 +85,11 @@ moved = tf2_sensor_msgs.tf2_sensor_msgs.do_transform_cloud(
 show(moved.header.frame_id, moved.height, moved.width, moved.point_step, moved.row_step, len(moved.fields))
 show([round(each, 4) + 0.0 for each in struct.unpack("<12f", moved.data)])
 show([round(each, 4) + 0.0 for each in struct.unpack("<12f", buffer.transform(cloud, "map").data)])
+fields[3] = sensor.PointField("i", 14, sensor.PointField.UINT16, 1)
+data = struct.pack(">3fHHI", 1, 2, 3, 9, 10, 11)
+cloud = sensor.PointCloud2(header, 1, 1, fields, True, 20, 20, data, True)
+moved = buffer.transform(cloud, "map")
+show(moved.is_dense, moved.is_bigendian, moved.point_step, moved.row_step, bytes(moved.data[12:]).hex())
 
 for name in ("TransformException", "LookupException", "ExtrapolationException", "TimeoutException"):
     kind = getattr(tf2_ros, name)
