@@ -26,6 +26,7 @@
     |   |   +-- BagFormatError          bytes that are not what the bag format prescribes
     |   |   +-- BagVersionError         a version of the format that cannot be read
     |   |   +-- BagUnindexedError       a bag without its index: it was not closed, or its end is missing
+    |   |   |   `-- McapUnindexedError  an MCAP file without its summary, likewise
     |   |   +-- BagEncryptedError       the bag is encrypted
     |   |   +-- BagCompressionError     a compression that is unknown, or whose library is missing
     |   +-- BoardError                  the virtual board cannot be reached
@@ -76,6 +77,7 @@ __all__ = [
     "LookupException",
     "ManifestError",
     "MasterUnreachableError",
+    "McapUnindexedError",
     "MessageException",
     "MinirospyError",
     "NodeUnreachableError",
@@ -317,6 +319,13 @@ class BagUnindexedError(BagError):
 
     def __str__(self) -> str:
         return "Unindexed bag"
+
+
+class McapUnindexedError(BagUnindexedError):
+    """The MCAP file was not completed, or its summary is damaged; ``why`` is the fault."""
+
+    def __str__(self) -> str:
+        return f"the MCAP file is not complete: {self.why}"
 
 
 class BagEncryptedError(BagError):

@@ -5,7 +5,7 @@ Opening reads the summary at the file's end. Needs the extra ``minirospy[mcap]``
 
 from __future__ import annotations
 
-import contextlib
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -13,10 +13,11 @@ from minirospy.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.bag.chunks import StoredChunk
 from minirospy.bag.compression import NONE
 from minirospy.bag.index import ConnectionIndex
+from minirospy.bag.mcap_repair import MAGIC, mcap_faults
 from minirospy.bag.mcap_writer import check_mcap
 from minirospy.bag.reader import open_bag
 from minirospy.bag.records import Chunk, ChunkInfo, Connection, Fields
-from minirospy.errors import BagFormatError, BagUnindexedError
+from minirospy.errors import BagFormatError, McapUnindexedError
 
 if TYPE_CHECKING:
     from mcap.reader import SeekingReader
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from mcap.summary import Summary
 
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
-
-MAGIC = b"\x89MCAP0\r\n"
-"""The first and the last bytes of a file."""
 
 
 def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
@@ -41,7 +39,7 @@ class McapReader(BagReader):
     """An MCAP file of profile ``ros1``; its channels are the connections.
 
     Channels of other encodings are not read: ``foreign`` names their topics. Raise BagFormatError where the file is damaged,
-    BagUnindexedError where it has no summary, BagError if the extra is missing.
+    McapUnindexedError where its summary is missing or damaged, BagError if the extra is missing.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -52,11 +50,19 @@ class McapReader(BagReader):
         self.stream = stream
         self.foreign: list[str] = []
         self.connections = {}
-        with _faults():
-            self._reader: SeekingReader = SeekingReader(stream)
-            summary = self._reader.get_summary()
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(size - len(MAGIC), 0))
+        if size < 2 * len(MAGIC) or stream.read() != MAGIC:
+            raise McapUnindexedError("its end is missing")
+        stream.seek(0)
+        try:
+            with mcap_faults():
+                self._reader: SeekingReader = SeekingReader(stream)
+                summary = self._reader.get_summary()
+        except BagFormatError as error:
+            raise McapUnindexedError(error.why) from error
         if summary is None or summary.statistics is None:
-            raise BagUnindexedError("the MCAP file has no summary")
+            raise McapUnindexedError("it has no summary")
         for channel in summary.channels.values():
             schema = summary.schemas.get(channel.schema_id)
             if channel.message_encoding == "ros1" and schema is not None:
@@ -88,7 +94,7 @@ class McapReader(BagReader):
         """See :meth:`BagReader.messages`."""
         wanted = {number: self.connections[number] for number in connections or self.connections}
         topics = {connection.topic for connection in wanted.values()}
-        with _faults():
+        with mcap_faults():
             for _, channel, message in self._reader.iter_messages(
                 topics, starting_at=start, ending_before=None if end is None else end + 1
             ):
@@ -114,22 +120,6 @@ class McapReader(BagReader):
         for message in self.messages(list(indexes)):
             indexes[message.connection.id].extend([message.time], [0], 0)
         return list(indexes.values())
-
-
-@contextlib.contextmanager
-def _faults() -> Iterator[None]:
-    """Turn what the library raises on damaged files into BagFormatError."""
-    import struct
-
-    from mcap.exceptions import McapError
-
-    try:
-        yield
-    except (McapError, struct.error, KeyError, StopIteration, UnicodeDecodeError) as error:
-        raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
-    except (EOFError, OSError, ValueError, RuntimeError) as error:
-        # Of the decompressors, and of seeking before the start of a short file.
-        raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
 def _connection(channel: Channel, schema: Schema) -> Connection:

@@ -55,7 +55,7 @@ class McapWriter:
         self._stream = stream
         self._chunk_size = chunk_size
         self._is_plain = compression == "none"
-        self._gathered = 0
+        self._gathered = self._count = 0
         self._writer: Writer = Writer(
             cast(BinaryIO, _Whole(stream)),
             chunk_size=chunk_size,
@@ -99,6 +99,7 @@ class McapWriter:
         whole = b"".join((body, tail)) if tail else body
 
         self._gathered += len(whole)
+        self._count += 1
         # A view is copied into the chunk by the library.
         self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
         if self._gathered > self._chunk_size:
@@ -115,8 +116,17 @@ class McapWriter:
             self._stream.flush()
 
     def salvage(self, written: int | None = None) -> int:
-        """Raise OSError: a file without its summary is left to tools such as ``mcap recover``."""
-        raise OSError("the file has no summary")
+        """Complete a file whose stream has failed with the chunks before, read back; return how many messages are lost.
+
+        As :meth:`minirospy.bag.writer.BagWriter.salvage`. Raise BagFormatError or OSError if not even an empty file fits.
+        """
+        from minirospy.bag.mcap_repair import McapRepair
+
+        self._closed = True
+        repair = McapRepair(self._stream, written)
+        for _ in repair.run():
+            pass
+        return self._count - repair.apply()
 
 
 class _Whole:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.bag import compression as compressions
 from minirospy.bag.base import BagReader
-from minirospy.bag.mcap_reader import MAGIC, open_bag_or_mcap
+from minirospy.bag.mcap_reader import open_bag_or_mcap
+from minirospy.bag.mcap_repair import MAGIC, McapRepair
 from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import Connection, read_version
 from minirospy.bag.repair import Repair
@@ -216,8 +217,18 @@ def filter_bag(
 
 
 def reindex(path: str, progress: Progress) -> list[str]:
-    """Make the index of a bag of version 2.0 again, in place; return what could not be recovered. Raise BagError, OSError."""
+    """Make the index of a bag of version 2.0, or an MCAP file, again, in place; return what could not be recovered.
+
+    Raise BagError, OSError.
+    """
+    is_other = is_mcap(path)
     with open(path, "r+b") as stream:
+        if is_other:
+            mcap = McapRepair(stream)
+            for position in mcap.run():
+                progress(position)
+            mcap.apply()
+            return mcap.problems
         repair = Repair(stream)
         for position in repair.run():
             progress(position)

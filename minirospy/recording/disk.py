@@ -84,6 +84,12 @@ class QueuedFile:
         self._do(lambda: self._write_all(data), size)
         return size
 
+    def read(self, size: int = -1) -> bytes:
+        """Return the bytes at the current position. In the disk's thread."""
+        data = self._file.read(size) or b""
+        self._position += len(data)
+        return data
+
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek from the start, or to the end."""
         if whence == os.SEEK_END:

@@ -340,8 +340,7 @@ class Recorder:
     def _disk_failed(self, file: BagFile, error: Exception, lost: int) -> None:
         why = _reason(error)
         if lost < 0:
-            tool = "mcap recover" if self.options.mcap else "rosbag reindex"
-            client.logerr("Error writing: %s: %s. `%s` may save it", file.active_name, why, tool)
+            client.logerr("Error writing: %s: %s. `rosbag reindex` may save it", file.active_name, why)
         else:
             client.logerr(
                 "Error writing: %s: %s. Recording ends; %d messages are lost, the bag has those before",

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import sys
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
 
 from minirospy.bag.base import StoredMessage
 from minirospy.bag.mcap_reader import McapReader, open_bag_or_mcap
+from minirospy.bag.mcap_repair import McapRepair
 from minirospy.bag.mcap_writer import McapWriter
-from minirospy.bag.writer import BagWriter
+from minirospy.bag.writer import BagWriter, Buffer
 from minirospy.errors import BagCompressionError, BagError, BagUnindexedError, UsageError
 from minirospy.introspect.bag_convert import convert
 
@@ -149,6 +153,100 @@ def test_a_file_without_a_summary_is_named() -> None:
 
     with pytest.raises(BagUnindexedError):
         McapReader(stream)
+
+
+def repaired(data: bytes) -> tuple[McapRepair, io.BytesIO]:
+    stream = io.BytesIO(data)
+    repair = McapRepair(stream)
+    positions = list(repair.run())
+    assert positions == sorted(set(positions))
+    repair.apply()
+    stream.seek(0)
+    return repair, stream
+
+
+def library_reads(stream: io.BytesIO) -> list[tuple[int, bytes]]:
+    """Return times and bodies as the mcap library reads them, by the summary, and without it."""
+    stream.seek(0)
+    by_summary = [(each.log_time, each.data) for _, _, each in make_reader(stream).iter_messages()]
+    stream.seek(0)
+    by_stream = [
+        (each.log_time, each.data)
+        for each in StreamReader(stream, validate_crcs=True).records
+        if isinstance(each, Message)
+    ]
+    assert by_summary == sorted(by_stream)
+    return by_summary
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_a_file_that_is_cut_off_is_repaired_up_to_its_last_whole_chunk(compression: str) -> None:
+    whole = made(compression)
+    expected = library_reads(whole)
+    data = whole.getvalue()
+    last = 0
+    for size in [*range(60, len(data) - 700, len(data) // 100), *range(len(data) - 700, len(data) + 1)]:
+        _, stream = repaired(data[:size])
+        found = library_reads(stream)
+        assert set(found) <= set(expected)
+        assert len(found) >= last
+        last = len(found)
+        reader = McapReader(stream)
+        assert len(list(reader.messages())) == len(found) == reader.statistics.message_count
+    assert found == expected
+    with pytest.raises(BagError, match="not whole"):
+        repaired(data[:12])
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_a_damaged_chunk_costs_its_own_messages_alone(compression: str) -> None:
+    data = bytearray(made(compression).getvalue())
+    second = McapReader(io.BytesIO(bytes(data))).chunks[1]
+    data[second.position + 70] ^= 0xFF
+
+    repair, stream = repaired(bytes(data))
+
+    assert len(repair.problems) == 1
+    assert f"record at byte {second.position}: not a whole MCAP file: " in repair.problems[0]
+    assert 0 < len(list(McapReader(stream).messages())) < 5
+
+
+class Full(io.BytesIO):
+    """A disk that takes so many bytes."""
+
+    room = 0
+
+    def write(self, data: Buffer, /) -> int:  # type: ignore[override]
+        if self.tell() + len(data) > self.room:
+            super().write(bytes(data)[: max(self.room - self.tell(), 0)])
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(data)
+
+
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_a_full_disk_leaves_a_readable_file(compression: str) -> None:
+    lengths = []
+    for room in range(1500, 20_000, 500):
+        stream = Full()
+        stream.room = room
+        writer = McapWriter(stream, compression=compression, chunk_size=200)
+        connection = writer.add_connection("/chatter", HEADER)
+        count = 0
+        try:
+            for count in range(1, 201):
+                writer.write(connection, count, b"%060d" % count)
+            writer.close()
+            lost = 0
+        except OSError:
+            lost = writer.salvage()
+
+        found = library_reads(stream)
+        assert len(found) == count - lost
+        assert [time for time, _ in found] == list(range(1, len(found) + 1))
+        lengths.append(len(found))
+    assert lengths == sorted(lengths)
+    assert lengths[0] < 20
+    assert lengths[-1] > 50
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -337,3 +337,24 @@ def test_filter_writes_no_bag_named_as_an_mcap_file(bag: Path, command: Command)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert err.startswith("rosbag: ERROR: r.mcap would be a bag: ")
     assert os.listdir() == ["a.bag"]
+
+
+def test_reindex_recovers_an_mcap_file_whose_end_is_missing(bag: Path, command: Command) -> None:
+    assert command("rosbag", "convert", "-q", "a.bag", "r.mcap").status == 0
+    whole = Path("r.mcap").read_bytes()
+    Path("r.mcap.active").write_bytes(whole[:-100])
+    why = "is not complete: its end is missing"
+    said = f"ERROR: r.mcap.active {why}; `rosbag reindex r.mcap.active`\n"
+    assert command("rosbag", "info", "r.mcap.active") == (1, "", said)
+    status, _, err = command("rosbag", "convert", "-q", "r.mcap.active", "b.bag")
+    assert (status, err) == (
+        1,
+        "rosbag: ERROR: r.mcap.active: the MCAP file is not complete: its end is missing. "
+        "Run `rosbag reindex r.mcap.active`\n",
+    )
+
+    assert command("rosbag", "reindex", "-q", "r.mcap.active") == (0, "", "")
+    assert Path("r.mcap.orig.active").read_bytes() == whole[:-100]
+    assert command("rosbag", "info", "-y", "-k", "messages", "r.mcap.active").out == "100\n"
+    assert command("rosbag", "convert", "-q", "r.mcap.active", "b.bag").status == 0
+    assert messages(Path("b.bag")) == messages(bag)

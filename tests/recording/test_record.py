@@ -265,6 +265,27 @@ def test_a_full_disk_leaves_a_readable_bag(talker: Talker, start: Start, tmp_pat
     assert found == [f"{i:04}" for i in range(len(found))]
 
 
+@POSIX_ONLY
+def test_a_full_disk_leaves_a_readable_mcap_file(talker: Talker, start: Start, tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+
+    chatter = talker.advertise("/chatter")
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))"
+    process = start("record", "--mcap", "--chunksize", "10", "-O", "out", "/chatter", prelude=limit)
+    connected(chatter)
+    for i in range(400):
+        say(chatter, f"{i:04}" + "x" * 1000)
+    _, errors = process.communicate(timeout=GUARD)
+
+    assert process.returncode == 1
+    assert len(errors.splitlines()) == 1, errors
+    assert "Error writing: out.mcap: File too large. Recording ends;" in errors
+    with (tmp_path / "out.mcap").open("rb") as stream:
+        found = [said(one.data)[:4] for _, _, one in make_reader(stream).iter_messages()]
+    assert len(found) > 200
+    assert found == [f"{i:04}" for i in range(len(found))]
+
+
 @pytest.mark.parametrize("chunk", ["10", "4096"])
 def test_a_chunk_that_cannot_be_compressed_leaves_a_readable_bag(
     talker: Talker, start: Start, tmp_path: Path, chunk: str

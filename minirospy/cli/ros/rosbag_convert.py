@@ -6,7 +6,7 @@ import os
 
 from minirospy.cli.parser import Parser
 from minirospy.cli.verbs import Verb
-from minirospy.errors import BagError, NotFoundError
+from minirospy.errors import BagError, BagUnindexedError, NotFoundError
 
 __all__ = ["VERB"]
 
@@ -40,6 +40,8 @@ def _convert(source: str, target: str, compression: str, force: bool, quiet: boo
     try:
         with showing_progress(target, os.path.getsize(source), quiet=quiet) as step:
             convert(source, target, compression=compression, force=force, step=step)
+    except BagUnindexedError as error:
+        raise BagError(f"{source}: {error}. Run `rosbag reindex {source}`") from error
     except BagError as error:
         raise BagError(f"{source}: {error}") from error
 

@@ -12,6 +12,7 @@ from minirospy.errors import (
     BagEncryptedError,
     BagError,
     BagUnindexedError,
+    McapUnindexedError,
     MessageException,
     MinirospyError,
     ValueTextError,
@@ -31,6 +32,8 @@ def unreadable(path: str, error: BagError | OSError) -> str:
     """Return ROS's line about a bag that cannot be opened or read."""
     if isinstance(error, BagEncryptedError):
         return f"ERROR: {error}"
+    if isinstance(error, McapUnindexedError):
+        return f"ERROR: {path} is not complete: {error.why}; `rosbag reindex {path}`"
     if isinstance(error, BagUnindexedError):
         return f"ERROR bag unindexed: {path}.  Run rosbag reindex."
     return f"ERROR reading {path}: {error}"

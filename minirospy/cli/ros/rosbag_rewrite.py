@@ -89,7 +89,7 @@ def _reindex_one(source: str, target: str, quiet: bool) -> None:
     from minirospy.introspect import bags
 
     size = os.path.getsize(source)
-    if bags.version_of(source) < 200:
+    if not bags.is_mcap(source) and bags.version_of(source) < 200:
         with showing_progress(target, size, quiet=quiet) as progress:
             bags.convert12(source, target, progress)
         return
@@ -121,7 +121,7 @@ def _rewrite(
     for path in paths:
         if not _is_readable(path, unindexed=unindexed):
             continue
-        if is_mcap(path):
+        if not unindexed and is_mcap(path):
             report(
                 f"ERROR: {path} is an MCAP file, and the result would be a bag: "
                 f"`rosbag convert -c lz4 {path} OTHER.mcap` changes its compression"
