@@ -358,3 +358,9 @@ def test_reindex_recovers_an_mcap_file_whose_end_is_missing(bag: Path, command: 
     assert command("rosbag", "info", "-y", "-k", "messages", "r.mcap.active").out == "100\n"
     assert command("rosbag", "convert", "-q", "r.mcap.active", "b.bag").status == 0
     assert messages(Path("b.bag")) == messages(bag)
+
+
+def test_reindex_into_a_missing_folder_has_status_1(bag: Path, command: Command) -> None:
+    Path("cut.bag").write_bytes(bag.read_bytes()[:-100])
+    said = "ERROR writing to none/cut.bag: [Errno 2] No such file or directory: 'none/cut.bag'\n"
+    assert command("rosbag", "reindex", "--output-dir=none", "cut.bag") == (1, "", said)

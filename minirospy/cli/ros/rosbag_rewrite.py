@@ -131,7 +131,9 @@ def _rewrite(
         if output_dir is not None:
             target = os.path.join(output_dir, os.path.basename(path))
             if os.path.realpath(target) != os.path.realpath(path):
-                _write(path, path, target, write)
+                if not _write(path, path, target, write) and unindexed:
+                    # As in ROS, where compress and decompress go on with status 0.
+                    status = 1
                 continue
 
         backup = backup_path(path)
@@ -167,7 +169,8 @@ def _is_readable(path: str, *, unindexed: bool) -> bool:
         return False
 
 
-def _write(path: str, source: str, target: str, write: Callable[[str, str], None]) -> None:
+def _write(path: str, source: str, target: str, write: Callable[[str, str], None]) -> bool:
+    """Write a bag again; return False if the target cannot be created."""
     try:
         with open(target, "wb"):
             pass
@@ -175,7 +178,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
         report(f"ERROR writing to {target}: {error}")
         if source != path:
             os.replace(source, path)
-        return
+        return False
     try:
         write(source, target)
     except BagError as error:
@@ -189,6 +192,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
         report(f"ERROR operating on {path}: {error}")
         if source != path:
             os.replace(source, path)
+    return True
 
 
 def _encrypt_parser() -> Parser:
