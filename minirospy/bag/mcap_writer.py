@@ -16,7 +16,14 @@ from minirospy.errors import BagCompressionError, BagError, BagFormatError
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-__all__ = ["CHUNK_SIZE", "COMPRESSIONS", "SCHEMA_FIELDS", "McapWriter", "check_mcap"]
+__all__ = [
+    "CHUNK_SIZE",
+    "COMPRESSIONS",
+    "SCHEMA_FIELDS",
+    "McapWriter",
+    "check_mcap",
+    "check_mcap_compression",
+]
 
 CHUNK_SIZE = 4 * 1024 * 1024
 """Bytes of a chunk before compression, as the MCAP tools have it: the summary that `rosbag info` reads has a record of each."""
@@ -40,6 +47,12 @@ def check_mcap() -> None:
         raise BagError(f"MCAP files need the library {error.name}: pip install 'minirospy[mcap]'") from error
 
 
+def check_mcap_compression(name: str) -> None:
+    """Raise BagCompressionError unless chunks of MCAP files can be compressed so."""
+    if name not in COMPRESSIONS:
+        raise BagCompressionError(name, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
+
+
 class McapWriter:
     """Writes an MCAP file into a binary stream, which it does not close. As :class:`minirospy.bag.writer.BagWriter`.
 
@@ -47,8 +60,7 @@ class McapWriter:
     """
 
     def __init__(self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_SIZE) -> None:
-        if compression not in COMPRESSIONS:
-            raise BagCompressionError(compression, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
+        check_mcap_compression(compression)
         check_mcap()
         from mcap.writer import CompressionType, Writer
 

@@ -6,12 +6,29 @@ import contextlib
 import os
 from collections.abc import Callable
 
-from minirospy.bag.mcap_writer import McapWriter
+from minirospy.bag.compression import check_compression
+from minirospy.bag.mcap_writer import McapWriter, check_mcap_compression
 from minirospy.bag.writer import BagWriter
 from minirospy.errors import BagError, UsageError
 from minirospy.introspect.bags import naming_full_disk, open_reader
 
-__all__ = ["convert"]
+__all__ = ["check", "convert"]
+
+
+def check(source: str, target: str, *, compression: str, force: bool) -> None:
+    """Raise what :func:`convert` raises before it writes: UsageError, BagError, OSError."""
+    if not target.endswith((".bag", ".mcap")):
+        raise UsageError(f"{target} must end with .bag or .mcap")
+    if os.path.exists(target) and not force:
+        raise UsageError(f"{target} exists already: remove it, or add -f")
+    if os.path.exists(target) and os.path.samefile(source, target):
+        raise UsageError(f"{target} is the file that is read")
+    if target.endswith(".mcap"):
+        check_mcap_compression(compression)
+    else:
+        check_compression(compression)
+    with open_reader(source):
+        pass
 
 
 def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
@@ -20,12 +37,7 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
     ``step`` is called with the bytes of messages that are done. ``force``: replace a file. A file that was not completed is
     removed. Raise UsageError if ``target`` exists, BagError, OSError.
     """
-    if not target.endswith((".bag", ".mcap")):
-        raise UsageError(f"{target} must end with .bag or .mcap")
-    if os.path.exists(target) and not force:
-        raise UsageError(f"{target} exists already: remove it, or add -f")
-    if os.path.exists(target) and os.path.samefile(source, target):
-        raise UsageError(f"{target} is the file that is read")
+    check(source, target, compression=compression, force=force)
 
     partial = f"{target}.active"
     count = done = 0

@@ -364,3 +364,26 @@ def test_reindex_into_a_missing_folder_has_status_1(bag: Path, command: Command)
     Path("cut.bag").write_bytes(bag.read_bytes()[:-100])
     said = "ERROR writing to none/cut.bag: [Errno 2] No such file or directory: 'none/cut.bag'\n"
     assert command("rosbag", "reindex", "--output-dir=none", "cut.bag") == (1, "", said)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("a.bag a.mcap", "a.mcap exists already: remove it, or add -f"),
+        ("a.bag b.txt", "b.txt must end with .bag or .mcap"),
+        ("-c bz2 a.bag b.mcap", "MCAP files have one of: none, lz4, zstd"),
+        ("-c zstd a.bag b.bag", "zstd"),
+        ("cut.bag b.mcap", "cut.bag: Unindexed bag"),
+    ],
+)
+def test_convert_shows_no_progress_before_an_error(
+    bag: Path, command: Command, words: str, said: str
+) -> None:
+    assert command("rosbag", "convert", "-q", "a.bag", "a.mcap").status == 0
+    Path("cut.bag").write_bytes(bag.read_bytes()[:-100])
+
+    status, out, err = command("rosbag", "convert", *words.split())
+
+    assert status
+    assert (out, err.count("\n")) == ("", 1)
+    assert said in err
