@@ -121,7 +121,7 @@ class Player:
         if options.wait_for_subscribers:
             self._wait_for_subscribers()
 
-        last = min(times[1], end or times[1])
+        last = self._bags.last_time(selection) if options.topics or end else times[1]
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
         # A collection that visits all that was imported takes milliseconds.

@@ -75,6 +75,10 @@ class Bags:
         spans = [span for reader in self.readers if (span := _span(reader))]
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
+    def last_time(self, selection: Selection) -> int:
+        """Return the time of the last message of a selection that is not empty. Few chunks are read for that."""
+        return max(_last_time(reader, selection) for reader in self.readers)
+
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
         """Yield the messages in the order of time, each with the number of its bag. Raise BagFormatError."""
         return heapq.merge(
@@ -157,12 +161,32 @@ def _span(reader: BagReader) -> tuple[int, int] | None:
     return min(index.times[0] for index in indexes), max(index.times[-1] for index in indexes)
 
 
-def _numbered(number: int, reader: BagReader, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
-    wanted = [
+def _last_time(reader: BagReader, selection: Selection) -> int:
+    """Return the time of the last message of a selection; 0 if there is none."""
+    wanted = _wanted(reader, selection)
+    end = selection.end
+    found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
+    # Of a bag without chunks all are read.
+    starts: list[int | None] = [*sorted(found, reverse=True)] or [selection.start]
+    for start in starts:
+        newest = deque(reader.messages(wanted, start, end), maxlen=1) if wanted else ()
+        for message in newest:
+            return message.time
+        end = None if start is None else start - 1
+    return 0
+
+
+def _wanted(reader: BagReader, selection: Selection) -> list[int]:
+    """Return the connections of the topics that are selected."""
+    return [
         connection.id
         for connection in reader.connections.values()
         if not selection.topics or connection.topic in selection.topics
     ]
+
+
+def _numbered(number: int, reader: BagReader, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
+    wanted = _wanted(reader, selection)
     if not wanted:
         return
     for message in reader.messages(wanted, selection.start, selection.end):

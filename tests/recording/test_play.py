@@ -326,6 +326,27 @@ def test_keys_of_a_terminal(ear: Ear, start: Start, tmp_path: Path) -> None:
     assert after == before
 
 
+@pytest.mark.parametrize("format_", ["bag", "mcap"])
+@pytest.mark.parametrize(
+    ("words", "length"),
+    [("", "0.400000"), ("--topics /a", "0.300000"), ("-u 0.25", "0.200000")],
+)
+def test_the_duration_is_that_of_the_messages_that_are_played(
+    master: str, start: Start, tmp_path: Path, words: str, length: str, format_: str
+) -> None:
+    given = [("/a", 0, "1"), ("/b", 0.1, "2"), ("/b", 0.2, "3"), ("/a", 0.3, "4"), ("/b", 0.4, "5")]
+    name = make_bag(tmp_path / "one.bag", given)
+    if format_ == "mcap":
+        from minirospy.introspect.bag_convert import convert
+
+        name = str(tmp_path / "one.mcap")
+        convert(str(tmp_path / "one.bag"), name, compression="none", force=False, step=lambda _: None)
+    output, errors = start("play", name, "-i", *words.split()).communicate(timeout=GUARD)
+
+    assert errors == ""
+    assert f" / {length} " in output
+
+
 def test_an_unindexed_bag_is_named(master: str, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", 0, "1")])
     os.truncate(tmp_path / name, (tmp_path / name).stat().st_size - 10)
