@@ -193,7 +193,8 @@ class Player:
             not publisher.get_num_connections() for publisher, _ in self._publishers.values()
         ):
             self._sleep(_TICK // 10)
-        self._say("Finished waiting for subscribers.")
+        if not self._ended:
+            self._say("Finished waiting for subscribers.")
 
     # --- playing
 

@@ -347,6 +347,17 @@ def test_the_duration_is_that_of_the_messages_that_are_played(
     assert f" / {length} " in output
 
 
+def test_ctrl_c_while_it_waits_for_subscribers_ends_it(master: str, start: Start, tmp_path: Path) -> None:
+    name = make_bag(tmp_path / "one.bag", [("/a", 0, "1")])
+    process = start("play", name, "--wait-for-subscribers")
+    read_until(process, "Waiting for subscribers.")
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=GUARD)
+
+    assert (process.returncode, errors) == (0, "")
+    assert "Finished waiting" not in output
+
+
 def test_an_unindexed_bag_is_named(master: str, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", 0, "1")])
     os.truncate(tmp_path / name, (tmp_path / name).stat().st_size - 10)
