@@ -33,7 +33,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
     finally:
         stop.set()
         if thread:
-            # It gives the terminal back as it was.
+            # It restores the terminal.
             thread.join(1.0)
 
 
@@ -45,7 +45,7 @@ def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
         terminal = _Terminal(number) if os.isatty(number) else None
         try:
             while not stop.is_set():
-                if terminal and not terminal.take():
+                if terminal and not terminal.set_up():
                     stop.wait(0.2)
                     continue
                 if not select.select([number], [], [], _POLL_SECONDS)[0]:
@@ -57,7 +57,7 @@ def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
                     on_key(key)
         finally:
             if terminal:
-                terminal.give_back()
+                terminal.restore()
 
 
 class _Terminal:
@@ -67,8 +67,8 @@ class _Terminal:
         self._number = number
         self._before: list[object] | None = None
 
-    def take(self) -> bool:
-        """Set the terminal up; return False in the background, where a read would stop the process."""
+    def set_up(self) -> bool:
+        """Have the terminal pass each key; return False in the background, where a read would stop the process."""
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False
@@ -81,8 +81,8 @@ class _Terminal:
             termios.tcsetattr(self._number, termios.TCSANOW, mode)
         return True
 
-    def give_back(self) -> None:
-        """Set the terminal as it was."""
+    def restore(self) -> None:
+        """Restore the settings that the terminal had."""
         if self._before is not None and os.tcgetpgrp(self._number) == os.getpgrp():
             import termios
 

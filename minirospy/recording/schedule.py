@@ -158,7 +158,7 @@ class Schedule:
         self._pauses_at = () if self._pauses_at else self._options.pause_topics
 
     def control_rate(self, stamp: int) -> None:
-        """Note the stamp of the last message of the topic that controls the rate."""
+        """Store the stamp of the last message of the topic that controls the rate."""
         self._controlled = stamp
 
     def tick(self, wall: int) -> int | None:
