@@ -572,6 +572,7 @@ _CHANGING = [
     # Where packages are installed.
     (re.compile(r"\[\['\S*/(?=\w+/(?:msg|srv)'\]\])"), "[['SHARE/"),
     (re.compile(r"(?<=named nope below )\S*/"), "SHARE/"),
+    (re.compile(r"(?<=package \[std_msgs\] in )\S*/"), "SHARE/"),
     (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
     # roslaunch colours its errors also where they go to a file, and writes tracebacks that ours has none of.
     (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),
