@@ -56,7 +56,12 @@ args = rospy.Subscriber("/chatter", Int32, lambda message, extra: note("args", m
 none = rospy.Subscriber("/chatter", Int32)
 false = rospy.Subscriber("/chatter", Int32, lambda *values: note("false", len(values)), callback_args=0)
 show(none.callback, plain.callback_args, args.callback_args, plain.impl is args.impl, plain.name, plain.type)
-show("connected", eventually(lambda: publisher.get_num_connections() == 1), plain.get_num_connections())
+# Each end sees the connection by itself.
+show(
+    "connected",
+    eventually(lambda: publisher.get_num_connections() == 1 == plain.get_num_connections()),
+    plain.get_num_connections(),
+)
 for number in range(3):
     publisher.publish(number)
 for key in ("plain", "args", "false"):
