@@ -45,7 +45,7 @@
     +-- TransformException              tf2's tree (http://wiki.ros.org/tf2/Errors)
     |   +-- ConnectivityException       the two frames are in different trees
     |   +-- LookupException             a frame that no transform has named, or a loop
-    |   +-- ExtrapolationException      a time for which there is no data
+    |   +-- ExtrapolationException      a time without data
     |   +-- InvalidArgumentException    a frame's name that is empty or starts with a slash
     |   +-- TimeoutException            a buffer server that does not answer
     +-- MessageException                genpy's tree: values and bytes that do not fit a message
@@ -451,7 +451,7 @@ class LookupException(TransformException):
 
 
 class ExtrapolationException(TransformException):
-    """There is no data for the time of a lookup."""
+    """The buffer has no data for the time of a lookup."""
 
     __module__ = "tf2"
 

@@ -49,7 +49,7 @@ _ALONE_BODY = 1024 * 1024
 """Of requests beyond this one is read at a time: its values may take some times as much memory."""
 
 _PROGRESS = 65536
-"""Bytes that have moved set the time limit anew: a large value may be long under way by a poor radio."""
+"""Bytes that have moved restart the time limit: a poor radio may need long for a large value."""
 
 _MOST_UNREAD = 256 * 1024
 """Bytes of answers that wait for a client to read them, before it gets no more."""
