@@ -40,6 +40,7 @@ test: $(STAMP)
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
+	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck" tests/workspace
 
 guard: $(STAMP)
 	@$(BIN)/python benchmarks/guard.py

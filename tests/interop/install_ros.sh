@@ -1,20 +1,90 @@
 #!/bin/sh
 # Real ROS 1 from Debian, the referee of the interop tests: rospy, roscpp, the commands, and what builds a C++ peer.
+# And the shells that the tests of setup files run in where they are installed.
 # Everything goes to /usr; nothing of it is used by minirospy itself. Does nothing where it is installed already.
 set -eu
-packages="ros-core openssh-server openssh-client rosbash python3-rospy python3-rosmaster python3-std-srvs python3-sensor-msgs python3-nav-msgs
-python3-diagnostic-msgs python3-tf2-msgs python3-actionlib python3-numpy
-ros-std-msgs ros-std-srvs ros-rosgraph-msgs ros-actionlib-msgs ros-geometry-msgs ros-sensor-msgs ros-diagnostic-msgs
-ros-nav-msgs ros-roscpp-msg ros-shape-msgs ros-stereo-msgs ros-trajectory-msgs ros-visualization-msgs
-ros-map-msgs ros-move-base-msgs ros-pcl-msgs ros-tf2-msgs ros-topic-tools-srvs
-python3-shape-msgs python3-stereo-msgs python3-trajectory-msgs python3-visualization-msgs python3-map-msgs
-python3-move-base-msgs python3-pcl-msgs python3-bond python3-dynamic-reconfigure python3-message-filters python3-angles python3-cv-bridge libdynamic-reconfigure-config-init-mutex-dev python3-rostest python3-topic-tools topic-tools libtopic-tools-dev libroslib-dev
-python3-tf2-ros python3-tf python3-tf2-geometry-msgs python3-tf2-sensor-msgs python3-tf2-kdl python3-tf-conversions python3-pykdl
-tf2-tools tf-tools libtf2-dev libtf2-ros-dev
-catkin cmake ros-message-generation
-python3-rosbag python3-roslz4
-g++ pkg-config libroscpp-dev libsensor-msgs-dev libstd-srvs-dev libactionlib-dev iproute2
-ros-robot-state-publisher joint-state-publisher liburdfdom-tools tf-tools tf2-tools python3-tf2-ros graphviz"
+# One package a line, sorted.
+packages="
+catkin
+cmake
+fish
+g++
+graphviz
+iproute2
+joint-state-publisher
+libactionlib-dev
+libdynamic-reconfigure-config-init-mutex-dev
+libroscpp-dev
+libroslib-dev
+libsensor-msgs-dev
+libstd-srvs-dev
+libtf2-dev
+libtf2-ros-dev
+libtopic-tools-dev
+liburdfdom-tools
+openssh-client
+openssh-server
+pkg-config
+python3-actionlib
+python3-angles
+python3-bond
+python3-cv-bridge
+python3-diagnostic-msgs
+python3-dynamic-reconfigure
+python3-map-msgs
+python3-message-filters
+python3-move-base-msgs
+python3-nav-msgs
+python3-numpy
+python3-pcl-msgs
+python3-pykdl
+python3-rosbag
+python3-roslz4
+python3-rosmaster
+python3-rospy
+python3-rostest
+python3-sensor-msgs
+python3-shape-msgs
+python3-std-srvs
+python3-stereo-msgs
+python3-tf
+python3-tf-conversions
+python3-tf2-geometry-msgs
+python3-tf2-kdl
+python3-tf2-msgs
+python3-tf2-ros
+python3-tf2-sensor-msgs
+python3-topic-tools
+python3-trajectory-msgs
+python3-visualization-msgs
+ros-actionlib-msgs
+ros-core
+ros-diagnostic-msgs
+ros-geometry-msgs
+ros-map-msgs
+ros-message-generation
+ros-move-base-msgs
+ros-nav-msgs
+ros-pcl-msgs
+ros-robot-state-publisher
+ros-roscpp-msg
+ros-rosgraph-msgs
+ros-sensor-msgs
+ros-shape-msgs
+ros-std-msgs
+ros-std-srvs
+ros-stereo-msgs
+ros-tf2-msgs
+ros-topic-tools-srvs
+ros-trajectory-msgs
+ros-visualization-msgs
+rosbash
+shellcheck
+tf-tools
+tf2-tools
+topic-tools
+zsh
+"
 missing=""
 for package in $packages; do
   dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed' || missing="$missing $package"
