@@ -13,6 +13,8 @@ graphviz
 iproute2
 joint-state-publisher
 libactionlib-dev
+libbondcpp-dev
+libdiagnostic-aggregator-tools
 libdynamic-reconfigure-config-init-mutex-dev
 libroscpp-dev
 libroslib-dev
@@ -28,9 +30,12 @@ pkg-config
 python3-actionlib
 python3-angles
 python3-bond
+python3-bondpy
 python3-cv-bridge
 python3-diagnostic-msgs
+python3-diagnostic-updater
 python3-dynamic-reconfigure
+python3-interactive-markers
 python3-map-msgs
 python3-message-filters
 python3-move-base-msgs

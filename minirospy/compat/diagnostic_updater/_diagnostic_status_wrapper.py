@@ -1,0 +1,69 @@
+"""A DiagnosticStatus with methods that fill it."""
+
+from __future__ import annotations
+
+from typing import overload
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+__all__ = ["ERROR", "OK", "WARN", "DiagnosticStatusWrapper"]
+
+OK = DiagnosticStatus.OK
+WARN = DiagnosticStatus.WARN
+ERROR = DiagnosticStatus.ERROR
+
+
+class DiagnosticStatusWrapper(DiagnosticStatus):
+    """A diagnostic_msgs/DiagnosticStatus that is filled step by step; it can be published as it is."""
+
+    def __init__(self, *args: object, **kwds: object) -> None:
+        """Take the values of the fields, all in order or some by name."""
+        super().__init__(*args, **kwds)
+
+    @overload
+    def summary(self, status: DiagnosticStatus, /) -> None: ...
+
+    @overload
+    def summary(self, level: int, message: object, /) -> None: ...
+
+    def summary(self, *args: object) -> None:
+        """Set level and message: ``summary(level, message)``, or ``summary(status)`` with those of another status."""
+        self.level, message = _summary_of(args)
+        self.message = str(message)
+
+    def clearSummary(self) -> None:
+        """Set level OK and no message."""
+        self.summary(OK, "")
+
+    @overload
+    def mergeSummary(self, status: DiagnosticStatus, /) -> None: ...
+
+    @overload
+    def mergeSummary(self, level: int, message: str, /) -> None: ...
+
+    def mergeSummary(self, *args: object) -> None:
+        """Take the higher level; join the messages where both are OK or neither is, else keep the one that is not.
+
+        Arguments as of ``summary``.
+        """
+        level, message = _summary_of(args)
+        if (level > OK) == (self.level > OK):
+            self.message = f"{self.message}; {message}" if self.message else message
+        elif level > self.level:
+            self.message = message
+        self.level = max(self.level, level)
+
+    def add(self, key: str, val: object) -> None:
+        """Append a pair of a key and a value, as text."""
+        self.values.append(KeyValue(key, str(val)))
+
+
+def _summary_of(args: tuple[object, ...]) -> tuple[int, str]:
+    """Return level and message. Raises TypeError for what is neither a status nor a level and a message."""
+    if len(args) == 2:
+        level, message = args
+    elif len(args) == 1 and isinstance(args[0], DiagnosticStatus):
+        level, message = args[0].level, args[0].message
+    else:
+        raise TypeError("a summary is a DiagnosticStatus, or a level and a message")
+    return level, message  # type: ignore[return-value]

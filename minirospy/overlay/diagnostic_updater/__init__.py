@@ -1,0 +1,57 @@
+"""diagnostic_updater, provided by minirospy. Source: http://wiki.ros.org/diagnostic_updater."""
+
+import threading
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from minirospy.compat.diagnostic_updater._diagnostic_status_wrapper import (
+    ERROR,
+    OK,
+    WARN,
+    DiagnosticStatusWrapper,
+)
+from minirospy.compat.diagnostic_updater._diagnostic_updater import (
+    CompositeDiagnosticTask,
+    DiagnosticTask,
+    DiagnosticTaskVector,
+    FunctionDiagnosticTask,
+    Updater,
+)
+from minirospy.compat.diagnostic_updater._publisher import (
+    DiagnosedPublisher,
+    HeaderlessTopicDiagnostic,
+    TopicDiagnostic,
+)
+from minirospy.compat.diagnostic_updater._update_functions import (
+    FrequencyStatus,
+    FrequencyStatusParam,
+    Heartbeat,
+    TimeStampStatus,
+    TimeStampStatusParam,
+)
+
+__all__ = [
+    "ERROR",
+    "OK",
+    "WARN",
+    "CompositeDiagnosticTask",
+    "DiagnosedPublisher",
+    "DiagnosticArray",
+    "DiagnosticStatus",
+    "DiagnosticStatusWrapper",
+    "DiagnosticTask",
+    "DiagnosticTaskVector",
+    "FrequencyStatus",
+    "FrequencyStatusParam",
+    "FunctionDiagnosticTask",
+    "HeaderlessTopicDiagnostic",
+    "Heartbeat",
+    "KeyValue",
+    "TimeStampStatus",
+    "TimeStampStatusParam",
+    "TopicDiagnostic",
+    "Updater",
+    "rospy",
+    "threading",
+]

@@ -1,0 +1,13 @@
+"""diagnostic_updater._publisher, provided by minirospy. Source: http://wiki.ros.org/diagnostic_updater."""
+
+from minirospy.compat.diagnostic_updater._publisher import (
+    DiagnosedPublisher,
+    HeaderlessTopicDiagnostic,
+    TopicDiagnostic,
+)
+
+__all__ = [
+    "DiagnosedPublisher",
+    "HeaderlessTopicDiagnostic",
+    "TopicDiagnostic",
+]
