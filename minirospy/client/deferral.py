@@ -45,14 +45,12 @@ class Deferral:
     @contextlib.contextmanager
     def lifted(self) -> Iterator[None]:
         """Leave the critical section for the length of a block: for the user's code."""
-        if not is_main_thread():
-            yield
-            return
-        depth, self._depth = self._depth, 0
+        depth = int(is_main_thread())
+        self._depth -= depth
         try:
             yield
         finally:
-            self._depth = depth
+            self._depth += depth
 
 
 def is_main_thread() -> bool:

@@ -9,11 +9,11 @@ import contextlib
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from minirospy import errors
 from minirospy.client.deferral import Deferral, is_main_thread
-from minirospy.client.shutdown import Phase, ShutdownMachine, ThreadState
+from minirospy.client.shutdown import Awareness, Phase, ShutdownMachine, ThreadState
 from minirospy.clock import SignalSafeEvent, wait_for_event
 
 __all__ = ["Lifecycle", "ROSInterruptException"]
@@ -29,45 +29,35 @@ class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
     """
 
 
+class _ThisThread(threading.local):
+    def __init__(self, main: ThreadState) -> None:
+        self.state = main if is_main_thread() else ThreadState()
+
+
 class Lifecycle:
     """From the first hook to the last: what runs when the node shuts down, and in which order."""
 
-    def __init__(
-        self,
-        leave: Callable[[], object],
-        stop_leaving: Callable[[], object] = lambda: None,
-        *,
-        is_down: bool = False,
-    ) -> None:
-        """``leave()`` takes the node out of the graph, ``stop_leaving()`` lets it return without the master's answer.
-
-        ``is_down``: in a fork of a process that has shut down.
-        """
+    def __init__(self, leave: Callable[[], object]) -> None:
+        """``leave()`` takes the node out of the graph."""
         self._leave = leave
-        self.stop_leaving = stop_leaving
         self._lock = threading.RLock()
+        self._claim = threading.Lock()
+        """Held from the start of the shutdown on. A lock, since a signal's handler may come between any two steps."""
         self.shutting_down = SignalSafeEvent()
         """Set once the shutdown hooks have run: every blocking call ends."""
-        if is_down:
-            self.shutting_down.set()
         self.left = SignalSafeEvent()
         """Set once the node has left the graph."""
-
-        self.deferral = Deferral()
         self.reason: object = None
         """What the shutdown was requested with."""
+
         self.hooks: list[Callable[[], object]] = []
-        """What on_shutdown was given: called while is_shutdown() is false."""
-        self.late_hooks: list[Callable[[], object]] = []
-        """Called after those, still before is_shutdown() is true."""
+        """Called while is_shutdown() is false."""
         self.interrupts: list[Callable[[], object]] = []
         """Called once is_shutdown() is true, before the node leaves the graph: they end what blocks."""
 
-        self._main = ThreadState()
-        self._thread = threading.local()
-        self.machine = ShutdownMachine(self._main)
-        # A lock, since it is claimed in one step: a signal's handler may come between any two.
-        self._claim = threading.Lock()
+        self.deferral = Deferral()
+        self.machine = ShutdownMachine()
+        self._this_thread = _ThisThread(self.machine.main)
 
     def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
         """Call ``hook`` when the node shuts down, or now where it has; ``hooks``: a list above, by default the first.
@@ -97,17 +87,34 @@ class Lifecycle:
             self.machine.phase = Phase.HOOKS
             try:
                 self._run(self.hooks)
-                self._run(self.late_hooks)
             finally:
-                self._end()
+                with self._lock:
+                    # A hook that is added from now on is called immediately.
+                    self.shutting_down.set()
+                self.machine.phase = Phase.DOWN
+                self._run(list(self.interrupts))
+
+                self.machine.phase = Phase.LEAVING
+                try:
+                    self._leave()
+                finally:
+                    self.machine.phase = Phase.LEFT
+                    self.left.set()
         return True
 
-    def interrupting(self, interrupt: Callable[[], object]) -> _Interrupting:
+    @contextlib.contextmanager
+    def interrupting(self, interrupt: Callable[[], object]) -> Iterator[None]:
         """While a block runs, have a shutdown call ``interrupt`` to end what blocks in it.
 
         A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
         """
-        return _Interrupting(self.interrupts, interrupt, self.shutting_down)
+        self.interrupts.append(interrupt)
+        try:
+            if self.is_shutdown():
+                interrupt()
+            yield
+        finally:
+            self.interrupts.remove(interrupt)
 
     def spin(self) -> None:
         """Wait until the node shuts down."""
@@ -116,8 +123,6 @@ class Lifecycle:
         except KeyboardInterrupt:
             self.signal_shutdown("keyboard interrupt")
         self.poll_shutdown()
-
-    # --- which threads were notified
 
     @property
     def is_shutdown_requested(self) -> bool:
@@ -128,14 +133,19 @@ class Lifecycle:
         """Return whether the node has shut down."""
         return self.shutting_down.is_set()
 
+    # --- which threads were notified
+
+    @property
+    def is_notified(self) -> bool:
+        """Whether the calling thread was notified of the shutdown."""
+        return self._this_thread.state.awareness is Awareness.NOTIFIED
+
     def poll_shutdown(self) -> bool:
         """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
-        state = self.thread_state
-        state.polls = state.polled = True
-        if self.deferral.pending:
-            self.deferral.poll()
-        state.notified = state.notified or self.shutting_down.is_set()
-        return self.shutting_down.is_set()
+        self.deferral.poll()
+        is_shutdown = self.shutting_down.is_set()
+        self._this_thread.state.awareness = Awareness.NOTIFIED if is_shutdown else Awareness.POLLS
+        return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
         """Notify the calling thread, whose sleep a shutdown has cut short. Raises ROSInterruptException.
@@ -143,14 +153,14 @@ class Lifecycle:
         In a loop that polls is_shutdown() the sleep just ends early, as with rospy: the loop will poll, and what follows
         it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
         """
-        state = self.thread_state
-        if not state.polled:
+        state = self._this_thread.state
+        if state.awareness is not Awareness.POLLS:
             raise self.interrupted("ROS shutdown request")
-        state.polled = False
+        state.awareness = Awareness.CUT_SHORT
 
     def interrupted(self, text: str) -> ROSInterruptException:
         """Return the error that notifies the calling thread of the shutdown, for it to raise."""
-        self.thread_state.notified = True
+        self._this_thread.state.awareness = Awareness.NOTIFIED
         return ROSInterruptException(text)
 
     def is_interrupt(self, error: BaseException) -> bool:
@@ -158,17 +168,6 @@ class Lifecycle:
         if isinstance(error, KeyboardInterrupt) and self.machine.signals:
             return True
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown()
-
-    @property
-    def thread_state(self) -> ThreadState:
-        """What the calling thread knows of the shutdown."""
-        try:
-            found: ThreadState = self._thread.state
-        except AttributeError:
-            found = self._thread.state = self._main if is_main_thread() else ThreadState()
-        return found
-
-    # --- helpers
 
     def _run(self, hooks: Iterable[Callable[[], object]]) -> None:
         # A hook may add another: it runs last.
@@ -181,39 +180,3 @@ class Lifecycle:
                 if type(error) is not KeyboardInterrupt:
                     with contextlib.suppress(OSError, ValueError):
                         traceback.print_exc()
-
-    def _end(self) -> None:
-        """End what blocks, and leave the graph."""
-        with self._lock:
-            # A hook that is added from now on is called immediately.
-            self.shutting_down.set()
-        self.machine.phase = Phase.DOWN
-        self._run(list(self.interrupts))
-
-        self.machine.phase = Phase.LEAVING
-        try:
-            self._leave()
-        finally:
-            self.machine.phase = Phase.LEFT
-            self.left.set()
-
-
-class _Interrupting:
-    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
-
-    __slots__ = ("_down", "_interrupt", "_interrupts")
-
-    def __init__(
-        self, interrupts: list[Callable[[], object]], interrupt: Callable[[], object], down: threading.Event
-    ) -> None:
-        self._interrupts = interrupts
-        self._interrupt = interrupt
-        self._down = down
-
-    def __enter__(self) -> None:
-        self._interrupts.append(self._interrupt)
-        if self._down.is_set():
-            self._interrupt()
-
-    def __exit__(self, *_: object) -> None:
-        self._interrupts.remove(self._interrupt)

@@ -44,12 +44,8 @@ class Session:
         """``previous``: the session that this one replaces; name, clock and listeners go on until init_node."""
         self.is_fork = is_fork
         self.identity: Identity = Identity(previous.identity if previous else None)
-        self.lifecycle = Lifecycle(
-            self._leave,
-            self._stop_leaving,
-            is_down=is_fork and previous is not None and previous.is_shutdown(),
-        )
-        self.signals = SignalWatchdog(self.lifecycle, self._is_sending)
+        self.lifecycle = Lifecycle(self._leave)
+        self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
         self.lock = threading.RLock()
         """Orders registrations, and guards the tables."""
@@ -280,4 +276,6 @@ def replace_session_in_fork() -> None:
     """Give a fork a new session: the name, the time and log lines continue, the node stays the parent's."""
     session = _Process.session
     _Process.session = Session(session, is_fork=True)
+    if session.is_shutdown():
+        _Process.session.lifecycle.shutting_down.set()
     session.abandon_in_fork()

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from minirospy.client.exit_messages import what_runs
-from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
+from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.shutdown import Action, Phase
 from minirospy.signal_dispatch import dispatching_signal
 
@@ -37,17 +37,24 @@ _MAX_STEP = 0.05
 class SignalWatchdog:
     """The signals of this process, from :meth:`install` on."""
 
-    def __init__(self, lifecycle: Lifecycle, is_sending: Callable[[], bool]) -> None:
-        """``is_sending()``: whether a link's lock is held, so that a hook that publishes might wait for its own thread."""
+    def __init__(
+        self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
+    ) -> None:
+        """``stop_leaving()`` lets the node leave the graph without the master's answer.
+
+        ``is_sending()``: whether a link's lock is held, so that a hook that publishes might wait for its own thread.
+        """
         self._lifecycle = lifecycle
         self._machine = lifecycle.machine
         self._deferral = lifecycle.deferral
         self._deferral.dispatch = self._dispatch
+        self._stop_leaving = stop_leaving
         self._is_sending = is_sending
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         """The handlers before, by the numbers of the signals."""
         self._number = int(signal.SIGINT)
-        self._error: BaseException | None = None
+        self._interrupt: Action | None = None
+        """The exception that the main thread is to raise."""
         self._is_nudge = False
         """Whether a nudge is on its way to the handler."""
         self._nudging = threading.Lock()
@@ -75,9 +82,7 @@ class SignalWatchdog:
         if self._sending is None:
             receiving, self._sending = socket.socketpair()
             self._sending.setblocking(False)
-            threading.Thread(
-                target=self._watch, args=(receiving,), name="minirospy-signals", daemon=True
-            ).start()
+            _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
             # An event loop's, which was installed first.
@@ -86,7 +91,7 @@ class SignalWatchdog:
     def release(self) -> None:
         """Give the signals back to their previous handlers, and end the watchdog thread. In the main thread."""
         for number, handler in self._previous.items():
-            if signal.getsignal(number) == self._on_signal:
+            if self._is_handled(number):
                 signal.signal(number, handler)
         if self._sending is not None:
             with contextlib.suppress(ValueError):
@@ -128,15 +133,12 @@ class SignalWatchdog:
             with contextlib.suppress(KeyboardInterrupt):
                 previous(self._number, None)
 
-        error, self._error = self._error, None
-        if isinstance(error, ROSInterruptException):
-            state = self._lifecycle.thread_state
-            if state.notified:
-                # Meanwhile: what would be interrupted now is the program's clean-up.
-                return
-            state.notified = True
-        if error is not None:
-            raise error
+        action, self._interrupt = self._interrupt, None
+        if action is Action.KEYBOARD_INTERRUPT:
+            raise KeyboardInterrupt
+        # Meanwhile it may have been notified: what would be interrupted now is the program's clean-up.
+        if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
+            raise self._lifecycle.interrupted("the program was signalled to end")
 
     # --- the watchdog thread
 
@@ -144,13 +146,14 @@ class SignalWatchdog:
         """Feed the state machine with signals and time, and perform its actions, until :meth:`release`."""
         machine, deferral = self._machine, self._deferral
         now = deferred_at = 0.0
-        with receiving:
+        with receiving, contextlib.suppress(ConnectionError):
             while True:
                 started = time.monotonic()
-                is_idle = machine.is_settled and not deferral.pending
-                receiving.settimeout(None if is_idle else _TICK_SECONDS)
-                if not self._receive(receiving):
-                    return
+                receiving.settimeout(_TICK_SECONDS if machine.signals or deferral.pending else None)
+                with contextlib.suppress(TimeoutError):
+                    if not (numbers := receiving.recv(64)):
+                        return
+                    self._arrived += sum(self._is_handled(number) for number in numbers)
                 now += min(time.monotonic() - started, _MAX_STEP)
 
                 machine.main_has_ended = not threading.main_thread().is_alive()
@@ -163,18 +166,8 @@ class SignalWatchdog:
                 elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()
 
-    def _receive(self, receiving: socket.socket) -> bool:
-        """Count the signals that have arrived; return False at the end."""
-        try:
-            data = receiving.recv(64)
-        except TimeoutError:
-            return True
-        except OSError:
-            return False
-        self._arrived += sum(
-            number in self._previous and signal.getsignal(number) == self._on_signal for number in data
-        )
-        return bool(data)
+    def _is_handled(self, number: int) -> bool:
+        return number in self._previous and signal.getsignal(number) == self._on_signal
 
     def _new_signals(self) -> int:
         """Return how many signals of the user's have come that the machine has not counted.
@@ -187,29 +180,23 @@ class SignalWatchdog:
         for action in actions:
             match action:
                 case Action.RUN_HOOKS:
-                    run, reason = self._lifecycle.signal_shutdown, f"signal-{self._number}"
-                    threading.Thread(
-                        target=run, args=(reason,), name="minirospy-shutdown", daemon=True
-                    ).start()
-                case Action.INTERRUPT:
-                    self._interrupt(ROSInterruptException("the program was signalled to end"))
-                case Action.KEYBOARD_INTERRUPT:
-                    self._interrupt(KeyboardInterrupt())
+                    _start(
+                        self._lifecycle.signal_shutdown, f"signal-{self._number}", name="minirospy-shutdown"
+                    )
+                case Action.INTERRUPT | Action.KEYBOARD_INTERRUPT:
+                    self._interrupt = action
+                    self._nudge()
                 case Action.STOP_LEAVING:
-                    self._lifecycle.stop_leaving()
+                    self._stop_leaving()
                 case Action.REPORT:
                     self._report()
                 case Action.EXIT:
                     os._exit(_EXIT_STATUS)
 
-    def _interrupt(self, error: BaseException) -> None:
-        self._error = error
-        self._nudge()
-
     def _nudge(self) -> None:
         """Run the handler in the main thread, and end a system call that it is in."""
         with self._nudging:
-            if self._is_nudge or signal.getsignal(self._number) != self._on_signal:
+            if self._is_nudge or not self._is_handled(self._number):
                 # One at a time: the system makes one of two that were not delivered yet, and they have to be counted.
                 return
             self._nudges += 1
@@ -223,10 +210,11 @@ class SignalWatchdog:
     def _report(self) -> None:
         is_leaving = self._machine.phase is Phase.LEAVING
         what = "the master to unregister this node" if is_leaving else what_runs()
-        text = (
-            f"shutdown: still waiting for {what}. Press Ctrl-C again to interrupt it, and a third time to end"
-        )
+        advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
         # There may be no terminal any more.
         with contextlib.suppress(OSError, ValueError, AttributeError):
-            sys.stderr.write(f"{text} the process\n")
-            sys.stderr.flush()
+            print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
+
+
+def _start(target: Callable[..., object], argument: object, name: str) -> None:
+    threading.Thread(target=target, args=(argument,), name=name, daemon=True).start()

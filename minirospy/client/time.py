@@ -243,17 +243,15 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
         return
     session = current_session()
     lifecycle = session.lifecycle
-    if lifecycle.deferral.pending:
-        lifecycle.deferral.poll()
-    end = stop or (threading.Event() if lifecycle.thread_state.notified else lifecycle.shutting_down)
+    lifecycle.deferral.poll()
+    end = stop or (threading.Event() if lifecycle.is_notified else lifecycle.shutting_down)
 
     try:
         is_over = session.clock.sleep(nanoseconds, end)
     except errors.ROSTimeMovedBackwardsException as error:
         raise ROSTimeMovedBackwardsException(error.time) from None
 
-    if lifecycle.deferral.pending:
-        lifecycle.deferral.poll()
+    lifecycle.deferral.poll()
     if not is_over and not stop:
         lifecycle.check_interrupted_sleep()
 

@@ -10,14 +10,14 @@ import threading
 import pytest
 
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
-from minirospy.client.shutdown import Action, Phase, ShutdownMachine, ThreadState
+from minirospy.client.shutdown import Action, Awareness, Phase, ShutdownMachine
 from minirospy.client.signals import SignalWatchdog
 from minirospy.signal_dispatch import is_dispatching_signal
 
 
 @pytest.fixture
 def machine() -> ShutdownMachine:
-    return ShutdownMachine(ThreadState())
+    return ShutdownMachine()
 
 
 def timeline(machine: ShutdownMachine, start: float, end: float) -> list[tuple[float, Action]]:
@@ -30,7 +30,6 @@ def test_nothing_happens_without_a_signal(machine: ShutdownMachine) -> None:
     for phase in Phase:
         machine.phase = phase
         assert timeline(machine, 0.0, 100.0) == []
-        assert machine.is_settled
 
 
 def test_a_main_thread_that_goes_on_is_interrupted_once_and_reported(machine: ShutdownMachine) -> None:
@@ -39,7 +38,6 @@ def test_a_main_thread_that_goes_on_is_interrupted_once_and_reported(machine: Sh
     assert timeline(machine, 10.0, 10.2) == []
     machine.phase = Phase.LEFT
     assert timeline(machine, 10.3, 100.0) == [(10.8, Action.INTERRUPT), (12.0, Action.REPORT)]
-    assert machine.is_settled
 
 
 def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: ShutdownMachine) -> None:
@@ -49,7 +47,6 @@ def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: Shutdow
     # However long they take, the main thread is not interrupted before is_shutdown() is true.
     assert timeline(machine, 1.0, 9.9) == [(2.0, Action.REPORT)]
     machine.phase = Phase.DOWN
-    assert not machine.is_settled
     assert timeline(machine, 10.0, 20.0) == [(10.5, Action.INTERRUPT)]
 
 
@@ -84,9 +81,12 @@ def test_second_signal_interrupts_a_main_thread_that_ignores_shutdown(
     assert timeline(machine, 0.2, 10.0) == [(2.0, Action.REPORT)]
 
 
-@pytest.mark.parametrize("why", ["polls", "notified", "main_has_ended"])
-def test_a_main_thread_that_ends_by_itself_is_not_interrupted(machine: ShutdownMachine, why: str) -> None:
-    setattr(machine if why == "main_has_ended" else machine.main, why, True)
+@pytest.mark.parametrize("awareness", [*list(Awareness)[1:], None])
+def test_a_main_thread_that_ends_by_itself_is_not_interrupted(
+    machine: ShutdownMachine, awareness: Awareness | None
+) -> None:
+    machine.main_has_ended = awareness is None
+    machine.main.awareness = awareness or Awareness.NONE
     machine.signal(0.0)
     machine.phase = Phase.LEFT
     assert timeline(machine, 0.0, 10.0) == [(2.0, Action.REPORT)]
@@ -96,7 +96,7 @@ def test_a_main_thread_that_is_notified_in_time_is_not_interrupted(machine: Shut
     machine.signal(0.0)
     machine.phase = Phase.LEFT
     assert timeline(machine, 0.0, 0.4) == []
-    machine.main.notified = True
+    machine.main.awareness = Awareness.NOTIFIED
     assert timeline(machine, 0.5, 1.9) == []
 
 
@@ -128,7 +128,7 @@ def lifecycle() -> Lifecycle:
 @pytest.fixture
 def watchdog(lifecycle: Lifecycle) -> SignalWatchdog:
     """Not installed: the handler is called as the system would call it."""
-    return SignalWatchdog(lifecycle, lambda: False)
+    return SignalWatchdog(lifecycle, lambda: None, lambda: False)
 
 
 @pytest.mark.parametrize("was_notified", [False, True])
@@ -137,7 +137,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
 ) -> None:
     lifecycle.signal_shutdown("test")
     # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and goes to its clean-up.
-    watchdog._error = ROSInterruptException("the program was asked to end")
+    watchdog._interrupt = Action.INTERRUPT
     watchdog._is_nudge = True
     if was_notified:
         assert lifecycle.poll_shutdown()
@@ -145,7 +145,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
     else:
         with pytest.raises(ROSInterruptException):
             watchdog._on_signal(signal.SIGINT, None)
-    assert lifecycle.thread_state.notified
+    assert lifecycle.is_notified
 
 
 @pytest.mark.parametrize("call", ["poll_shutdown", "deferral"])
@@ -190,7 +190,7 @@ def test_hooks_can_see_that_a_signal_has_interrupted_a_call(
 
 def test_a_nudge_while_a_link_is_sending_waits(lifecycle: Lifecycle) -> None:
     sending = [True]
-    watchdog = SignalWatchdog(lifecycle, lambda: sending[0])
+    watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: sending[0])
     watchdog._is_nudge = True
     watchdog._on_signal(signal.SIGINT, None)
     assert not lifecycle.is_shutdown_requested
@@ -230,7 +230,7 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     ran: list[str] = []
 
     def hook() -> None:
-        watchdog._error = KeyboardInterrupt()
+        watchdog._interrupt = Action.KEYBOARD_INTERRUPT
         watchdog._is_nudge = True
         watchdog._on_signal(signal.SIGINT, None)
         ran.append("never")
@@ -257,7 +257,7 @@ def test_a_critical_section_of_another_thread_defers_nothing(lifecycle: Lifecycl
 
 
 def test_a_nudge_is_no_signal_of_the_users(lifecycle: Lifecycle) -> None:
-    watchdog = SignalWatchdog(lifecycle, lambda: False)
+    watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: False)
     watchdog._arrived, watchdog._handled, watchdog._nudges = 5, 3, 4
     assert watchdog._new_signals() == 1
     lifecycle.machine.signal(0.0)
