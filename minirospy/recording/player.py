@@ -22,7 +22,7 @@ from minirospy.recording.frames import ReceivedFrame, frame_class
 from minirospy.recording.keys import read_keys
 from minirospy.recording.precise import PreciseWait
 from minirospy.recording.schedule import PlayOptions, Schedule, State
-from minirospy.recording.sources import Bags, Selection, read_ahead
+from minirospy.recording.sources import Bags, ReadAhead, Selection
 
 if TYPE_CHECKING:
     from std_srvs.srv import SetBoolRequest, SetBoolResponse
@@ -33,7 +33,7 @@ _SECOND = 10**9
 _TICK = _SECOND // 10
 """The status line is printed so often, and a shutdown noticed."""
 
-_SWITCH_SECONDS = 0.0005
+_SWITCH_SECONDS = 0.00005
 """How long the thread that reads ahead may keep the GIL when a message is due."""
 
 _STAMP = struct.Struct("<4xII")
@@ -110,30 +110,42 @@ class Player:
         for number, connection in self._bags.connections(selection):
             self._advertise(number, connection)
         self._offer_services()
+        last = self._bags.last_time(selection) if options.topics or end else times[1]
+        latched = self._bags.last_latched(selection) if options.start else []
+        # From here on the files are its thread's.
+        messages = ReadAhead(self._bags.messages(selection))
+        with contextlib.closing(messages):
+            self._wait_before(latched)
+            self._play_precisely(messages, selection, (first[1].time, last))
+        return 0
+
+    def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
+        """Wait for subscribers, as the options demand; publish what was latched before the start."""
+        options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)
         self._say(" done.")
         self._say("\nHit space to toggle paused, or 's' to step.")
 
-        if options.start:
-            for number, message in self._bags.last_latched(selection):
-                self._publish(number, message)
+        for number, message in latched:
+            self._publish(number, message)
         if options.wait_for_subscribers:
             self._wait_for_subscribers()
 
-        last = self._bags.last_time(selection) if options.topics or end else times[1]
+    def _play_precisely(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
+        """Play with what makes this process's threads switch soon, for as long as that lasts."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
         # A collection that visits all that was imported takes milliseconds.
         gc.freeze()
         try:
+            messages.wait()
             # Before the keys are read: the first ones count.
-            self._schedule = Schedule(options, first[1].time, last, time.perf_counter_ns())
+            self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
             with read_keys(self._on_key):
-                self._play_all(selection, first[1].time, last)
+                self._play_all(messages, selection, span)
         finally:
             sys.setswitchinterval(interval)
-        return 0
 
     # --- what it offers
 
@@ -198,25 +210,25 @@ class Player:
 
     # --- playing
 
-    def _play_all(self, selection: Selection, first: int, last: int) -> None:
-        while not self._ended:
-            messages = read_ahead(self._bags.messages(selection))
-            try:
+    def _play_all(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
+        while True:
+            with contextlib.closing(messages):
                 for number, message in messages:
                     if not self._play(message):
                         break
                     self._publish(number, message)
-            finally:
-                messages.close()
             if self._options.keep_alive:
                 self._keep_alive()
             if self._ended:
                 self._say("")
-            elif not self._options.loop:
+                return
+            if not self._options.loop:
                 self._say("\nDone.")
                 return
+            messages = ReadAhead(self._bags.messages(selection))
+            messages.wait()
             with self._lock:
-                self._schedule = Schedule(self._options, first, last, time.perf_counter_ns())
+                self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
 
     def _play(self, message: StoredMessage) -> bool:
         """Wait until a message is due; return False at a shutdown."""

@@ -9,7 +9,7 @@ import heapq
 import queue
 import threading
 from collections import deque
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.records import Connection
 from minirospy.errors import BagError, BagUnindexedError, NotFoundError
 
-__all__ = ["Bags", "Selection", "open_reader", "read_ahead"]
+__all__ = ["Bags", "ReadAhead", "Selection", "open_reader"]
 
 _BATCH = 500
 _BATCH_BYTES = 4 * 1024 * 1024
@@ -107,22 +107,31 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
     return reader
 
 
-def read_ahead(
-    messages: Iterator[tuple[int, StoredMessage]],
-) -> Generator[tuple[int, StoredMessage], None, None]:
-    """Yield what an iterator yields, which a thread runs ahead by some thousand messages. Raise what it raises."""
-    ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
-    stop = threading.Event()
+class ReadAhead:
+    """The messages of an iterator, which a thread runs ahead by some thousand from now on; iterate once, and close."""
 
-    def put(item: list[tuple[int, StoredMessage]] | Exception | None) -> None:
-        while not stop.is_set():
-            try:
-                ready.put(item, timeout=0.1)
-            except queue.Full:
-                continue
-            return
+    def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
+        self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
+        self._stop = threading.Event()
+        self._first = threading.Event()
+        threading.Thread(target=self._read, args=(messages,), name="rosbag-reader", daemon=True).start()
 
-    def read() -> None:
+    def __iter__(self) -> Iterator[tuple[int, StoredMessage]]:
+        """Yield what the iterator yields; raise what it raises."""
+        while (item := self._ready.get()) is not None:
+            if isinstance(item, Exception):
+                raise item
+            yield from item
+
+    def wait(self) -> None:
+        """Wait until the first messages have been read, or none has."""
+        self._first.wait()
+
+    def close(self) -> None:
+        """Have the thread end."""
+        self._stop.set()
+
+    def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         try:
             batch: list[tuple[int, StoredMessage]] = []
             size = 0
@@ -130,24 +139,25 @@ def read_ahead(
                 batch.append(item)
                 size += len(item[1].body)
                 if len(batch) >= _BATCH or size >= _BATCH_BYTES:
-                    put(batch)
+                    self._put(batch)
                     batch, size = [], 0
-                    if stop.is_set():
+                    if self._stop.is_set():
                         return
-            put(batch)
-            put(None)
+            self._put(batch)
+            self._put(None)
         except Exception as error:  # noqa: BLE001 - raised again in the reading thread
-            put(batch)
-            put(error)
+            self._put(batch)
+            self._put(error)
 
-    threading.Thread(target=read, name="rosbag-reader", daemon=True).start()
-    try:
-        while (item := ready.get()) is not None:
-            if isinstance(item, Exception):
-                raise item
-            yield from item
-    finally:
-        stop.set()
+    def _put(self, item: list[tuple[int, StoredMessage]] | Exception | None) -> None:
+        while not self._stop.is_set():
+            try:
+                self._ready.put(item, timeout=0.1)
+            except queue.Full:
+                continue
+            finally:
+                self._first.set()
+            return
 
 
 def _span(reader: BagReader) -> tuple[int, int] | None:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import random
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from minirospy.bag.base import StoredMessage
+from minirospy.bag.records import Connection
+from minirospy.errors import BagFormatError
 from minirospy.introspect.bag_convert import convert
-from minirospy.recording.sources import Bags, Selection
+from minirospy.recording.sources import Bags, ReadAhead, Selection
 from tests.bag.bags import Given, make_bag
 
 
@@ -37,3 +42,40 @@ def test_last_time_is_that_of_the_last_message(tmp_path: Path, suffix: str) -> N
                 times = [message.time for _, message in bags.messages(selection)]
                 if times:
                     assert bags.last_time(selection) == max(times)
+
+
+def test_reading_ahead_starts_before_the_first_message_is_wanted() -> None:
+    connection = Connection(0, "/a", {})
+    read: list[int] = []
+
+    def messages() -> Iterator[tuple[int, StoredMessage]]:
+        for number in range(3):
+            read.append(number)
+            yield 0, StoredMessage(connection, number, b"", 0)
+        raise BagFormatError("the end is damaged")
+
+    ahead = ReadAhead(messages())
+    ahead.wait()
+    assert read == [0, 1, 2]
+
+    found = []
+    with pytest.raises(BagFormatError):
+        found.extend(message.time for _, message in ahead)
+    ahead.close()
+
+
+def test_reading_ahead_ends_when_it_is_closed() -> None:
+    connection = Connection(0, "/a", {})
+    is_closed = threading.Event()
+
+    def messages() -> Iterator[tuple[int, StoredMessage]]:
+        try:
+            while True:
+                yield 0, StoredMessage(connection, 0, b"", 0)
+        finally:
+            is_closed.set()
+
+    ahead = ReadAhead(messages())
+    ahead.wait()
+    ahead.close()
+    assert is_closed.wait(45)
