@@ -217,6 +217,9 @@ class Player:
                     if not self._play(message):
                         break
                     self._publish(number, message)
+            if self._schedule and not self._ended and not self._options.quiet:
+                # All of it has been played, however long ago the last line was.
+                self._show_status(self._schedule, time.perf_counter_ns())
             if self._options.keep_alive:
                 self._keep_alive()
             if self._ended:
@@ -274,14 +277,17 @@ class Player:
                 self._clock.publish(message)
         if now >= self._next_line and not self._options.quiet:
             self._next_line = now + _TICK
-            with self._lock:
-                status = schedule.status(now)
-            delay = f"Delay: {status.delay / 1e9:.2f} " if status.state is State.DELAYED else " " * 12
-            self._say(
-                f"\r [{status.state.value:7}]  Bag Time: {status.time / 1e9:13.6f}   "
-                f"Duration: {status.played / 1e9:.6f} / {status.length / 1e9:.6f}   {delay}\r",
-                end="",
-            )
+            self._show_status(schedule, now)
+
+    def _show_status(self, schedule: Schedule, now: int) -> None:
+        with self._lock:
+            status = schedule.status(now)
+        delay = f"Delay: {status.delay / 1e9:.2f} " if status.state is State.DELAYED else " " * 12
+        self._say(
+            f"\r [{status.state.value:7}]  Bag Time: {status.time / 1e9:13.6f}   "
+            f"Duration: {status.played / 1e9:.6f} / {status.length / 1e9:.6f}   {delay}\r",
+            end="",
+        )
 
     # --- what comes from outside
 

@@ -269,9 +269,12 @@ def test_it_loops_until_it_is_interrupted(ear: Ear, start: Start, tmp_path: Path
 def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", i * 100, str(i)) for i in range(50)])
     ear.listen("/a")
-    play(start, name, "-i").communicate(timeout=GUARD)
+    output, _ = play(start, name, "-i").communicate(timeout=GUARD)
 
     assert ear.texts == [str(i) for i in range(50)]
+    assert output.endswith(
+        "Bag Time:   5900.000000   Duration: 4900.000000 / 4900.000000               \nDone.\n"
+    )
 
 
 @pytest.mark.parametrize(
