@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import select
 import subprocess
 import sys
 import threading
@@ -183,7 +184,9 @@ def test_the_picture_of_a_person(encoding: str) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal")
 @pytest.mark.parametrize("kind", ["xterm", "dumb"])
-def test_keys_press_buttons_and_move_the_person(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keys_press_buttons_and_move_the_person(
+    kind: str, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
     import pty
 
     monkeypatch.setenv("TERM", kind)
@@ -192,12 +195,14 @@ def test_keys_press_buttons_and_move_the_person(kind: str, monkeypatch: pytest.M
     with Board() as board:
         child = subprocess.Popen([sys.executable, "-c", code], stdin=theirs, stdout=theirs, stderr=theirs)
         os.close(theirs)
+        request.addfinalizer(lambda: (child.kill(), child.wait()))
 
         def type_until(keys: bytes, condition: Callable[[], bool]) -> None:
             os.write(ours, keys)
             while not condition():
-                # What it draws has to be read, or it waits; there is something to read after each change.
-                os.read(ours, 65536)
+                # What it draws has to be read, or it waits. The change may reach this process after the drawing of it.
+                if select.select([ours], [], [], 0.05)[0]:
+                    os.read(ours, 65536)
 
         os.read(ours, 1)
         type_until(b"1", lambda: board.get(11) == 1)
