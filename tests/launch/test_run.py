@@ -98,6 +98,18 @@ def test_a_program_that_is_missing_stops_no_other(start: Start, master: str) -> 
     assert launch.process.returncode == 0
 
 
+def test_compiled_packages_are_named_and_the_rest_runs(start: Start, master: str) -> None:
+    launch = start(
+        '<node pkg="amcl" type="amcl" name="a"/><node pkg="pkg" type="stop.py" name="b" args="0"/>'
+    )
+    said, _ = launch.process.communicate(timeout=30)
+    (line,) = (line for line in said.splitlines() if "amcl/amcl" in line and "ERROR" in line)
+    assert line.startswith("ERROR: cannot launch node of type [amcl/amcl]: ")
+    assert "which minirospy does not have: install it by RoboStack" in line
+    assert "[b-2] process has finished cleanly" in said
+    assert launch.process.returncode == 0
+
+
 def test_respawn_waits_for_its_delay(start: Start, master: str) -> None:
     launch = start(
         f'<node pkg="pkg" type="stop.py" name="a" args="0" respawn="true" respawn_delay="0.3"/>{NODE}"b"/>'

@@ -11,6 +11,7 @@ OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 COMPAT = OVERLAY.with_name("compat")
 SHARED = {
     "cv_bridge/compressed.py",
+    "elsewhere.py",
     "cv_bridge/encodings.py",
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",

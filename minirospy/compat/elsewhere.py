@@ -1,0 +1,19 @@
+"""Modules that programs import and minirospy does not have: importing one raises ImportError with what to do.
+
+The names and the texts are in `workspace/elsewhere.py`. The real module, where it is installed, comes first.
+"""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from minirospy.workspace.elsewhere import IMPORTED, advice
+
+__all__: list[str] = []
+
+
+def __getattr__(name: str) -> NoReturn:
+    """Raise ImportError for a module of the table, AttributeError for any other name."""
+    if name in IMPORTED:
+        raise ImportError(f"No module named '{name}': {advice(name)}", name=name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,211 @@
+"""What ROS 1 has and minirospy has not: packages and modules of C++ or Qt, and what to do instead. A table.
+
+It is consulted where a package, a program or a module is not found: what a workspace or an installation has comes first.
+"""
+
+from __future__ import annotations
+
+__all__ = ["IMPORTED", "advice"]
+
+_RUN_IT_THERE = (
+    "install it by RoboStack (`conda install -c conda-forge -c robostack-noetic ros-noetic-{conda}`) or on a machine with ROS 1, "
+    "and run it there with the same ROS_MASTER_URI: it works with minirospy's nodes"
+)
+_DEFINITIONS = (
+    "it holds definitions: clone it into a workspace's src, then `catkin_make` generates its modules"
+)
+_QT = (
+    "`pip install PyQt5 pydot catkin_pkg`, clone {repository} into a workspace's src, `catkin_make`, and source "
+    "devel/setup.bash"
+)
+
+_NAVIGATION = "localization and navigation, in C++"
+_CPP = {
+    # Navigation and maps.
+    "amcl": _NAVIGATION,
+    "base_local_planner": _NAVIGATION,
+    "carrot_planner": _NAVIGATION,
+    "cartographer_ros": "SLAM, in C++",
+    "clear_costmap_recovery": _NAVIGATION,
+    "costmap_2d": _NAVIGATION,
+    "dwa_local_planner": _NAVIGATION,
+    "explore_lite": _NAVIGATION,
+    "fake_localization": _NAVIGATION,
+    "global_planner": _NAVIGATION,
+    "gmapping": "SLAM, in C++",
+    "hector_mapping": "SLAM, in C++",
+    "karto_slam": "SLAM, in C++",
+    "slam_karto": "SLAM, in C++",
+    "laser_scan_matcher": "odometry of laser scans, in C++",
+    "move_base": _NAVIGATION,
+    "move_slow_and_clear": _NAVIGATION,
+    "nav_core": _NAVIGATION,
+    "navfn": _NAVIGATION,
+    "octomap_server": "maps in three dimensions, in C++",
+    "rf2o_laser_odometry": "odometry of laser scans, in C++",
+    "robot_localization": "filters of poses, in C++",
+    "robot_pose_ekf": "filters of poses, in C++",
+    "rotate_recovery": _NAVIGATION,
+    "rtabmap_ros": "SLAM, in C++",
+    "slam_toolbox": "SLAM, in C++",
+    "teb_local_planner": _NAVIGATION,
+    "voxel_grid": _NAVIGATION,
+    # Arms and controllers.
+    "controller_manager": "ros_control, in C++",
+    "diff_drive_controller": "ros_control, in C++",
+    "effort_controllers": "ros_control, in C++",
+    "hardware_interface": "ros_control, in C++",
+    "joint_state_controller": "ros_control, in C++",
+    "joint_trajectory_controller": "ros_control, in C++",
+    "moveit_commander": "MoveIt, in C++",
+    "moveit_core": "MoveIt, in C++",
+    "moveit_fake_controller_manager": "MoveIt, in C++",
+    "moveit_planners_ompl": "MoveIt, in C++",
+    "moveit_ros_move_group": "MoveIt, in C++",
+    "moveit_ros_planning_interface": "MoveIt, in C++",
+    "moveit_ros_visualization": "MoveIt, in C++",
+    "moveit_ros_warehouse": "MoveIt, in C++",
+    "moveit_servo": "MoveIt, in C++",
+    "moveit_setup_assistant": "MoveIt, in C++",
+    "moveit_simple_controller_manager": "MoveIt, in C++",
+    "position_controllers": "ros_control, in C++",
+    "trac_ik_kinematics_plugin": "inverse kinematics, in C++",
+    "velocity_controllers": "ros_control, in C++",
+    # Simulators.
+    "gazebo_plugins": "the simulator Gazebo, in C++",
+    "gazebo_ros": "the simulator Gazebo (spawn_model gives it a model), in C++",
+    "gazebo_ros_control": "the simulator Gazebo, in C++",
+    "stage_ros": "the simulator Stage, in C++",
+    # Images, clouds, sensors.
+    "apriltag_ros": "a detector in images, in C++",
+    "aruco_ros": "a detector in images, in C++",
+    "ar_track_alvar": "a detector in images, in C++",
+    "cv_camera": "a camera's driver, in C++",
+    "depth_image_proc": "nodelets on images, in C++",
+    "depthimage_to_laserscan": "nodelets on images, in C++",
+    "freenect_launch": "a camera's driver, in C++",
+    "hokuyo_node": "a laser scanner's driver, in C++",
+    "image_proc": "nodelets on images, in C++",
+    "image_view": "windows with images, in C++",
+    "laser_filters": "filters of laser scans, in C++",
+    "libuvc_camera": "a camera's driver, in C++",
+    "opencv_apps": "nodelets on images, in C++",
+    "openni_launch": "a camera's driver, in C++",
+    "openni2_launch": "a camera's driver, in C++",
+    "pcl_ros": "nodelets on point clouds, in C++",
+    "pointcloud_to_laserscan": "nodelets on point clouds, in C++",
+    "realsense2_camera": "a camera's driver, in C++",
+    "rplidar_ros": "a laser scanner's driver, in C++",
+    "stereo_image_proc": "nodelets on images, in C++",
+    "urg_node": "a laser scanner's driver, in C++",
+    "usb_cam": "a camera's driver, in C++",
+    "velodyne_driver": "a laser scanner's driver, in C++",
+    "velodyne_pointcloud": "a laser scanner's driver, in C++",
+    # Inputs, plug-ins, tools.
+    "imu_complementary_filter": "filters of an IMU, in C++",
+    "imu_filter_madgwick": "filters of an IMU, in C++",
+    "interactive_marker_twist_server": "interactive markers, in C++",
+    "nodelet": "plug-ins of C++ programs in one process",
+    "nodelet_topic_tools": "plug-ins of C++ programs in one process",
+    "eigen_conversions": "a C++ library",
+    "pluginlib": "plug-ins of C++ programs",
+    "class_loader": "plug-ins of C++ programs",
+    "rviz": "a window in three dimensions, in C++",
+    "spacenav_node": "an input device's driver, in C++",
+    "twist_mux": "a node in C++",
+    "ps3joy": "an input device's driver",
+    "wiimote": "an input device's driver, in C++",
+    "yocs_cmd_vel_mux": "nodelets, in C++",
+    "yocs_velocity_smoother": "nodelets, in C++",
+}
+"""Packages whose programs are compiled: what they are."""
+
+_MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
+_INSTEAD = {
+    "twist_mux": _MUX,
+    "yocs_cmd_vel_mux": _MUX,
+    "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
+    "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
+}
+"""What minirospy has in place of some of them, and of others."""
+
+_QT_REPOSITORIES = (
+    "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "
+    "(master)"
+)
+_QT_PLUGINS = (
+    "rqt_action",
+    "rqt_bag",
+    "rqt_console",
+    "rqt_dep",
+    "rqt_graph",
+    "rqt_image_view",
+    "rqt_joint_trajectory_controller",
+    "rqt_launch",
+    "rqt_logger_level",
+    "rqt_msg",
+    "rqt_nav_view",
+    "rqt_plot",
+    "rqt_pose_view",
+    "rqt_publisher",
+    "rqt_py_console",
+    "rqt_reconfigure",
+    "rqt_robot_monitor",
+    "rqt_robot_steering",
+    "rqt_runtime_monitor",
+    "rqt_service_caller",
+    "rqt_shell",
+    "rqt_srv",
+    "rqt_tf_tree",
+    "rqt_top",
+    "rqt_topic",
+    "rqt_web",
+)
+_QT_LIBRARIES = (
+    "python_qt_binding",
+    "qt_dotgraph",
+    "qt_gui",
+    "qt_gui_py_common",
+    "rqt_gui",
+    "rqt_gui_py",
+    "rqt_py_common",
+)
+
+_MESSAGES = (
+    "ackermann_msgs",
+    "mavros_msgs",
+    "moveit_msgs",
+    "object_recognition_msgs",
+    "octomap_msgs",
+    "costmap_converter",
+    "robot_localization_msgs",
+)
+
+IMPORTED = frozenset(
+    {
+        "gazebo_ros",
+        "moveit_commander",
+        "moveit_ros_planning_interface",
+        "nodelet",
+        "rviz",
+        "rqt_graph",
+        *_QT_LIBRARIES,
+    }
+)
+"""The modules that Python programs import of them; `overlay/` has one for each, which raises ImportError."""
+
+
+def advice(name: str) -> str:
+    """Return what a package or module of ROS 1 is, and what to do without it, in one line; empty for one that is not known."""
+    if name in _CPP:
+        what = f"{_CPP[name]}, which minirospy does not have"
+        there = _RUN_IT_THERE.format(conda=name.replace("_", "-"))
+        return f"{what}: {_INSTEAD.get(name, there)}"
+    if name in _INSTEAD:
+        return f"minirospy does not have it: {_INSTEAD[name]}"
+    if name in _QT_PLUGINS or name in _QT_LIBRARIES or name == "rqt":
+        plugin = name if name in _QT_PLUGINS else "the plug-in"
+        return f"a window of Qt, from its source: {_QT.format(repository=_QT_REPOSITORIES.format(plugin=plugin))}"
+    if name in _MESSAGES:
+        return f"minirospy does not bring it: {_DEFINITIONS}"
+    return ""
