@@ -7,40 +7,27 @@ rosmaster where that is silent.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import chain, islice
+from itertools import chain
 from sys import getsizeof, intern
 from typing import NamedTuple
 
-from minirospy.errors import MinirospyError
+from minirospy.graph import registry_limits
+from minirospy.graph.registry_limits import (
+    PARAMETER,
+    PUBLISHES,
+    SERVES,
+    SUBSCRIBES,
+    RegistryFullError,
+    name_cost,
+    node_cost,
+)
+from minirospy.graph.shares import Shares, holder_of
+from minirospy.graph.topic_types import TopicTypes
 
 __all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry", "RegistryFullError"]
 
 _ANY = "*"
-_PUBLISHES, _SUBSCRIBES, _SERVES, _PARAMETER = 1, 2, 4, 8
-
-MOST_BYTES = 96 * 1024 * 1024
-"""What all registrations together may take in memory."""
-
-MOST_ENTRIES = 10_000
-"""Topics, services and parameters that one node may register."""
-
-_MOST_OLD_TYPES = 10_000
-"""Topics whose types are remembered although nobody registers them any more."""
-
 _FEW_BYTES = 200_000
-_ENTRY_BYTES = 500
-"""What a registration takes beside its texts."""
-
-
-class RegistryFullError(MinirospyError):
-    """A registration would be beyond a limit, which ``limit`` names."""
-
-    def __init__(self, limit: str) -> None:
-        super().__init__(limit)
-        self.limit = limit
-
-    def __str__(self) -> str:
-        return f"the registration is beyond the limit of {self.limit}"
 
 
 class PublisherUpdate(NamedTuple):
@@ -76,7 +63,8 @@ class _Node:
     def __init__(self, name: str, uri: str) -> None:
         self.name = name
         self.uri = uri
-        self.size = getsizeof(name) + getsizeof(uri) + _ENTRY_BYTES
+        self.size = 0
+        """The bytes that are counted for it."""
         self.entries: dict[str, int] = {}
 
     def add(self, name: str, kind: int) -> None:
@@ -104,26 +92,28 @@ class Registry:
     Actions come one by one, as they are needed: there may be many of them.
     """
 
-    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, shares: Shares | None = None) -> None:
+        """``shares``: the bytes that the nodes of each host and port may take."""
         self.changes = 0
         """Grows whenever publishers, subscribers or services may have changed."""
-        self._most_bytes = most_bytes
-        self._bytes = 0
+        self._shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _Node] = {}
         self._publishers: dict[str, dict[str, str]] = {}
         self._subscribers: dict[str, dict[str, str]] = {}
         self._services: dict[str, _Service] = {}
-        self._types: dict[str, str] = {}
+        self._types = TopicTypes(self._count_for)
 
     # --- registering
 
     def register_publisher(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node``, whose Slave API is at ``uri``, publishes ``topic``."""
-        actions = self._claim(node, uri, topic)
-        entry = self._enter(node, topic, _PUBLISHES)
+        actions = self._claim(node, uri, topic, PUBLISHES, type_)
+        entry = self._enter(node, topic, PUBLISHES)
         _row(self._publishers, topic)[entry.name] = entry.uri
-        if type_ != _ANY or topic not in self._types:
-            self.set_type(topic, type_)
+        if type_ == _ANY:
+            self._types.add(topic, type_, entry.name)
+        else:
+            self._types.set(topic, type_, entry.name)
         subscribers = self._subscribers.get(topic)
         if subscribers is None:
             return Registered([], actions)
@@ -133,16 +123,16 @@ class Registry:
         """``node`` publishes ``topic`` no more; None where that was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
-        self._drop(self._publishers, topic, node, _PUBLISHES)
+        self._drop(self._publishers, topic, node, PUBLISHES)
         return self._updates(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
         """``node`` subscribes to ``topic``; type "*" takes any and does not become the topic's."""
-        actions = self._claim(node, uri, topic)
-        entry = self._enter(node, topic, _SUBSCRIBES)
+        actions = self._claim(node, uri, topic, SUBSCRIBES, type_)
+        entry = self._enter(node, topic, SUBSCRIBES)
         _row(self._subscribers, topic)[entry.name] = entry.uri
-        if type_ != _ANY and topic not in self._types:
-            self.set_type(topic, type_)
+        if type_ != _ANY or topic in self._types:
+            self._types.add(topic, type_, entry.name)
         publishers = self._publishers.get(topic)
         return Registered(list(publishers.values()) if publishers else [], actions)
 
@@ -150,16 +140,19 @@ class Registry:
         """``node`` subscribes no more; whether that was registered from ``uri``."""
         if self._subscribers.get(topic, {}).get(node) != uri:
             return False
-        self._drop(self._subscribers, topic, node, _SUBSCRIBES)
+        self._drop(self._subscribers, topic, node, SUBSCRIBES)
         return True
 
     def register_service(self, node: str, service: str, service_uri: str, uri: str) -> Iterable[Action]:
         """``node`` offers ``service`` at ``service_uri``; the last one to register has it."""
-        actions = self._claim(node, uri, service)
+        actions = self._claim(node, uri, service, SERVES, service_uri)
         before = self._services.get(service)
-        if before and before.node != node:
-            self._leave(before.node, service, _SERVES)
-        entry = self._enter(node, service, _SERVES)
+        if before:
+            self._count(self._nodes[before.node], -getsizeof(before.uri))
+            if before.node != node:
+                self._leave(before.node, service, SERVES)
+        entry = self._enter(node, service, SERVES)
+        self._count(entry, getsizeof(service_uri))
         self._services[service] = _Service(entry.name, service_uri)
         return actions
 
@@ -168,20 +161,21 @@ class Registry:
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
-        self._leave(node, service, _SERVES)
+        self._count(self._nodes[node], -getsizeof(service_uri))
+        self._leave(node, service, SERVES)
         return True
 
     def register_parameter(self, node: str, key: str, uri: str) -> Iterable[Action]:
         """``node`` is to be notified of a parameter: the tree holds the subscription, this table the node."""
-        actions = self._claim(node, uri, key)
-        self._enter(node, key, _PARAMETER)
+        actions = self._claim(node, uri, key, PARAMETER)
+        self._enter(node, key, PARAMETER)
         return actions
 
     def unregister_parameter(self, node: str, key: str, uri: str) -> None:
         """``node`` is not notified any more."""
         entry = self._nodes.get(node)
         if entry and entry.uri == uri:
-            self._leave(node, key, _PARAMETER)
+            self._leave(node, key, PARAMETER)
 
     def forget(self, node: str, uri: str) -> Iterable[Action]:
         """Drop all that ``node`` has registered from ``uri``: it is gone."""
@@ -189,25 +183,18 @@ class Registry:
         if entry is None or entry.uri != uri:
             return ()
         published = self._clear(entry)
-        self._remove_node(entry)
         return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Remember the type of a topic, which need not be registered."""
-        self._types[topic] = intern(type_)
-        if len(self._types) > len(self._publishers) + len(self._subscribers) + _MOST_OLD_TYPES:
-            # Some of the oldest: the others have their turn at the next registrations.
-            for old in list(islice(self._types, 20)):
-                type_ = self._types.pop(old)
-                if old == topic or old in self._publishers or old in self._subscribers:
-                    self._types[old] = type_
+        """Remember the type of a topic that nobody registers now."""
+        self._types.keep(topic, type_)
 
     # --- queries
 
     @property
     def is_small(self) -> bool:
         """Return whether all registrations together are few."""
-        return self._bytes < _FEW_BYTES
+        return self._shares.total < _FEW_BYTES
 
     def node_uri(self, node: str) -> str | None:
         """Return the URI of a node's Slave API."""
@@ -234,11 +221,11 @@ class Registry:
     def subscriptions(self, node: str) -> list[str]:
         """Return the topics that a node subscribes to."""
         entry = self._nodes.get(node)
-        return entry.names(_SUBSCRIBES) if entry else []
+        return entry.names(SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
         """Return the type of each topic that was ever registered with one."""
-        return dict(self._types)
+        return dict(self.type_rows())
 
     def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
         """(topic, type) of each published topic below the namespace ``subgraph``."""
@@ -258,7 +245,7 @@ class Registry:
 
     def type_rows(self) -> Iterator[tuple[str, str]]:
         """Yield what :meth:`topic_types` returns. The table may change meanwhile."""
-        return iter(list(self._types.items()))
+        return self._types.rows()
 
     def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
         """Yield what :meth:`published_topics` returns. The table may change meanwhile."""
@@ -303,73 +290,91 @@ class Registry:
 
     # --- helpers
 
-    def _claim(self, node: str, uri: str, name: str) -> Iterable[Action]:
-        """Make ``node`` known at ``uri``, where it registers ``name``.
+    def _claim(self, node: str, uri: str, name: str, kind: int, text: str = "") -> Iterable[Action]:
+        """Make ``node`` known at ``uri``, where it registers ``name`` with a type or a service's URI.
 
         What is registered under its name at another address is dropped and stopped. Raises RegistryFullError.
         """
         entry = self._nodes.get(node)
-        if entry is not None and entry.uri == uri:
-            if len(entry.entries) >= MOST_ENTRIES and name not in entry.entries:
-                raise RegistryFullError(f"{MOST_ENTRIES} topics, services and parameters of one node")
-            self._check_room(getsizeof(name))
+        is_new = entry is None or entry.uri != uri
+        kinds = entry.entries.get(name, 0) if entry and not is_new else 0
+        if entry and not is_new and not kinds and len(entry.entries) >= registry_limits.MOST_ENTRIES:
+            most = registry_limits.MOST_ENTRIES
+            raise RegistryFullError(f"{most} topics, services and parameters of one node")
+
+        cost = node_cost(node, uri) if is_new else 0
+        cost += name_cost(name, kind, kinds) + self._cost_of_text(name, kind, text)
+        excess = self._shares.excess(holder_of(uri), cost) if cost > 0 else None
+        if excess:
+            raise RegistryFullError(registry_limits.describe(excess, self._shares))
+        if not is_new:
             return ()
-        self._check_room(getsizeof(name) + getsizeof(node) + getsizeof(uri))
-        published: list[str] = []
-        if entry is not None:
-            published = self._clear(entry)
-            self._remove_node(entry)
+
+        published = self._clear(entry) if entry else []
         added = self._nodes[node] = _Node(node, uri)
-        self._bytes += added.size
+        self._count(added, node_cost(node, uri))
         if entry is None:
             return ()
         shutdown = NodeShutdown(entry.uri, node, "new node registered with same name")
         return chain((shutdown,), self._updates(*published))
 
-    def _check_room(self, size: int) -> None:
-        if self._bytes + size + 2 * _ENTRY_BYTES > self._most_bytes:
-            raise RegistryFullError(f"{self._most_bytes // 1024**2} MiB for all registrations")
+    def _cost_of_text(self, name: str, kind: int, text: str) -> int:
+        """Return the bytes that a type or a service's URI takes beyond the one that it may replace."""
+        if kind == SERVES:
+            service = self._services.get(name)
+            return getsizeof(text) - (getsizeof(service.uri) if service else 0)
+        return 0 if kind == PARAMETER else self._types.cost(name, text)
 
-    def _remove_node(self, entry: _Node) -> None:
-        del self._nodes[entry.name]
-        self._bytes -= entry.size
+    def _count(self, entry: _Node, size: int) -> None:
+        entry.size += size
+        self._shares.add(holder_of(entry.uri), size)
+
+    def _count_for(self, node: str, size: int) -> None:
+        self._count(self._nodes[node], size)
 
     def _clear(self, entry: _Node) -> list[str]:
         """Take a node out of every table; the topics that it published."""
         self.changes += 1
-        published = entry.names(_PUBLISHES)
+        published = entry.names(PUBLISHES)
         for topic in published:
             _remove(self._publishers, topic, entry.name)
-        for topic in entry.names(_SUBSCRIBES):
+        for topic in entry.names(SUBSCRIBES):
             _remove(self._subscribers, topic, entry.name)
-        for service in entry.names(_SERVES):
+        for service in entry.names(SERVES):
             del self._services[service]
+        for topic in entry.names(PUBLISHES | SUBSCRIBES):
+            self._leave_type(topic, entry)
+        del self._nodes[entry.name]
+        self._count(entry, -entry.size)
         return published
 
     def _enter(self, node: str, name: str, kind: int) -> _Node:
         self.changes += 1
         entry = self._nodes[node]
-        if name not in entry.entries:
-            size = getsizeof(name) + _ENTRY_BYTES
-            entry.size += size
-            self._bytes += size
+        self._count(entry, name_cost(name, kind, entry.entries.get(name, 0)))
         entry.add(intern(name), kind)
         return entry
 
     def _leave(self, node: str, name: str, kind: int) -> None:
         self.changes += 1
         entry = self._nodes[node]
+        if not entry.entries.get(name, 0) & kind:
+            return
         entry.discard(name, kind)
-        if name not in entry.entries:
-            size = getsizeof(name) + _ENTRY_BYTES
-            entry.size -= size
-            self._bytes -= size
+        self._count(entry, -name_cost(name, kind, entry.entries.get(name, 0)))
+        if kind in (PUBLISHES, SUBSCRIBES):
+            self._leave_type(name, entry)
         if not entry.entries:
-            self._remove_node(entry)
+            del self._nodes[node]
+            self._count(entry, -entry.size)
 
     def _drop(self, table: dict[str, dict[str, str]], topic: str, node: str, kind: int) -> None:
         _remove(table, topic, node)
         self._leave(node, topic, kind)
+
+    def _leave_type(self, topic: str, entry: _Node) -> None:
+        others = chain(self._publishers.get(topic, ()), self._subscribers.get(topic, ()))
+        self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
         """Yield an update for each subscriber of the topics, as they are when it is their turn."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from sys import getsizeof
+from types import MethodType
+from typing import Any
 
 import pytest
 
-from minirospy.graph import registry as registry_module
+from minirospy.graph import registry_limits, topic_types
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry, RegistryFullError
+from minirospy.graph.shares import Shares
 
 
 def test_publishers_and_subscribers_find_each_other() -> None:
@@ -100,7 +104,7 @@ def test_one_name_may_be_topic_service_and_parameter_of_a_node() -> None:
 
 
 def test_one_node_registers_so_much_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry_module, "MOST_ENTRIES", 3)
+    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 3)
     registry = Registry()
     for number in range(3):
         registry.register_publisher("/n", f"/t{number}", "a/B", "u")
@@ -113,20 +117,11 @@ def test_one_node_registers_so_much_and_no_more(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
-    registry = Registry(most_bytes=100_000)
-    registered = 0
-
-    while registered < 1000:
-        try:
-            registry.register_publisher(f"/n{registered}", f"/t{registered}", "a/B", "u")
-        except RegistryFullError as error:
-            refused = error
-            break
-
-        registered += 1
-
-    assert refused.limit == "0 MiB for all registrations"
-    assert str(refused) == "the registration is beyond the limit of 0 MiB for all registrations"
+    registry = Registry(Shares(100_000, 100_000, 0, 0))
+    registered = fill(registry, "u")
+    with pytest.raises(RegistryFullError) as refused:
+        registry.register_publisher("/n", "/t", "a/B", "u")
+    assert str(refused.value) == "the registration is beyond the limit of 0 MiB for all registrations"
     assert 40 < registered < 200
     # A long name takes more.
     for number in range(registered):
@@ -141,30 +136,158 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
             list(registry.forget(f"/n{number}", "u"))
 
     assert registry.is_small
+    assert registry._shares.total == 0
 
 
 def test_limits_are_as_documented() -> None:
-    assert (registry_module.MOST_BYTES, registry_module.MOST_ENTRIES) == (96 * 2**20, 10_000)
+    shares = registry_limits.new_shares()
+    assert (shares.most, shares.largest, shares.shared, shares.small) == (
+        64 * 2**20,
+        32 * 2**20,
+        48 * 2**20,
+        2**18,
+    )
+    assert registry_limits.MOST_ENTRIES == 10_000
 
 
-def test_registration_counts_once_whatever_it_is() -> None:
+def fill(registry: Registry, uri: str, prefix: str = "") -> int:
+    """Register nodes at ``uri`` until that is refused; return how many."""
+    for number in range(100_000):
+        try:
+            registry.register_publisher(f"/{prefix}n{number}", f"/{prefix}t{number}", "a/B", uri)
+        except RegistryFullError:
+            return number
+    raise AssertionError("it is never full")
+
+
+def register_node(registry: Registry, number: int) -> None:
+    """Register what an ordinary node does, at its own port."""
+    uri = f"http://robot:{1000 + number}/"
+    for topic in ("/rosout", f"/good{number}/out", "/status"):
+        registry.register_publisher(f"/good{number}", topic, "std_msgs/String", uri)
+    registry.register_subscriber(f"/good{number}", "/clock", "rosgraph_msgs/Clock", uri)
+    registry.register_service(f"/good{number}", f"/good{number}/get", f"rosrpc://robot:{number}", uri)
+    list(registry.register_parameter(f"/good{number}", "/watched", uri))
+
+
+def test_ordinary_nodes_register_whatever_one_client_holds() -> None:
+    registry = Registry(Shares(3_000_000, 2_000_000, 500_000, 10_000))
+    # Names and paths of its URI may differ: its port is the same.
+    for number in range(10):
+        fill(registry, f"http://127.0.0.1:9/{number}", f"bad{number}")
+    with pytest.raises(RegistryFullError, match="1 MiB for the registrations of one host and port"):
+        registry.register_publisher("/bad", "/bad", "a/B", "http://127.0.0.1:9/")
+    for number in range(200):
+        register_node(registry, number)
+
+
+def test_ordinary_nodes_register_whatever_some_clients_hold() -> None:
+    registry = Registry(Shares(3_000_000, 2_000_000, 500_000, 10_000))
+    for port in range(5):
+        fill(registry, f"http://127.0.0.1:{port}/", f"bad{port}")
+    long_name = f"/{'x' * 10_000}"
+    with pytest.raises(RegistryFullError, match="2 MiB for the registrations of all that have many"):
+        registry.register_publisher(long_name, long_name, "a/B", "http://127.0.0.1:9/")
+    for number in range(100):
+        register_node(registry, number)
+
+
+URI = "http://127.0.0.1:9/"
+KINDS: dict[str, Callable[[Registry, int], object]] = {
+    "topics of one node": lambda r, n: r.register_publisher("/n", f"/attack/{n}", "a/B", URI),
+    "topics of many nodes": lambda r, n: r.register_publisher(f"/n{n}", f"/attack/{n}", "a/B", URI),
+    "subscribers of one topic": lambda r, n: r.register_subscriber(f"/n{n}", "/fan", "a/B", URI + str(n)),
+    "publishers of one topic": lambda r, n: r.register_publisher(f"/n{n}", "/fan", "a/B", URI + str(n)),
+    "services of one node": lambda r, n: r.register_service("/n", f"/s{n}", f"rosrpc://x:{n}", URI),
+    "long types": lambda r, n: r.register_publisher("/n", f"/t{n}", f"a/{n}" + "B" * 2000, URI),
+    "long types of subscribers": lambda r, n: r.register_subscriber(
+        "/n", f"/t{n}", f"a/{n}" + "B" * 2000, URI
+    ),
+    "long URIs of services": lambda r, n: r.register_service(
+        "/n", f"/s{n}", f"rosrpc://{n}" + "x" * 2000, URI
+    ),
+    "long names": lambda r, n: r.register_publisher("/n" + "x" * 2000 + str(n), "/t", "a/B", URI),
+    "topics that one publishes and subscribes to": lambda r, n: (
+        r.register_publisher("/n", f"/attack/{n}", "a/B", URI),
+        r.register_subscriber("/n", f"/attack/{n}", "a/B", URI),
+    ),
+}
+
+
+def size_of(value: Any, seen: set[int]) -> int:
+    """Return the bytes that an object takes, with all that it refers to."""
+    if id(value) in seen or isinstance(value, (type, MethodType)):
+        return 0
+    seen.add(id(value))
+    inner: list[Any] = []
+    if isinstance(value, dict):
+        inner = [*value, *value.values()]
+    elif isinstance(value, (list, tuple)):
+        inner = list(value)
+    elif hasattr(value, "__slots__"):
+        inner = [getattr(value, name) for name in value.__slots__]
+    elif hasattr(value, "__dict__"):
+        inner = [value.__dict__]
+    return getsizeof(value) + sum(size_of(each, seen) for each in inner)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_registrations_count_what_they_take_in_memory(kind: str) -> None:
+    registry, count = Registry(), 2000
+    for number in range(count):
+        KINDS[kind](registry, number)
+    taken = size_of(registry, set())
+    assert 0.8 * taken < registry._shares.total < 2.5 * taken
+
+
+def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:
     registry = Registry()
+
+    def counted() -> int:
+        return registry._shares.total
+
     registry.register_publisher("/n", "/t", "a/B", "u")
-    one = registry._bytes
-    assert one == sum(map(getsizeof, ("/n", "u", "/t"))) + 1000
+    one = counted()
     registry.register_subscriber("/n", "/t", "a/B", "u")
     registry.register_service("/n", "/t", "rosrpc://n:1", "u")
     list(registry.register_parameter("/n", "/t", "u"))
-    assert registry._bytes == one
+    more = counted()
+    assert more > one
+    # Again, and with another URI of the service and another type, as long.
+    registry.register_publisher("/n", "/t", "a/C", "u")
+    registry.register_subscriber("/n", "/t", "a/D", "u")
+    registry.register_service("/n", "/t", "rosrpc://n:2", "u")
+    list(registry.register_parameter("/n", "/t", "u"))
+    assert counted() == more
     registry.unregister_subscriber("/n", "/t", "u")
-    registry.unregister_service("/n", "/t", "rosrpc://n:1")
+    registry.unregister_service("/n", "/t", "rosrpc://n:2")
     registry.unregister_parameter("/n", "/t", "u")
-    assert registry._bytes == one
-    registry.register_publisher("/n", "/other", "a/B", "u")
-    registry.unregister_publisher("/n", "/other", "u")
-    assert registry._bytes == one
+    registry.unregister_parameter("/n", "/t", "u")
+    assert counted() == one
     registry.unregister_publisher("/n", "/t", "u")
-    assert registry._bytes == 0
+    assert counted() == 0
+
+
+def test_a_type_is_counted_for_a_node_that_remains() -> None:
+    registry = Registry()
+    registry.register_subscriber("/s", "/t", "*", "http://s:1/")
+    alone = registry._shares.total
+    long_type = "a/" + "B" * 4000
+    registry.register_publisher("/p", "/t", long_type, "http://p:1/")
+    registry.unregister_publisher("/p", "/t", "http://p:1/")
+    assert registry._shares.total - alone > 4000
+    assert registry._shares.excess("s:1", registry._shares.largest - 4000)
+    list(registry.forget("/s", "http://s:1/"))
+    assert registry._shares.total == 0
+    assert registry.topic_types() == {"/t": long_type}
+
+
+def test_a_service_that_another_node_takes_over_is_counted_for_it() -> None:
+    registry = Registry()
+    registry.register_service("/a", "/s", "rosrpc://a:1" + "x" * 1000, "http://a:1/")
+    registry.register_service("/b", "/s", "rosrpc://b:1", "http://b:1/")
+    registry.unregister_service("/b", "/s", "rosrpc://b:1")
+    assert registry._shares.total == 0
 
 
 def test_topics_and_services_are_counted() -> None:
@@ -177,7 +300,7 @@ def test_topics_and_services_are_counted() -> None:
 
 
 def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry_module, "_MOST_OLD_TYPES", 3)
+    monkeypatch.setattr(topic_types, "_MOST_OLD", 3)
     registry = Registry()
     registry.register_publisher("/n", "/published", "a/B", "u")
     registry.register_subscriber("/n", "/subscribed", "a/B", "u")
@@ -185,18 +308,31 @@ def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPa
         registry.set_type(topic, "a/B")
     assert len(registry.topic_types()) == 5
     registry.set_type("/old4", "a/B")
-    assert set(registry.topic_types()) == {"/published", "/subscribed", "/old4"}
+    assert list(registry.topic_types()) == ["/published", "/subscribed", "/old2", "/old3", "/old4"]
+    # One that is registered again is not an old one any more.
+    registry.register_publisher("/n", "/old2", "*", "u")
+    registry.set_type("/old5", "a/B")
+    assert registry.topic_types()["/old2"] == "a/B"
+    assert len(registry.topic_types()) == 6
+
+
+def test_old_types_take_no_more_than_4_mib() -> None:
+    registry = Registry()
+    for number in range(2000):
+        registry.register_publisher("/n", f"/t{number}", f"a/{number}" + "B" * 4000, "u")
+        registry.unregister_publisher("/n", f"/t{number}", "u")
+    assert 900 < len(registry.topic_types()) < 1024
 
 
 def test_types_of_topics_that_are_gone_are_forgotten_one_day(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry_module, "_MOST_OLD_TYPES", 10)
+    monkeypatch.setattr(topic_types, "_MOST_OLD", 10)
     registry = Registry()
     registry.register_publisher("/n", "/kept", "a/B", "u")
     for number in range(100):
         registry.register_publisher("/n", f"/t{number}", "a/B", "u")
         registry.unregister_publisher("/n", f"/t{number}", "u")
     types = registry.topic_types()
-    assert len(types) <= 13
+    assert len(types) == 11
     assert types["/kept"] == "a/B"
     assert types["/t99"] == "a/B"
 
