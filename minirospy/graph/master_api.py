@@ -339,8 +339,13 @@ class MasterApi(ABC):
 
     def subscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
         """Tell a node of changes of a parameter; its value now."""
-        actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
+        # First: it is refused where there are too many, and replaces nothing.
         value = self.parameters.subscribe(name, caller_id, uri)
+        try:
+            actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
+        except RegistryFullError:
+            self.parameters.unsubscribe(name, caller_id, uri)
+            raise
         self._act(actions)
         self.hold(uri, PARAMETERS)
         self.note("+par", caller_id, name, uri)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from minirospy.errors import MinirospyError
+from minirospy.graph.shares import Excess, Shares, holder_of
 from minirospy.names import namespace_of
 from minirospy.steps import Steps, finish
 
@@ -30,9 +31,14 @@ _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 MOST_BYTES = 96 * 1024 * 1024
 """What all parameters together may take in memory."""
 
+RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
+"""What is left of it to values of no more than SMALL bytes."""
 
-MOST_SUBSCRIPTIONS = 20_000
-"""Subscriptions to parameters, of all nodes."""
+MOST_SUBSCRIPTIONS, MOST_OF_ONE = 20_000, 10_000
+"""Subscriptions to parameters, of all nodes and of one host and port."""
+
+FEW_RESERVE, FEW = 5_000, 100
+"""What is left of them to hosts and ports that have no more than FEW."""
 
 _FEW_BYTES = 200_000
 
@@ -55,7 +61,7 @@ class ParameterUpdate(NamedTuple):
     key: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Subscriber:
     caller_id: str
     uri: str
@@ -68,17 +74,18 @@ class ParameterTree:
     parameters. So a dictionary that was returned is copied before it is changed.
     """
 
-    def __init__(self, most: int = MOST_BYTES) -> None:
+    def __init__(self, most: int = MOST_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
         # The dictionaries, by id(), that nobody was given since they were made: they may be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # Their keys, sorted: those below a namespace are next to each other.
         self._keys: list[str] = []
-        self._subscriptions = 0
+        self._shares = Shares(MOST_SUBSCRIPTIONS, MOST_OF_ONE, FEW_RESERVE, FEW)
         # URI of a node -> its keys, and under how many names it subscribed to each.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most
+        self._reserve = reserve
         # No less than what all values take in memory.
         self._bytes = 0
 
@@ -102,7 +109,10 @@ class ParameterTree:
 
     def has_room(self, weight: int) -> bool:
         """Return whether there surely is room for a value of ``weight`` bytes."""
-        return self._bytes + weight <= self._most
+        return self._bytes + weight <= self._most_for(weight)
+
+    def _most_for(self, weight: int) -> int:
+        return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
         """Count again, since values that were replaced are still counted. Raises ParametersFullError."""
@@ -111,7 +121,7 @@ class ParameterTree:
             counted = yield from weigh_in_steps("/", self.get("/"))
             self._bytes = counted + self._bytes - before
             if not self.has_room(weight):
-                raise ParametersFullError(f"no more than {self._most // 1024**2} MiB in memory")
+                raise ParametersFullError(f"no more than {self._most_for(weight) // 1024**2} MiB in memory")
 
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
         """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
@@ -185,16 +195,15 @@ class ParameterTree:
 
         Raises ParametersFullError.
         """
-        if self._subscriptions >= MOST_SUBSCRIPTIONS:
-            raise ParametersFullError(f"no more than {MOST_SUBSCRIPTIONS} subscriptions")
         full = _with_slash(_split(key))
-        if full not in self._subscribers:
-            self._subscribers[full] = {}
-            insort(self._keys, full)
         subscriber = _Subscriber(caller_id, uri)
-        if subscriber not in self._subscribers[full]:
+        if subscriber not in self._subscribers.get(full, ()):
+            self._check_subscription(uri)
+            if full not in self._subscribers:
+                self._subscribers[full] = {}
+                insort(self._keys, full)
             self._subscribers[full][subscriber] = None
-            self._subscriptions += 1
+            self._shares.add(holder_of(uri), 1)
             keys = self._keys_of.setdefault(uri, {})
             keys[full] = keys.get(full, 0) + 1
         return self.get(key) if self.has(key) else {}
@@ -216,7 +225,7 @@ class ParameterTree:
 
     def count_subscriptions(self) -> int:
         """Return how many subscriptions there are."""
-        return self._subscriptions
+        return self._shares.total
 
     def subscribed_keys(self, uri: str) -> list[str]:
         """Return the keys that the node at ``uri`` has subscribed to; they end in a slash."""
@@ -227,6 +236,19 @@ class ParameterTree:
         return (
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
+
+    def _check_subscription(self, uri: str) -> None:
+        match self._shares.excess(holder_of(uri), 1):
+            case Excess.ALL:
+                raise ParametersFullError(f"no more than {self._shares.most} subscriptions")
+            case Excess.ONE:
+                raise ParametersFullError(
+                    f"no more than {self._shares.largest} subscriptions of one host and port"
+                )
+            case Excess.LARGE:
+                raise ParametersFullError(
+                    f"no more than {self._shares.shared} subscriptions of all that have many"
+                )
 
     def _find(self, path: list[str]) -> object:
         value: object = self._root
@@ -254,7 +276,7 @@ class ParameterTree:
 
     def _drop(self, key: str, subscriber: _Subscriber) -> None:
         del self._subscribers[key][subscriber]
-        self._subscriptions -= 1
+        self._shares.add(holder_of(subscriber.uri), -1)
         keys = self._keys_of[subscriber.uri]
         keys[key] -= 1
         if not keys[key]:
@@ -294,7 +316,9 @@ def weigh_in_steps(key: str, value: object) -> Steps[int]:
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")
-    weight, left = 0, _STEP_ITEMS
+    # The namespaces around it, which may not be there yet.
+    weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
+    left = _STEP_ITEMS
     # The containers around the present item: how deep their items are, and those that are still to come.
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:

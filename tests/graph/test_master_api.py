@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from minirospy.errors import RpcFault
+from minirospy.graph import parameters, registry_limits
 from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import PARAMETERS, MasterApi, Notice, key_of_node
 from minirospy.graph.parameters import ParameterUpdate
@@ -391,3 +392,17 @@ def test_arguments_are_named_as_by_rosmaster(master: Recorded) -> None:
 
 def test_keys_of_a_node_end_without_a_slash() -> None:
     assert [key_of_node(key) for key in ("/", "/a", "/a/", "/a/b//")] == ["/", "/a", "/a", "/a/b"]
+
+
+def test_subscription_that_is_refused_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    master = Recorded()
+    master.call("subscribeParam", "/n", URI, "/p")
+    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 1)
+    assert master.call("subscribeParam", "/n", URI, "/q")[0] == -1
+    assert master.parameters.subscribed_keys(URI) == ["/p/"]
+    monkeypatch.setattr(registry_limits, "MOST_ENTRIES", 10)
+    monkeypatch.setattr(parameters, "MOST_SUBSCRIPTIONS", 0)
+    master = Recorded()
+    assert master.call("subscribeParam", "/n", URI, "/p")[0] == -1
+    assert master.registry.nodes() == {}
+    assert master.done == []

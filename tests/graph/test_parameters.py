@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from sys import getsizeof
 from typing import Any
 
@@ -168,7 +169,7 @@ def test_update_survives_subscribers_that_change_meanwhile() -> None:
 
 
 def test_a_full_tree_refuses_and_forgets_what_was_replaced() -> None:
-    tree = ParameterTree(most=4 * MIB)
+    tree = ParameterTree(most=4 * MIB, reserve=0)
     value = "x" * MIB
     weight = finish(weigh_in_steps("/p", value))
     assert MIB < weight < 1.1 * MIB
@@ -186,12 +187,52 @@ def test_a_full_tree_refuses_and_forgets_what_was_replaced() -> None:
 
 
 def test_too_many_subscriptions_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parameters, "MOST_SUBSCRIPTIONS", 3)
+    for name, value in (("MOST_SUBSCRIPTIONS", 9), ("MOST_OF_ONE", 5), ("FEW_RESERVE", 2), ("FEW", 1)):
+        monkeypatch.setattr(parameters, name, value)
     tree = tree_of()
-    for number in range(3):
-        tree.subscribe("/a", f"/n{number}", "u")
-    with pytest.raises(ParametersFullError, match="no more than 3 subscriptions"):
-        tree.subscribe("/a", "/n4", "u")
+    for number in range(5):
+        tree.subscribe("/a", f"/n{number}", f"http://bad:1/{number}")
+    with pytest.raises(ParametersFullError, match="no more than 5 subscriptions of one host and port"):
+        tree.subscribe("/a", "/n6", "http://bad:1/")
+    # What is there may be subscribed to again.
+    tree.subscribe("/a", "/n0", "http://bad:1/0")
+    tree.subscribe("/a", "/other", "http://bad:2/")
+    tree.subscribe("/b", "/other", "http://bad:2/")
+    with pytest.raises(ParametersFullError, match="no more than 7 subscriptions of all that have many"):
+        tree.subscribe("/c", "/other", "http://bad:2/")
+    # There is room for others.
+    tree.subscribe("/a", "/good1", "http://good:1/")
+    tree.subscribe("/a", "/good2", "http://good:2/")
+    with pytest.raises(ParametersFullError, match="no more than 9 subscriptions"):
+        tree.subscribe("/a", "/good3", "http://good:3/")
+    assert tree.count_subscriptions() == 9
+    tree.unsubscribe_node("/n0", "http://bad:1/0")
+    tree.subscribe("/a", "/good3", "http://good:3/")
+
+
+def test_small_values_find_room_where_large_ones_have_filled_it() -> None:
+    tree = ParameterTree(most=4 * MIB, reserve=MIB)
+    for number in range(2):
+        tree.set(f"/p{number}", "x" * MIB, "", MIB + 49)
+    with pytest.raises(ParametersFullError, match="full: no more than 3 MiB"):
+        finish(tree.make_room(MIB))
+    for _ in range(5):
+        weight = finish(weigh_in_steps("/robot_description", "x" * 200_000))
+        assert tree.has_room(weight)
+        tree.set("/robot_description", "x" * 200_000, "", weight)
+
+
+def test_namespaces_count_what_they_take_in_memory() -> None:
+    tree = ParameterTree()
+    tracemalloc.start()
+    try:
+        for number in range(500):
+            key = f"/{number}" + "/a" * 50
+            tree.set(key, 1, "", finish(weigh_in_steps(key, 1)))
+        taken = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert 0.5 * taken < tree._bytes < 2.5 * taken
 
 
 @pytest.mark.parametrize(
@@ -225,7 +266,9 @@ def test_a_large_value_is_weighed_in_many_steps(value: Any) -> None:
 
 
 def test_limits_are_as_documented() -> None:
-    assert (parameters.MOST_BYTES, parameters.MOST_SUBSCRIPTIONS) == (96 * 2**20, 20_000)
+    assert (parameters.MOST_BYTES, parameters.RESERVE, parameters.SMALL) == (96 * 2**20, 16 * 2**20, 2**18)
+    assert (parameters.MOST_SUBSCRIPTIONS, parameters.MOST_OF_ONE) == (20_000, 10_000)
+    assert (parameters.FEW_RESERVE, parameters.FEW) == (5_000, 100)
 
 
 @pytest.mark.parametrize(
