@@ -1,0 +1,5 @@
+"""image_geometry.cameramodels, provided by minirospy. Source: http://wiki.ros.org/image_geometry."""
+
+from minirospy.compat.image_geometry.cameramodels import PinholeCameraModel, StereoCameraModel, mkmat
+
+__all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
