@@ -5,11 +5,13 @@
 set -eu
 # One package a line, sorted.
 packages="
+camera-calibration-parsers-tools
 catkin
 cmake
 fish
 g++
 graphviz
+image-transport-tools
 iproute2
 joint-state-publisher
 libactionlib-dev
@@ -31,11 +33,14 @@ python3-actionlib
 python3-angles
 python3-bond
 python3-bondpy
+python3-camera-calibration-parsers
 python3-cv-bridge
 python3-diagnostic-msgs
 python3-diagnostic-updater
 python3-dynamic-reconfigure
+python3-image-geometry
 python3-interactive-markers
+python3-laser-geometry
 python3-map-msgs
 python3-message-filters
 python3-move-base-msgs
@@ -43,6 +48,7 @@ python3-nav-msgs
 python3-numpy
 python3-pcl-msgs
 python3-pykdl
+python3-resource-retriever
 python3-rosbag
 python3-roslz4
 python3-rosmaster

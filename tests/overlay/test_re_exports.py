@@ -12,6 +12,8 @@ COMPAT = OVERLAY.with_name("compat")
 SHARED = {
     "cv_bridge/compressed.py",
     "elsewhere.py",
+    "camera_calibration_parsers/texts.py",
+    "image_geometry/rectification.py",
     "cv_bridge/encodings.py",
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",

@@ -79,6 +79,12 @@ AROUND = [
     "angles",
     "cv_bridge",
     "cv_bridge.core",
+    "image_geometry",
+    "image_geometry.cameramodels",
+    "laser_geometry",
+    "laser_geometry.laser_geometry",
+    "camera_calibration_parsers",
+    "resource_retriever",
     "rosbag",
     "rosbag.bag",
     "rosbag.migration",
@@ -122,7 +128,8 @@ OF_ROS = (
     "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
     "PyKDL",
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
-    "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure",
+    "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure", "image_geometry", "laser_geometry", "camera_calibration_parsers",
+    "resource_retriever",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
