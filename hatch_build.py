@@ -27,17 +27,19 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         sys.path.insert(0, self.root)
         try:
             from minirospy.idl.load import Catalogue, write_package
+            from minirospy.idl.on_demand import COMPILED_AHEAD
         finally:
             sys.path.remove(self.root)
         overlay = root / "minirospy" / "overlay"
         catalogue = Catalogue.below(root / "msgs")
         for package in catalogue.packages:
-            write_package(catalogue, package, overlay)
+            write_package(catalogue, package, overlay, on_demand=package not in COMPILED_AHEAD)
         if version == "editable":
             return
         for package in catalogue.packages:
             build_data["artifacts"] += [
                 f"minirospy/overlay/{package}/**/*.py",
+                f"minirospy/overlay/{package}/**/*.pyi",
                 f"minirospy/overlay/{package}/py.typed",
             ]
         build_data["force_include"] |= {

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+MOST_BYTES = 3_000_000
 
 USE = """
 import site, sys
@@ -24,6 +25,8 @@ import minirospy, rospy
 from minirospy.workspace.packages import Packages
 print(minirospy.__file__)
 print(LaserScan._md5sum, SetBool._md5sum)
+from gazebo_msgs.msg import ModelStates
+print(ModelStates._md5sum)
 for name in ("std_msgs", "rpi_feros", "rpi_feros_bringup"):
     print(Packages().find(name))
 print(Packages().find_executable("rpi_feros", "led_actuator.py")[1])
@@ -75,6 +78,10 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/overlay/tf/transformations.py",
         "minirospy/overlay/tf/msg/_tfMessage.py",
         "minirospy/overlay/std_msgs/msg/_Bool.py",
+        "minirospy/overlay/std_msgs/msg/__init__.pyi",
+        "minirospy/overlay/gazebo_msgs/msg/__init__.pyi",
+        "minirospy/overlay/gazebo_msgs/srv/__init__.py",
+        "minirospy/share/msgs/gazebo_msgs/srv/SpawnModel.srv",
         "minirospy/overlay/sick_safetyscanners/srv/_FieldData.py",
         "minirospy/share/msgs/std_msgs/msg/Bool.msg",
         "minirospy/share/rpi_feros/package.xml",
@@ -84,6 +91,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     ):
         assert name in names
 
+    assert wheel.stat().st_size < MOST_BYTES
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
 
 
@@ -108,8 +116,10 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
     assert lines[0] == str(site / "minirospy" / "__init__.py")
     assert lines[1] == "90c7ef2dc6895d81024acba2ac42f369 09fb03525b03e7ea1fd3992bafd87e16"
 
+    assert lines[2] == "48c080191eb15c41858319b4d8a609c2"
+
     share = site / "minirospy" / "share"
-    assert [Path(line) for line in lines[2:]] == [
+    assert [Path(line) for line in lines[3:]] == [
         share / "msgs" / "std_msgs",
         share / "rpi_feros",
         share / "launch",

@@ -43,6 +43,51 @@ def test_types_of_a_user_program(tmp_path: Path) -> None:
     ]
 
 
+CONSTRUCTORS = """
+import numpy as np
+from geometry_msgs.msg import Point, Twist, Vector3
+from sensor_msgs.msg import Image, JointState, LaserScan
+from std_msgs.msg import Float64MultiArray, Header, String
+from std_srvs.srv import SetBoolRequest
+from gazebo_msgs.srv import SpawnModel, SpawnModelRequest
+
+Twist(linear=Vector3(x=1.0), angular=Vector3(0, 0, 1))
+JointState(name=["a"], position=(1.0, 2), velocity=np.zeros(2))
+Image(data=bytearray(3), header=Header(frame_id="camera"))
+SetBoolRequest(True)
+SpawnModelRequest(model_name="box")
+reveal_type(SpawnModel._request_class)
+reveal_type(LaserScan.__init__)
+Twist(lin=Vector3())
+String(data=3)
+Point(1.0, 2.0, "3")
+JointState(name="a", position=1.0)
+"""
+
+
+def test_constructors_of_messages_are_typed(tmp_path: Path) -> None:
+    (tmp_path / "node.py").write_text(CONSTRUCTORS)
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "node.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    lines = [line for line in done.stdout.splitlines() if "defined in" not in line]
+    # Each version of mypy writes the type of a function in its own way.
+    (scan,) = (line for line in lines if "LaserScan" in line)
+    assert "angle_min: float =, angle_max: float =" in scan
+    assert [line for line in lines if line != scan] == [
+        'node.py:14: note: Revealed type is "type[gazebo_msgs.srv.SpawnModelRequest]"',
+        'node.py:16: error: Unexpected keyword argument "lin" for "Twist"  [call-arg]',
+        'node.py:17: error: Argument "data" to "String" has incompatible type "int"; expected "str"  [arg-type]',
+        'node.py:18: error: Argument 3 to "Point" has incompatible type "str"; expected "float"  [arg-type]',
+        'node.py:19: error: Argument "position" to "JointState" has incompatible type "float"; '
+        'expected "Collection[float]"  [arg-type]',
+    ]
+
+
 def test_any_stays_rare() -> None:
     """`Any` switches the checker off: a value that is passed on is an `object`, a message has a protocol."""
     package = Path(__file__).parents[1] / "minirospy"

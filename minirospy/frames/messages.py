@@ -60,7 +60,7 @@ class LazyTFMessage(TFMessage):
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types
 
-    def __init__(self, *args: object, **kwds: object) -> None:
+    def __init__(self, *args: Any, **kwds: Any) -> None:
         if args or kwds:
             super().__init__(*args, **kwds)
         self.raw: bytes | None = None

@@ -13,6 +13,7 @@ from pathlib import Path
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.idl.load import Catalogue, write_package
+from minirospy.idl.on_demand import COMPILED_AHEAD, own_definitions
 
 __all__ = ["main"]
 
@@ -34,7 +35,7 @@ def _parser() -> Parser:
 
 
 def _compile(source: Path | None, target: Path | None) -> int:
-    own = next(p for p in (_PACKAGE.parent / "msgs", _PACKAGE / "share" / "msgs") if p.is_dir())
+    own = own_definitions()
     catalogue = Catalogue.below(*([source] if source else []), own)
     chosen = Catalogue.below(source or own).packages
     if not chosen:
@@ -42,9 +43,14 @@ def _compile(source: Path | None, target: Path | None) -> int:
     written = [
         path
         for package in chosen
-        for path in write_package(catalogue, package, target or _PACKAGE / "overlay")
+        for path in write_package(
+            catalogue,
+            package,
+            target or _PACKAGE / "overlay",
+            on_demand=source is target is None and package not in COMPILED_AHEAD,
+        )
     ]
-    print(f"{len(chosen)} packages, {len(written)} modules written")
+    print(f"{len(chosen)} packages, {len(written)} files written")
     return 0
 
 

@@ -62,6 +62,10 @@ class Message:
     """The base of all messages. Subclasses have ``_type``, ``_md5sum``, ``_full_text``, ``_slot_types``."""
 
     __slots__ = ["_connection_header"]
+    _type: str
+    _md5sum: str
+    _full_text: str
+    _has_header: bool
     _slot_types: list[str] = []
     _connection_header: dict[str, str]
 
@@ -176,7 +180,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
             # Of another generator, or made from another text: the bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
-            raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")  # type: ignore[attr-defined]
+            raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
         if isinstance(only, list | tuple) and len(data_class.__slots__) != 1:
             return data_class(*only)
 

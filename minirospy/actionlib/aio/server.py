@@ -47,7 +47,7 @@ class ServerGoal(Generic[_G, _F]):
         self.text = ""
         """The text that is sent with the goal's end."""
         self._server = server
-        self._status = GoalStatus(goal_id=message.goal_id)
+        self._status = GoalStatus(goal_id=cast("GoalID", message.goal_id))
         self._task: asyncio.Task[None] | None = None
         self._has_begun = False
         self._ended_at = 0

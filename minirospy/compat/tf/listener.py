@@ -313,7 +313,8 @@ class TransformerROS(Transformer):
     ) -> sensor_msgs.msg.PointCloud:
         """Return a PointCloud (not PointCloud2) in another frame."""
         matrix = self.asMatrix(target_frame, point_cloud.header)
-        points = [geometry_msgs.msg.Point(*_moved(matrix, point)) for point in point_cloud.points]
+        # Points of 64 bits, as the real one gives: they have the fields of a Point32.
+        points: list[Any] = [geometry_msgs.msg.Point(*_moved(matrix, point)) for point in point_cloud.points]
         return sensor_msgs.msg.PointCloud(
             _header(target_frame, point_cloud.header), points, point_cloud.channels
         )

@@ -1,0 +1,157 @@
+"""Definitions -> modules, when they are first imported: for the many packages of which a program uses a few types.
+
+A package that is compiled so has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`add_package`; from then on
+``import moveit_msgs.msg._RobotState`` compiles that definition, and Python keeps the result in ``__pycache__`` as it does with
+any module. Where that folder cannot be written to, the module is compiled again in each process.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+    from minirospy.idl.load import Catalogue
+
+__all__ = ["COMPILED_AHEAD", "add_package", "own_definitions", "packages_on_demand"]
+
+COMPILED_AHEAD = frozenset(
+    [
+        "actionlib",
+        "actionlib_msgs",
+        "actionlib_tutorials",
+        "bond",
+        "control_msgs",
+        "diagnostic_msgs",
+        "dynamic_reconfigure",
+        "geometry_msgs",
+        "map_msgs",
+        "minirospy_msgs",
+        "move_base_msgs",
+        "nav_msgs",
+        "pcl_msgs",
+        "roscpp",
+        "roscpp_tutorials",
+        "rosgraph_msgs",
+        "rospy_tutorials",
+        "rpi_msgs",
+        "sensor_msgs",
+        "shape_msgs",
+        "sick_safetyscanners",
+        "std_msgs",
+        "std_srvs",
+        "stereo_msgs",
+        "tf",
+        "tf2_msgs",
+        "theora_image_transport",
+        "topic_tools",
+        "trajectory_msgs",
+        "visualization_msgs",
+    ]
+)
+"""Packages whose modules are files of the wheel: those of ROS itself and of the workshop, which most programs import."""
+
+_OURS = Path(__file__).parents[1]
+
+
+def add_package(package: str, fingerprint: int) -> None:
+    """Let the modules of a package of ours be imported. ``fingerprint`` changes with the text of any of them."""
+    if _FINDER not in sys.meta_path:
+        sys.meta_path.append(_FINDER)
+    _FINDER.packages[package] = fingerprint
+
+
+def packages_on_demand() -> tuple[str, ...]:
+    """Return the packages that have been added."""
+    return tuple(_FINDER.packages)
+
+
+def own_definitions() -> Path:
+    """Return the folder of minirospy's own definitions: ``share/msgs`` when installed, ``msgs`` in a checkout."""
+    installed = _OURS / "share" / "msgs"
+    return installed if installed.is_dir() else _OURS.parent / "msgs"
+
+
+class _Finder:
+    """The last of ``sys.meta_path``: a module that exists as a file is found before it."""
+
+    def __init__(self) -> None:
+        self.packages: dict[str, int] = {}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the spec of ``pkg.msg._Name`` or ``pkg.srv._Name`` where the package defines it."""
+        package, _, rest = fullname.partition(".")
+        kind, _, module = rest.partition(".")
+        if package not in self.packages or not path or not module.startswith("_"):
+            return None
+        if not _defines(package, kind, module[1:]):
+            return None
+        file = str(Path(path[0], f"{module}.py"))
+        loader = _Loader(fullname, file, self.packages[package])
+        return spec_from_file_location(fullname, file, loader=loader)
+
+
+class _Loader(SourceFileLoader):
+    """Reads from a definition what SourceFileLoader reads from a file, and leaves the rest to it: compiling, the cache."""
+
+    def __init__(self, fullname: str, path: str, fingerprint: int) -> None:
+        super().__init__(fullname, path)
+        self._fingerprint = fingerprint
+
+    def path_stats(self, path: str | bytes) -> dict[str, int]:
+        """Return what a cached module is compared with: the source's size is not known before it is made."""
+        return {"mtime": self._fingerprint, "size": 0}
+
+    def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
+        """Write a module's cache, with the size that :meth:`path_stats` returns in its header (PEP 552)."""
+        cached = bytes(data)
+        super().set_data(path, cached[:12] + bytes(4) + cached[16:], _mode=_mode)
+
+    def get_data(self, path: str | bytes) -> bytes:
+        """Return the source of the module, or the bytes of its cache."""
+        if path != self.path:
+            return super().get_data(str(path))
+        package, kind, module = self.name.split(".")
+        return _source(package, kind, module[1:]).encode()
+
+
+def _defines(package: str, kind: str, name: str) -> bool:
+    folder = own_definitions() / package
+    if kind == "srv":
+        return (folder / "srv" / f"{name}.srv").is_file()
+    return kind == "msg" and (
+        (folder / "msg" / f"{name}.msg").is_file() or name in _of_actions(_catalogue(), package)
+    )
+
+
+def _of_actions(catalogue: Catalogue, package: str) -> set[str]:
+    return {message.name for action in catalogue.actions(package) for message in action.messages}
+
+
+@lru_cache(maxsize=1)
+def _catalogue() -> Catalogue:
+    from minirospy.idl.load import Catalogue
+
+    return Catalogue.below(own_definitions())
+
+
+def _source(package: str, kind: str, name: str) -> str:
+    from minirospy.idl.emit import emit_message, emit_service
+
+    catalogue = _catalogue()
+    if kind == "msg":
+        return emit_message(catalogue.message(f"{package}/{name}"), catalogue.message)
+    return emit_service(catalogue.service(f"{package}/{name}"), catalogue.message)
+
+
+_FINDER = _Finder()
