@@ -20,7 +20,7 @@ MSGS = HERE.parents[1] / "msgs"
 def types() -> Iterator[tuple[str, str]]:
     """Yield the kind and pkg/Name of every definition; the messages of an action are seven."""
     for folder in sorted(MSGS.iterdir()):
-        for path in sorted(folder.glob("*/*.*")):
+        for path in sorted(path for kind in KINDS for path in folder.glob(f"{kind}/*.{kind}")):
             names = [path.stem]
             kind = path.suffix[1:]
             if kind == "action":
@@ -30,6 +30,7 @@ def types() -> Iterator[tuple[str, str]]:
                 yield kind, folder.name + "/" + name
 
 
+KINDS = ["action", "msg", "srv"]
 PARTS = ["Action", "ActionGoal", "ActionResult", "ActionFeedback", "Goal", "Result", "Feedback"]
 
 
