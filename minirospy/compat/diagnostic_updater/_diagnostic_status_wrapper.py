@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import overload
+from typing import Any, overload
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -16,7 +16,7 @@ ERROR = DiagnosticStatus.ERROR
 class DiagnosticStatusWrapper(DiagnosticStatus):
     """A diagnostic_msgs/DiagnosticStatus that is filled step by step; it can be published as it is."""
 
-    def __init__(self, *args: object, **kwds: object) -> None:
+    def __init__(self, *args: Any, **kwds: Any) -> None:
         """Take the values of the fields, all in order or some by name."""
         super().__init__(*args, **kwds)
 
