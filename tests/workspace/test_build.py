@@ -774,10 +774,12 @@ def test_install(scene: Scene) -> None:
     assert {name for name in found if "/" in name} == {
         "lib/python3/dist-packages/led_msgs/__init__.py",
         "lib/python3/dist-packages/led_msgs/msg/__init__.py",
+        "lib/python3/dist-packages/led_msgs/msg/__init__.pyi",
         "lib/python3/dist-packages/led_msgs/msg/_Led.py",
         "lib/python3/dist-packages/led_msgs/py.typed",
         "lib/python3/dist-packages/tested/__init__.py",
         "lib/python3/dist-packages/tested/msg/__init__.py",
+        "lib/python3/dist-packages/tested/msg/__init__.pyi",
         "lib/python3/dist-packages/tested/msg/_T.py",
         "lib/python3/dist-packages/tested/py.typed",
         "share/tested/package.xml",
