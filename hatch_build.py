@@ -27,7 +27,7 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         sys.path.insert(0, self.root)
         try:
             from minirospy.idl.load import Catalogue, write_package
-            from minirospy.idl.on_demand import COMPILED_AHEAD
+            from minirospy.idl.own_packages import COMPILED_AHEAD
         finally:
             sys.path.remove(self.root)
         overlay = root / "minirospy" / "overlay"

@@ -13,7 +13,7 @@ from pathlib import Path
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.idl.load import Catalogue, write_package
-from minirospy.idl.on_demand import COMPILED_AHEAD, own_definitions
+from minirospy.idl.own_packages import COMPILED_AHEAD, own_definitions
 
 __all__ = ["main"]
 

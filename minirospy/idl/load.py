@@ -374,7 +374,7 @@ def _has_definitions(package: str, kind: str) -> bool:
 
 def _known(kind: str) -> set[str]:
     """Return the types of minirospy's own packages, and of all on sys.path that hold generated modules."""
-    from minirospy.idl.on_demand import own_definitions
+    from minirospy.idl.own_packages import own_definitions
 
     files = [(path.parent.parent, path.stem) for path in own_definitions().glob(f"*/{kind}/*.{kind}")]
     for entry in sys.path:

@@ -1,7 +1,7 @@
 """Definitions -> modules, when they are first imported: for the many packages of which a program uses a few types.
 
 A package that is compiled so has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`add_package`; from then on
-``import moveit_msgs.msg._RobotState`` compiles that definition, and Python keeps the result in ``__pycache__`` as it does with
+``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python keeps the result in ``__pycache__`` as it does with
 any module. Where that folder cannot be written to, the module is compiled again in each process.
 """
 
@@ -16,50 +16,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from minirospy.idl.own_packages import own_definitions
+
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
     from minirospy.idl.load import Catalogue
 
-__all__ = ["COMPILED_AHEAD", "add_package", "own_definitions", "packages_on_demand"]
-
-COMPILED_AHEAD = frozenset(
-    [
-        "actionlib",
-        "actionlib_msgs",
-        "actionlib_tutorials",
-        "bond",
-        "control_msgs",
-        "diagnostic_msgs",
-        "dynamic_reconfigure",
-        "geometry_msgs",
-        "map_msgs",
-        "minirospy_msgs",
-        "move_base_msgs",
-        "nav_msgs",
-        "pcl_msgs",
-        "roscpp",
-        "roscpp_tutorials",
-        "rosgraph_msgs",
-        "rospy_tutorials",
-        "rpi_msgs",
-        "sensor_msgs",
-        "shape_msgs",
-        "sick_safetyscanners",
-        "std_msgs",
-        "std_srvs",
-        "stereo_msgs",
-        "tf",
-        "tf2_msgs",
-        "theora_image_transport",
-        "topic_tools",
-        "trajectory_msgs",
-        "visualization_msgs",
-    ]
-)
-"""Packages whose modules are files of the wheel: those of ROS itself and of the workshop, which most programs import."""
-
-_OURS = Path(__file__).parents[1]
+__all__ = ["add_package"]
 
 
 def add_package(package: str, fingerprint: int) -> None:
@@ -67,17 +31,6 @@ def add_package(package: str, fingerprint: int) -> None:
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
     _FINDER.packages[package] = fingerprint
-
-
-def packages_on_demand() -> tuple[str, ...]:
-    """Return the packages that have been added."""
-    return tuple(_FINDER.packages)
-
-
-def own_definitions() -> Path:
-    """Return the folder of minirospy's own definitions: ``share/msgs`` when installed, ``msgs`` in a checkout."""
-    installed = _OURS / "share" / "msgs"
-    return installed if installed.is_dir() else _OURS.parent / "msgs"
 
 
 class _Finder:

@@ -12,7 +12,7 @@ import pytest
 
 from minirospy.errors import NotFoundError
 from minirospy.idl.load import message_class, service_class
-from minirospy.idl.on_demand import COMPILED_AHEAD, own_definitions
+from minirospy.idl.own_packages import COMPILED_AHEAD, own_definitions
 
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 PACKAGE = "gazebo_msgs"

@@ -1,0 +1,51 @@
+"""The packages of definitions that come with minirospy: where they are, and which are modules of the wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["COMPILED_AHEAD", "own_definitions"]
+
+COMPILED_AHEAD = frozenset(
+    [
+        "actionlib",
+        "actionlib_msgs",
+        "actionlib_tutorials",
+        "bond",
+        "control_msgs",
+        "diagnostic_msgs",
+        "dynamic_reconfigure",
+        "geometry_msgs",
+        "map_msgs",
+        "minirospy_msgs",
+        "move_base_msgs",
+        "nav_msgs",
+        "pcl_msgs",
+        "roscpp",
+        "roscpp_tutorials",
+        "rosgraph_msgs",
+        "rospy_tutorials",
+        "rpi_msgs",
+        "sensor_msgs",
+        "shape_msgs",
+        "sick_safetyscanners",
+        "std_msgs",
+        "std_srvs",
+        "stereo_msgs",
+        "tf",
+        "tf2_msgs",
+        "theora_image_transport",
+        "topic_tools",
+        "trajectory_msgs",
+        "visualization_msgs",
+    ]
+)
+"""Packages whose modules are files of the wheel: those of ROS itself and of the workshop, which most programs import."""
+
+_OURS = Path(__file__).parents[1]
+
+
+def own_definitions() -> Path:
+    """Return the folder of minirospy's own definitions: ``share/msgs`` when installed, ``msgs`` in a checkout."""
+    installed = _OURS / "share" / "msgs"
+    return installed if installed.is_dir() else _OURS.parent / "msgs"
