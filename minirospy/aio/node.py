@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 
 from minirospy import names
 from minirospy.aio.log import RosoutHandler, TerminalHandler
+from minirospy.aio.parameters import ParameterWatch
+from minirospy.aio.raw import ANY_CLASS, RawSubscription
 from minirospy.aio.services import Service, ServiceClass, ServiceProxy
 from minirospy.aio.time import Rate, SimulatedTime
 from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription
@@ -32,6 +34,8 @@ from minirospy.runtime.node.node import Node as RuntimeNode
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
 from minirospy.runtime.node.topics import Publication
 from minirospy.times import Duration, Time
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
 
 __all__ = ["Node"]
@@ -106,6 +110,7 @@ class Node:
         self._subscribed: dict[str, SubscribedTopic] = {}
         self._tasks: set[asyncio.Task[object]] = set()
         self._simulated: SimulatedTime | None = None
+        self._is_started = False
         self._is_closed = False
 
     # --- life
@@ -134,7 +139,14 @@ class Node:
                 "asyncio.set_event_loop_policy(asyncio.WindowsSelectorEventLoopPolicy())"
             )
         self._loop = loop
-        runtime = RuntimeNode(self.name, self._environment, on_shutdown=self.shutdown)
+        self.parameters = ParameterWatch(self, loop)
+        runtime = RuntimeNode(
+            self.name,
+            self._environment,
+            on_shutdown=self.shutdown,
+            on_parameter=self.parameters.changed_in_worker,
+        )
+        runtime.when_registered_again.append(self.parameters.forgotten_in_worker)
         try:
             await runtime.start()
         except OSError as error:
@@ -149,6 +161,7 @@ class Node:
                 self._spawn(self._follow_clock(self._simulated))
             if self._rosout:
                 self._start_rosout()
+            self._is_started = True
         except BaseException:
             await self.close()
             raise
@@ -179,6 +192,16 @@ class Node:
         if self._loop:
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._stop)
+
+    @property
+    def is_started(self) -> bool:
+        """Whether the node has found a master, and is in the graph."""
+        return self._is_started
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the node follows /clock."""
+        return self._simulated is not None
 
     @property
     def is_shutdown(self) -> bool:
@@ -215,6 +238,17 @@ class Node:
         if state is None:
             state = self._subscribed[resolved] = SubscribedTopic(self, resolved, message_class)
         return Subscription(self, state, message_class, queue_size)
+
+    def subscribe_raw(self, topic: str, deliver: Callable[[Frame, Header], object]) -> RawSubscription:
+        """Subscribe to ``topic`` of any type: ``deliver(bytes, publisher's connection header)`` on the loop, quickly.
+
+        The bytes may be kept. ``await node.subscribe_raw(...)`` waits until the master knows.
+        """
+        resolved = self.resolve(topic)
+        state = self._subscribed.get(resolved)
+        if state is None:
+            state = self._subscribed[resolved] = SubscribedTopic(self, resolved, ANY_CLASS)
+        return RawSubscription(state, deliver)
 
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
         """Return the next message of ``topic``.

@@ -22,12 +22,13 @@ from minirospy.idl.protocols import Message, is_stamped
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.wire.framing import CHUNK, Frame
+from minirospy.wire.framing import CHUNK, Frame, LargeFrame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
+    from minirospy.aio.raw import RawSubscription
 
 __all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
 
@@ -158,6 +159,16 @@ class Publisher(Handle, Generic[_M_co]):
         self._state: PublishedTopic | None = state
         self._registration = state.join(self)
 
+    def publish_raw(self, body: bytes) -> None:
+        """Publish a message that is serialized already. Does not wait. Raises ROSException once it is closed."""
+        state = self._state
+        if state is None or self._node.is_shutdown:
+            raise ROSException("publish() to a closed topic")
+        publication = state.publication
+        if publication.links or publication.latch:
+            large = len(body) >= CHUNK
+            publication.publish(LargeFrame((body,), len(body)) if large else serialize_frame(body))
+
     async def publish(self, *args: object, **kwds: object) -> None:
         """Publish a message, or the message that these field values make.
 
@@ -215,7 +226,7 @@ class SubscribedTopic:
     def __init__(self, node: Node, topic: str, message_class: type[Message]) -> None:
         self.topic = topic
         self._node = node
-        self._handles: weakref.WeakSet[Subscription[Message]] = weakref.WeakSet()
+        self._handles: weakref.WeakSet[Subscription[Message] | RawSubscription] = weakref.WeakSet()
         runtime = node._node
         self.subscription: RuntimeSubscription = runtime.make_subscription(
             topic, InterfaceType.of(message_class), self._deliver, on_loop=True
@@ -224,13 +235,13 @@ class SubscribedTopic:
             registered(runtime.subscribe, self.subscription, f"subscription [{topic}]", node.log)
         )
 
-    def join(self, handle: Subscription[Message]) -> asyncio.Task[None]:
+    def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
         # `async for ... break` leaves a subscription behind without a reference.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
-    async def leave(self, handle: Subscription[Message]) -> None:
+    async def leave(self, handle: Subscription[Message] | RawSubscription) -> None:
         self._handles.discard(handle)
         try:
             await self._leave_if_empty()

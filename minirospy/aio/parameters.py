@@ -1,0 +1,63 @@
+"""Changes of parameters, of which the master notifies this node."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from minirospy.errors import MasterUnreachableError, RpcError
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["ParameterWatch"]
+
+
+class ParameterWatch:
+    """The parameters that a node is subscribed to; ``listeners(name, value)`` are called on the loop.
+
+    A parameter that is deleted has the value ``{}``, as the master sends it. After the master's restart it is
+    subscribed again. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
+    """
+
+    def __init__(self, node: Node, loop: asyncio.AbstractEventLoop) -> None:
+        self.listeners: list[Callable[[str, object], object]] = []
+        self._node = node
+        self._loop = loop
+
+    async def add(self, name: str) -> object:
+        """Subscribe to a parameter (global name) and return its value, ``{}`` where it is not set.
+
+        Raises MasterUnreachableError, RpcError.
+        """
+        runtime = self._node._node
+        value: object = await runtime.master("subscribeParam", runtime.uri, name)
+        runtime.parameters.add(name)
+        return value
+
+    async def remove(self, name: str) -> None:
+        """Unsubscribe from a parameter. Raises as :meth:`add`."""
+        runtime = self._node._node
+        runtime.parameters.discard(name)
+        await runtime.master("unsubscribeParam", runtime.uri, name)
+
+    def changed_in_worker(self, name: str, value: object) -> None:
+        """Pass on a change, of which the master has notified the node's server."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._changed, name, value)
+
+    def forgotten_in_worker(self) -> None:
+        """Subscribe again at a master that has restarted."""
+        self._node._later(self._add_again)
+
+    def _changed(self, name: str, value: object) -> None:
+        # The master reports names below the one that was subscribed to with a slash at the end.
+        for listener in list(self.listeners):
+            listener(name.rstrip("/") or "/", value)
+
+    async def _add_again(self) -> None:
+        for name in list(self._node._node.parameters):
+            with contextlib.suppress(MasterUnreachableError, RpcError):
+                self._changed(name, await self.add(name))

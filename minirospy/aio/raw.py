@@ -1,0 +1,116 @@
+"""Topics and services as bytes, of any type, for programs that pass them on: bridges, relays."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING, cast
+
+from minirospy.aio.handle import Handle
+from minirospy.errors import (
+    CallFailed,
+    HandshakeRefused,
+    MasterUnreachableError,
+    RpcError,
+    RpcRefused,
+    ServiceException,
+    WireError,
+)
+from minirospy.idl.protocols import Message
+from minirospy.runtime.node.services import AsyncServiceClient
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.aio.topics import SubscribedTopic
+
+__all__ = ["RawSubscription", "call_raw", "raw_class", "service_header"]
+
+PROBE_SECONDS = 5.0
+
+
+class RawSubscription(Handle):
+    """The messages of a topic as they come; made by :meth:`Node.subscribe_raw`, ended by :meth:`close`."""
+
+    def __init__(self, state: SubscribedTopic, deliver: Callable[[Frame, Header], object]) -> None:
+        self.topic = state.topic
+        self._deliver = deliver
+        self._state = state
+        self._registration = state.join(self)
+
+    @property
+    def headers(self) -> list[Header]:
+        """The connection headers of the publishers that are connected: the objects that ``deliver`` gets."""
+        return [link.header for link in self._state.subscription.links]
+
+    async def close(self) -> None:
+        """Stop listening. Idempotent."""
+        await self._state.leave(self)
+
+    def _put(self, frame: bytes | memoryview, header: Header) -> None:
+        self._deliver(frame, header)
+
+    def _end(self) -> None:
+        """There is nothing to end: nobody waits."""
+
+
+def raw_class(type_: InterfaceType) -> type[Message]:
+    """Return a class that gives a topic its type, for ``advertise`` and ``Publisher.publish_raw``: it has no fields."""
+    fields = {
+        "_type": type_.name,
+        "_md5sum": type_.md5sum,
+        "_full_text": type_.definition,
+        "_has_header": False,
+        "__slots__": (),
+    }
+    return cast("type[Message]", type("RawMessage", (), fields))
+
+
+ANY_CLASS = raw_class(InterfaceType(ANY, ANY))
+
+
+async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> bytes:
+    """Return the bytes that a service answers to those of a request. Raise ServiceException with the reason."""
+    client = await _connect(node, service, md5sum)
+    try:
+        return await client.call(request)
+    except CallFailed as error:
+        raise ServiceException(f"service [{service}] responded with an error: {error}") from error
+    except (OSError, WireError) as error:
+        raise ServiceException(
+            f"service [{service}] ended the connection during the call: {error}"
+        ) from error
+    finally:
+        client.close()
+
+
+async def service_header(node: Node, service: str) -> Header:
+    """Return the connection header that a service answers with, its type among it. Raise ServiceException."""
+    client = await _connect(node, service, ANY, probe=True)
+    client.close()
+    return client.header
+
+
+async def _connect(node: Node, service: str, md5sum: str, *, probe: bool = False) -> AsyncServiceClient:
+    try:
+        uri = await node._node.master("lookupService", service)
+    except RpcRefused:
+        raise ServiceException(f"service [{service}] unavailable") from None
+    except (MasterUnreachableError, RpcError) as error:
+        raise ServiceException(f"unable to contact master: {error}") from error
+    try:
+        return await AsyncServiceClient.connect(
+            uri,
+            service,
+            md5sum,
+            node.name,
+            probe=probe,
+            timeout=PROBE_SECONDS,
+            same_host=node._node.environment.same_host,
+        )
+    except HandshakeRefused as error:
+        raise ServiceException(f"service [{service}] refused the connection: {error}") from error
+    except (OSError, WireError, asyncio.TimeoutError) as error:
+        raise ServiceException(f"service [{service}] at {uri} cannot be reached: {error}") from error
