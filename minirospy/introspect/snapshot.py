@@ -1,0 +1,93 @@
+"""The whole graph at a moment, and the difference between two moments.
+
+Pure but for :func:`fetch`. Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["Changes", "Snapshot", "compare", "fetch"]
+
+Table = Mapping[str, tuple[str, ...]]
+
+_ANY = "*"
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Topics and services with their nodes, in the master's order, and the types of topics that are known."""
+
+    publishers: Table = field(default_factory=dict)
+    subscribers: Table = field(default_factory=dict)
+    services: Table = field(default_factory=dict)
+    types: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def topics(self) -> set[str]:
+        """The topics that have publishers or subscribers."""
+        return {*self.publishers, *self.subscribers}
+
+    def filtered(self, topic: Callable[[str], bool], service: Callable[[str], bool]) -> Snapshot:
+        """Return the part of which the names are allowed."""
+        return Snapshot(
+            {name: nodes for name, nodes in self.publishers.items() if topic(name)},
+            {name: nodes for name, nodes in self.subscribers.items() if topic(name)},
+            {name: nodes for name, nodes in self.services.items() if service(name)},
+            {name: type_ for name, type_ in self.types.items() if topic(name)},
+        )
+
+
+@dataclass(frozen=True)
+class Changes:
+    """From one moment to the next: entries that are new or differ, each whole, and names that are no more.
+
+    A topic that lost its last publisher but has subscribers is in ``publishers`` without nodes.
+    """
+
+    publishers: Table
+    subscribers: Table
+    services: Table
+    removed_topics: tuple[str, ...]
+    removed_services: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        """Return whether anything has changed."""
+        return bool(
+            self.publishers
+            or self.subscribers
+            or self.services
+            or self.removed_topics
+            or self.removed_services
+        )
+
+
+def compare(before: Snapshot, after: Snapshot) -> Changes:
+    """Return the difference; types do not count."""
+    left = before.topics - after.topics
+    return Changes(
+        _changed(before.publishers, after.publishers, left),
+        _changed(before.subscribers, after.subscribers, left),
+        _changed(before.services, after.services, before.services.keys() - after.services.keys()),
+        tuple(sorted(left)),
+        tuple(sorted(before.services.keys() - after.services.keys())),
+    )
+
+
+async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
+    """Return the present graph; ``call(method, *arguments)`` calls the master. Raises as it does."""
+    state = await call("getSystemState")
+    types = await call("getTopicTypes")
+    publishers, subscribers, services = (
+        {str(name): tuple(map(str, nodes)) for name, nodes in table} for table in state
+    )
+    known = {str(topic): str(type_) for topic, type_ in types if type_ != _ANY}
+    return Snapshot(publishers, subscribers, services, known)
+
+
+def _changed(before: Table, after: Table, left: set[str]) -> dict[str, tuple[str, ...]]:
+    changed = {name: nodes for name, nodes in after.items() if before.get(name) != nodes}
+    changed.update((name, ()) for name in before if name not in after and name not in left)
+    return changed
