@@ -30,6 +30,8 @@
     |   |   +-- BagEncryptedError       the bag is encrypted
     |   |   +-- BagCompressionError     a compression that is unknown, or whose library is missing
     |   +-- BoardError                  the virtual board cannot be reached
+    |   +-- BridgeError                 the bridge to browsers cannot be started, or refuses a request
+    |   |   +-- BridgeProtocolError     a client's message that is not of its protocol
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit its target
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
@@ -65,6 +67,8 @@ __all__ = [
     "BagUnindexedError",
     "BagVersionError",
     "BoardError",
+    "BridgeError",
+    "BridgeProtocolError",
     "BuildError",
     "CallFailed",
     "ConnectivityException",
@@ -357,6 +361,14 @@ class BagCompressionError(BagError):
 
 class BoardError(MinirospyError):
     """The virtual board cannot be reached, or refused a request."""
+
+
+class BridgeError(MinirospyError):
+    """The bridge to browsers cannot be started, or refuses a client's request."""
+
+
+class BridgeProtocolError(BridgeError):
+    """A client's message that is not of its protocol."""
 
 
 class ValueTextError(MinirospyError):

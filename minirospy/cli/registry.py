@@ -77,6 +77,8 @@ COMMANDS = (
           "rospack_words"),
     Entry("ros.rostest", "rostest", "ROSTEST", "rostest", "test", "run the tests of nodes (as rostest)"),
     Entry("catkin.make", "catkin_make", "MAKE", "catkin_make", "make", "build a workspace (as catkin_make)"),
+    Entry("bridge", "main", "COMMAND", "", "bridge",
+          "see the graph in Foxglove, Lichtblick and browsers"),
     Entry("doctor", "main", "DOCTOR", "", "doctor",
           "what is wrong here, in the network, in the graph (as roswtf)"),
     Entry("completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),

@@ -333,6 +333,7 @@ def test_the_other_name_of_each_command() -> None:
         "shell": "",
         "complete": "",
         "doctor": "",
+        "bridge": "",
     }
     for noun in re.findall(r"^  minirospy (\w+) ", run("minirospy -h").out, re.M):
         name = twins.get(noun, "ros" + noun)

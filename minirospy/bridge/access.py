@@ -1,0 +1,225 @@
+"""Who may connect, and to what: Host, Origin and token of a request; names of topics, services and parameters.
+
+Pure. On loopback everybody of this machine may connect, but no page of a foreign site: a browser names the page in
+``Origin``, and in ``Host`` the name that it looked up (DNS rebinding). Beyond loopback a token is required.
+Source: RFC 6455, section 10.2 (Origin).
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import hmac
+import ipaddress
+import re
+import secrets
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from minirospy.errors import BridgeError
+
+__all__ = [
+    "TOKEN_PROTOCOL",
+    "Access",
+    "Credentials",
+    "Grant",
+    "NameFilter",
+    "Refusal",
+    "is_loopback",
+    "new_token",
+]
+
+TOKEN_PROTOCOL = "minirospy.token."
+"""A sub-protocol of this beginning carries a token: a page can set no header of a WebSocket."""
+
+DESKTOP_ORIGINS = ("file://", "lichtblick://*", "foxglove://*", "app://*", "vscode-webview://*")
+APP_ORIGINS = (
+    "https://app.foxglove.dev",
+    "https://studio.foxglove.dev",
+    "https://lichtblick-suite.github.io",
+)
+"""The pages of the front ends; a browser sends no other page's name for them."""
+
+_LOCAL_NAMES = ("localhost",)
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
+
+
+class Grant(Enum):
+    """The rights of a client."""
+
+    READ = "read-only"
+    WRITE = "read-write"
+
+
+class Refusal(NamedTuple):
+    """Why a request is refused: the HTTP status, and one line for a person."""
+
+    status: int
+    text: str
+
+
+class Credentials(NamedTuple):
+    """What a request says about its sender: the headers Host, Origin, Authorization, the offered sub-protocols, the path."""
+
+    host: str
+    origin: str | None
+    authorization: str
+    subprotocols: Sequence[str]
+    target: str
+
+    @property
+    def token(self) -> str:
+        """The token of the header, the sub-protocol or the query, "" without one."""
+        scheme, _, rest = self.authorization.partition(" ")
+        if scheme.lower() == "bearer":
+            return rest.strip()
+        for name in self.subprotocols:
+            if name.startswith(TOKEN_PROTOCOL):
+                return name.removeprefix(TOKEN_PROTOCOL)
+        found = parse_qs(urlsplit(self.target).query, max_num_fields=50).get("token", [""])
+        return found[0]
+
+
+@dataclass(frozen=True)
+class Access:
+    """The rules of one listener.
+
+    ``hosts``: names by which this machine may be called besides addresses and localhost. ``origins``: patterns of pages
+    that may connect besides those of this machine and of the front ends. Tokens: "" where there is none;
+    ``requires_token`` for a listener beyond loopback; ``default_is_read``: who needs no token may only look.
+    """
+
+    hosts: tuple[str, ...] = ()
+    origins: tuple[str, ...] = ()
+    read_token: str = ""
+    write_token: str = ""
+    requires_token: bool = False
+    default_is_read: bool = False
+
+    def __post_init__(self) -> None:
+        for token in (self.read_token, self.write_token):
+            if token and not _TOKEN.fullmatch(token):
+                raise BridgeError("a token has 8 to 200 characters out of A-Z a-z 0-9 _ -")
+        if self.requires_token and not (self.read_token or self.write_token):
+            raise BridgeError("a listener beyond loopback needs a token")
+
+    def check(self, request: Credentials) -> Grant | Refusal:
+        """Return the rights of a request's sender, or why it is refused."""
+        if not self._knows_host(request.host):
+            return Refusal(
+                403,
+                f"Host '{request.host[:100]}' is not a name of this server: use its address, or start the bridge with "
+                "--host-name NAME",
+            )
+        grant = self._grant_of(request.token)
+        if grant:
+            # A page that knows the token was given it: it needs no other right.
+            return grant
+        if request.token and (self.read_token or self.write_token):
+            return Refusal(401, "this token is wrong: the bridge prints the right one when it starts")
+        if self.requires_token:
+            return Refusal(401, "a token is required: the bridge prints it when it starts")
+        if not self._knows_origin(request.origin, request.host):
+            return Refusal(
+                403,
+                f"pages of '{(request.origin or '')[:100]}' may not connect: start the bridge with --origin PATTERN",
+            )
+        return Grant.READ if self.default_is_read else Grant.WRITE
+
+    def _grant_of(self, token: str) -> Grant | None:
+        given = token.encode()
+        # Both are compared, so that the time of the answer says nothing.
+        is_write = bool(self.write_token) and hmac.compare_digest(given, self.write_token.encode())
+        is_read = bool(self.read_token) and hmac.compare_digest(given, self.read_token.encode())
+        return Grant.WRITE if is_write else Grant.READ if is_read else None
+
+    def _knows_host(self, host: str) -> bool:
+        name = _host_name(host)
+        if name in _LOCAL_NAMES or name.endswith(".localhost"):
+            return True
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return name in {each.lower() for each in self.hosts}
+        return True
+
+    def _knows_origin(self, origin: str | None, host: str) -> bool:
+        if origin is None:
+            return True  # not a browser
+        lowered = origin.lower()
+        parts = urlsplit(lowered)
+        if parts.scheme in ("http", "https") and (
+            parts.netloc == host.lower() or is_loopback(parts.hostname or "")
+        ):
+            return True
+        patterns = (*DESKTOP_ORIGINS, *APP_ORIGINS, *self.origins)
+        return any(fnmatch.fnmatchcase(lowered, pattern.lower()) for pattern in patterns)
+
+
+@dataclass(frozen=True)
+class NameFilter:
+    """Names that clients may see: of those that a pattern of ``allow`` and one of ``whitelist`` matches, not those of ``deny``.
+
+    ``allow`` and ``deny`` are globs in which ``*`` matches slashes too; ``whitelist`` are regular expressions for the whole
+    name, as those of foxglove_bridge.
+    """
+
+    allow: tuple[str, ...] = ("*",)
+    deny: tuple[str, ...] = ()
+    whitelist: tuple[re.Pattern[str], ...] | None = None
+
+    @classmethod
+    def of(
+        cls, allow: Iterable[str] = (), deny: Iterable[str] = (), whitelist: Iterable[str] | None = None
+    ) -> NameFilter:
+        """Return the filter; no pattern of ``allow`` allows all. Raise BridgeError on a bad expression."""
+        compiled = None
+        if whitelist is not None:
+            try:
+                compiled = tuple(re.compile(each, re.IGNORECASE) for each in whitelist)
+            except re.error as error:
+                raise BridgeError(f"'{error.pattern!s}' is not a regular expression: {error}") from error
+        return cls(tuple(allow) or ("*",), tuple(deny), compiled)
+
+    def __call__(self, name: str) -> bool:
+        """Return whether a name is allowed."""
+        if not any(fnmatch.fnmatchcase(name, each) for each in self.allow):
+            return False
+        if any(fnmatch.fnmatchcase(name, each) for each in self.deny):
+            return False
+        return self.whitelist is None or any(each.fullmatch(name) for each in self.whitelist)
+
+
+def new_token() -> str:
+    """Return a random token of 128 bits."""
+    return secrets.token_urlsafe(16)
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether a host is this machine's loopback address, or its name."""
+    if host in _LOCAL_NAMES or host.endswith(".localhost"):
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def without_token(target: str) -> str:
+    """Return a request's path for logs: without its query, where a token may be."""
+    return unquote(urlsplit(target).path)[:200]
+
+
+def header_items(headers: Mapping[str, str], name: str) -> list[str]:
+    """Return the items of a header that is a list."""
+    return [item.strip() for item in headers.get(name, "").split(",") if item.strip()]
+
+
+def _host_name(host: str) -> str:
+    """Return the name or address in a Host header, without its port."""
+    try:
+        return (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:
+        return ""

@@ -1,0 +1,62 @@
+"""Where people find the bridge: addresses of this machine, links of front ends, a QR code for the terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import socket
+from typing import NamedTuple
+from urllib.parse import quote
+
+__all__ = ["Links", "links", "own_addresses", "qr_code"]
+
+FOXGLOVE_APP = "https://app.foxglove.dev/~/view"
+LICHTBLICK_APP = "https://lichtblick-suite.github.io/lichtblick/"
+
+
+class Links(NamedTuple):
+    """The addresses of one listener. The front ends' links are for a browser on this machine: they carry no token."""
+
+    websocket: list[str]
+    foxglove: str
+    lichtblick: str
+
+
+def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
+    """Return the links of a listener that is reached by these addresses; the first is that of the front ends' links."""
+    scheme = "wss" if encrypted else "ws"
+    websocket = [f"{scheme}://{_in_uri(address)}:{port}" for address in addresses]
+    query = f"ds=foxglove-websocket&ds.url={quote(websocket[0], safe='')}"
+    return Links(websocket, f"{FOXGLOVE_APP}?{query}", f"{LICHTBLICK_APP}?{query}")
+
+
+def own_addresses() -> list[str]:
+    """Return this machine's IPv4 addresses that other machines may reach, the one of the default route first."""
+    import psutil
+
+    found: dict[str, None] = {}
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        # Nothing is sent: the system names the address that it would send from.
+        probe.connect(("192.0.2.1", 9))
+        found[str(probe.getsockname()[0])] = None
+    for addresses in psutil.net_if_addrs().values():
+        for each in addresses:
+            if each.family == socket.AF_INET and not each.address.startswith("127."):
+                found[each.address] = None
+    found.pop("0.0.0.0", None)
+    return list(found)
+
+
+def qr_code(text: str) -> str:
+    """Return a QR code for a terminal; "" where the library segno is missing."""
+    try:
+        import segno
+    except ImportError:
+        return ""
+    out = io.StringIO()
+    segno.make(text, micro=False).terminal(out, compact=True)
+    return out.getvalue()
+
+
+def _in_uri(address: str) -> str:
+    return f"[{address}]" if ":" in address else address

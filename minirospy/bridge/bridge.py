@@ -1,0 +1,190 @@
+"""The bridge as a whole: the shared graph, its doors and their listeners, their state and their diagnostics."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from minirospy.aio.node import Node
+from minirospy.bridge.access import Access
+from minirospy.bridge.foxglove.assets import ALLOWED, Assets
+from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
+from minirospy.bridge.graph import Filters, SharedGraph
+from minirospy.bridge.web.connection import Exchange, Limits
+from minirospy.bridge.web.listener import Listener
+from minirospy.bridge.web.pipe import tls_context
+from minirospy.errors import BridgeError
+from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    import ssl
+
+__all__ = ["FOXGLOVE_PORT", "Bridge", "BridgeOptions"]
+
+FOXGLOVE_PORT = 8765
+_DIAGNOSTICS_SECONDS = 1.0
+
+
+@dataclass(frozen=True)
+class BridgeOptions:
+    """``address`` is where the listeners are; ``certificate`` and ``key`` are PEM files. ``slowest_look``: in seconds."""
+
+    address: str = "127.0.0.1"
+    foxglove_port: int = FOXGLOVE_PORT
+    access: Access = field(default_factory=Access)
+    limits: Limits = field(default_factory=Limits)
+    filters: Filters = field(default_factory=Filters)
+    capabilities: Sequence[str] = CAPABILITIES
+    assets: Sequence[str] = (ALLOWED,)
+    certificate: str = ""
+    key: str = ""
+    slowest_look: float = 1.0
+    diagnostics: bool = True
+
+
+class Bridge:
+    """Opens the graph of a node to browsers. On the node's loop."""
+
+    def __init__(
+        self, node: Node, options: BridgeOptions | None = None, playback: Playback | None = None
+    ) -> None:
+        self.options = options or BridgeOptions()
+        self.node = node
+        self.graph = SharedGraph(node, self.options.filters, slowest_look=self.options.slowest_look)
+        self.foxglove = FoxgloveDoor(
+            self.graph,
+            Assets(Packages(), self.options.assets),
+            FoxgloveOptions(
+                capabilities=self.options.capabilities, session_id=str(time.time_ns() // 1_000_000)
+            ),
+            playback,
+        )
+        self.listeners: dict[str, Listener] = {}
+        self._started = time.monotonic()
+        self._reporting: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Listen. Raises BridgeError."""
+        tls = self._tls()
+        listener = Listener(
+            [self.foxglove],
+            self.options.access,
+            limits=self.options.limits,
+            pages={"/status": self._status_page},
+            tls=tls,
+        )
+        await listener.open(self.options.address, self.options.foxglove_port)
+        self.listeners["foxglove"] = listener
+        if self.options.diagnostics:
+            self._reporting = asyncio.ensure_future(self._report())
+
+    async def close(self) -> None:
+        """Disconnect all clients. Idempotent."""
+        if self._reporting:
+            self._reporting.cancel()
+            await asyncio.gather(self._reporting, return_exceptions=True)
+        for listener in self.listeners.values():
+            await listener.close()
+        await self.graph.close()
+
+    def status(self) -> dict[str, object]:
+        """Return what the bridge serves and to whom, as JSON has it."""
+        clients = []
+        for door, listener in self.listeners.items():
+            for connection in listener.connections:
+                if connection.client:
+                    queue = connection.queue
+                    clients.append(
+                        {
+                            "door": door,
+                            "address": connection.peer,
+                            "protocol": connection.client.subprotocol or "",
+                            "rights": connection.client.grant.value,
+                            "seconds": round(time.monotonic() - connection.traffic.since, 1),
+                            "sent": queue.sent,
+                            "sent_bytes": queue.sent_bytes,
+                            "waiting": len(queue),
+                            "waiting_bytes": queue.size + queue.answers,
+                            "dropped": queue.dropped,
+                            "received": connection.traffic.received,
+                            "received_bytes": connection.traffic.received_bytes,
+                            "held_back": connection.traffic.held_back,
+                        }
+                    )
+        return {
+            "node": self.node.name,
+            "seconds": round(time.monotonic() - self._started, 1),
+            "doors": {
+                door: {
+                    "address": listener.host,
+                    "port": listener.port,
+                    "encrypted": listener.is_encrypted,
+                    "connections": len(listener.connections),
+                    "refused": listener.refused,
+                }
+                for door, listener in self.listeners.items()
+            },
+            "topics": {
+                topic: {"received": shared.received, "received_bytes": shared.received_bytes}
+                for topic, shared in self.graph.topics.items()
+            },
+            "clients": clients,
+        }
+
+    def _tls(self) -> ssl.SSLContext | None:
+        if not self.options.certificate:
+            if self.options.key:
+                raise BridgeError("a key is given without its certificate: give both PEM files")
+            return None
+        try:
+            return tls_context(self.options.certificate, self.options.key)
+        except OSError as error:  # ssl.SSLError is one
+            name = error.filename or f"{self.options.certificate} {self.options.key}".strip()
+            raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
+
+    def _status_page(self, exchange: Exchange) -> None:
+        exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
+
+    async def _report(self) -> None:
+        """Publish the state of the clients as diagnostics, every second while there are any."""
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+        publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)
+        before: Mapping[str, int] = {}
+        while True:
+            await asyncio.sleep(_DIAGNOSTICS_SECONDS)
+            dropped: dict[str, int] = {}
+            array = DiagnosticArray()
+            array.header.stamp = self.node.now()
+            for door, listener in self.listeners.items():
+                for connection in listener.connections:
+                    if not connection.client:
+                        continue
+                    queue, name = connection.queue, f"{connection.peer} {id(connection):x}"
+                    dropped[name] = queue.dropped
+                    lost = queue.dropped - before.get(name, 0)
+                    values = {
+                        "sent": queue.sent,
+                        "sent bytes": queue.sent_bytes,
+                        "waiting bytes": queue.size,
+                        "dropped": queue.dropped,
+                        "received": connection.traffic.received,
+                    }
+                    array.status.append(
+                        DiagnosticStatus(
+                            level=DiagnosticStatus.WARN if lost else DiagnosticStatus.OK,
+                            name=f"{self.node.name.lstrip('/')}: {door} client {connection.peer}",
+                            message=f"{lost} messages dropped in a second" if lost else "all messages sent",
+                            hardware_id=connection.peer,
+                            values=[KeyValue(key, str(value)) for key, value in values.items()],
+                        )
+                    )
+            before = dropped
+            if array.status:
+                with contextlib.suppress(Exception):
+                    await publisher.publish(array)

@@ -1,0 +1,72 @@
+"""Files for clients: meshes and pictures that a robot description names, out of known packages and nothing else."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import unquote
+
+from minirospy.errors import BridgeError, NotFoundError
+
+if TYPE_CHECKING:
+    from minirospy.workspace.packages import Packages
+
+__all__ = ["ALLOWED", "MOST_BYTES", "Assets"]
+
+ALLOWED = r"^package://(?:[-\w%]+/)*[-\w%.]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff|urdf|webp|xacro)$"
+"""The URIs that foxglove_bridge allows: matched as the whole, whatever the case."""
+
+MOST_BYTES = 100_000_000
+"""A larger file is refused."""
+
+
+class Assets:
+    """Reads files by ``package://`` URIs. Blocking."""
+
+    def __init__(
+        self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MOST_BYTES
+    ) -> None:
+        """Read from ``packages`` what a regular expression of ``allowed`` matches. Raise BridgeError on a bad one."""
+        self._packages = packages
+        self._most_bytes = most_bytes
+        try:
+            self._allowed = [re.compile(each, re.IGNORECASE) for each in allowed]
+        except re.error as error:
+            raise BridgeError(f"'{error.pattern!s}' is not a regular expression: {error}") from error
+
+    def read(self, uri: str) -> bytes:
+        """Return a file's bytes. Raise BridgeError with the reason."""
+        path = self._path(uri)
+        try:
+            size = path.stat().st_size
+            if size > self._most_bytes:
+                raise BridgeError(f"{uri}: {size} bytes, {self._most_bytes} are allowed")
+            with path.open("rb") as file:
+                data = file.read(self._most_bytes + 1)
+        except OSError as error:
+            raise BridgeError(f"{uri}: {error.strerror}") from None
+        if len(data) > self._most_bytes:
+            raise BridgeError(f"{uri}: more than {self._most_bytes} bytes")
+        return data
+
+    def _path(self, uri: str) -> Path:
+        if not any(each.fullmatch(uri) for each in self._allowed):
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
+        package, _, name = unquote(uri.removeprefix("package://")).partition("/")
+        if ".." in name or "\\" in name or "\0" in name or not name:
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
+        try:
+            folder = self._packages.find(package)
+        except NotFoundError as error:
+            raise BridgeError(f"{uri}: {error}") from None
+
+        root = folder.resolve()
+        path = (folder / name).resolve()
+        # A symbolic link must not lead out of the package.
+        if not path.is_relative_to(root):
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]} leaves its package")
+        if not path.is_file():
+            raise BridgeError(f"{uri}: there is no such file in {folder}")
+        return path

@@ -1,0 +1,128 @@
+"""Parameters for clients of the Foxglove protocol: reading, setting, and their changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from minirospy.bridge.foxglove.protocol import Parameter
+from minirospy.bridge.graph import SharedGraph
+from minirospy.errors import MasterUnreachableError, RpcError, RpcRefused
+
+__all__ = ["ParameterListener", "Parameters"]
+
+_ROOT = "/"
+
+
+class ParameterListener(Protocol):
+    """A client that subscribes to parameters."""
+
+    def parameters_changed(self, changed: list[Parameter]) -> None: ...
+
+
+class Parameters:
+    """The parameters of the graph. One subscription at the master, to the root, serves all clients."""
+
+    def __init__(self, graph: SharedGraph) -> None:
+        self._graph = graph
+        self._wanted: dict[ParameterListener, set[str] | None] = {}
+        """The names that a client subscribes to; None: all."""
+        self._is_watching = False
+
+    async def read(self, names: tuple[str, ...]) -> list[Parameter]:
+        """Return parameters, all that are set where ``names`` is empty. Raises MasterUnreachableError, RpcError."""
+        master = self._graph.node._node.master
+        allowed = self._graph.filters.parameters
+        if not names:
+            tree = await master("getParam", _ROOT)
+            leaves = _leaves("", tree) if isinstance(tree, dict) else []
+            return [Parameter(name, value) for name, value in leaves if allowed(name)]
+
+        found = []
+        for name in names:
+            try:
+                if not allowed(name):
+                    raise RpcRefused("getParam", -1, "not allowed")
+                found.append(Parameter(name, await master("getParam", self._graph.node.resolve(name))))
+            except RpcRefused:
+                found.append(Parameter(name, is_set=False))
+        return found
+
+    async def write(self, parameters: Iterable[Parameter]) -> list[str]:
+        """Set or delete parameters; return what failed, a line for each."""
+        master = self._graph.node._node.master
+        failed = []
+        for parameter in parameters:
+            name = self._graph.node.resolve(parameter.name)
+            if not self._graph.filters.parameters(name):
+                failed.append(f"parameter [{name}] may not be set by clients")
+                continue
+            try:
+                if parameter.is_set:
+                    await master("setParam", name, parameter.value)
+                else:
+                    await master("deleteParam", name)
+            except (RpcError, MasterUnreachableError, TypeError, ValueError, OverflowError) as error:
+                failed.append(f"Failed to set parameter '{name}': {error}")
+        return failed
+
+    def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
+        """Report the changes of parameters to a client, of all where ``names`` is empty."""
+        before = self._wanted.get(listener, set())
+        self._wanted[listener] = None if not names or before is None else before | set(names)
+        if not self._is_watching:
+            self._is_watching = True
+            self._graph.node.parameters.listeners.append(self._changed)
+            self._graph.spawn(self._graph.node.parameters.add(_ROOT))
+
+    def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
+        """Report them no more, none where ``names`` is empty."""
+        before = self._wanted.get(listener, set())
+        rest = set() if not names or before is None else before - set(names)
+        if rest:
+            self._wanted[listener] = rest
+        else:
+            self.forget(listener)
+
+    def forget(self, listener: ParameterListener) -> None:
+        """Report nothing to a client."""
+        self._wanted.pop(listener, None)
+        if not self._wanted and self._is_watching:
+            self._is_watching = False
+            self._graph.node.parameters.listeners.remove(self._changed)
+            self._graph.spawn(self._graph.node.parameters.remove(_ROOT))
+
+    def _changed(self, name: str, value: object) -> None:
+        """Report a change at ``name``, a parameter or a namespace; ``{}`` is one that was deleted."""
+        leaves = list(_leaves(name.rstrip("/"), value)) if isinstance(value, dict) else [(name, value)]
+        allowed = [Parameter(leaf, each) for leaf, each in leaves if self._graph.filters.parameters(leaf)]
+        if value == {} and self._graph.filters.parameters(name):
+            allowed = [Parameter(name, is_set=False)]
+        above: set[str] = set()
+        for listener, names in list(self._wanted.items()):
+            mine = [each for each in allowed if names is None or each.name in names]
+            if mine:
+                listener.parameters_changed(mine)
+            above |= {each for each in names or () if name.startswith(each.rstrip("/") + "/")}
+            if isinstance(value, dict):
+                above |= {each for each in names or () if each == name}
+                if value == {}:
+                    above |= {each for each in names or () if each.startswith(name.rstrip("/") + "/")}
+        if above:
+            self._graph.spawn(self._report(tuple(above)))
+
+    async def _report(self, names: tuple[str, ...]) -> None:
+        """Report the present values of namespaces that clients subscribe to as a whole, and of what was deleted with one."""
+        found = await self.read(names)
+        for listener, wanted in list(self._wanted.items()):
+            mine = [each for each in found if wanted and each.name in wanted]
+            if mine:
+                listener.parameters_changed(mine)
+
+
+def _leaves(namespace: str, value: object) -> Iterable[tuple[str, object]]:
+    if isinstance(value, dict) and value:
+        for key, each in value.items():
+            yield from _leaves(f"{namespace}/{key}", each)
+    elif namespace:
+        yield namespace, value

@@ -1,0 +1,82 @@
+"""Running a bridge as a process: its node, until Ctrl-C, SIGTERM or `rosnode kill`."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable, Sequence
+
+from minirospy.aio.node import Node
+from minirospy.bridge.bridge import Bridge
+from minirospy.errors import BridgeError, ROSInterruptException
+from minirospy.runtime.transport.loop import new_event_loop
+
+__all__ = ["require_libraries", "run"]
+
+
+def require_libraries() -> None:
+    """Raise BridgeError with what to install where the library of the web servers is missing."""
+    try:
+        import websockets.server  # noqa: F401 only whether it is there
+    except ImportError as error:
+        raise BridgeError(
+            f"the bridge needs the library {error.name}: python -m pip install 'minirospy[web]'"
+        ) from error
+
+
+def run(
+    name: str, argv: Sequence[str], start: Callable[[Node], Bridge], on_started: Callable[[Bridge], None]
+) -> int:
+    """Run a bridge on a node of this name until it is shut down; return the exit status.
+
+    ``argv``: remappings, as a launch file gives them. ``start`` makes the bridge, ``on_started`` shows its addresses.
+    """
+    loop = new_event_loop()
+    try:
+        return loop.run_until_complete(_run(name, argv, start, on_started))
+    finally:
+        loop.close()
+
+
+async def _run(
+    name: str, argv: Sequence[str], start: Callable[[Node], Bridge], on_started: Callable[[Bridge], None]
+) -> int:
+    loop = asyncio.get_running_loop()
+    node = Node(name, argv=argv)
+    main = asyncio.current_task()
+    assert main
+    interrupted = False
+
+    def interrupt() -> None:
+        nonlocal interrupted
+        interrupted = True
+        # Before there is a master, the wait for it ends; later the node shuts down.
+        if node.is_started:
+            node.shutdown("signal")
+        else:
+            main.cancel()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
+    # On Windows a signal is noticed when the loop next wakes up.
+    ticking = asyncio.ensure_future(_tick())
+    try:
+        async with node:
+            bridge = start(node)
+            try:
+                await bridge.start()
+                on_started(bridge)
+                await node.spin()
+            finally:
+                await bridge.close()
+    except (asyncio.CancelledError, ROSInterruptException):
+        if not interrupted:
+            raise
+    finally:
+        ticking.cancel()
+    return 0
+
+
+async def _tick() -> None:
+    while True:
+        await asyncio.sleep(0.5)

@@ -1,0 +1,160 @@
+"""Full texts and md5sums of the types of topics and services: from installed packages, else from the publishers."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from minirospy.errors import MinirospyError, RpcError, WireError
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+from minirospy.runtime.transport import tcp
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import ANY, InterfaceType, check_publisher, subscriber_header
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["ServiceInfo", "ServiceTypes", "TypeTexts", "installed_type", "type_of_text"]
+
+_AGAIN_SECONDS = 10.0
+"""After this a service that did not answer is tried again."""
+
+
+def installed_type(name: str) -> InterfaceType | None:
+    """Return a message type of the installed packages; None where there is none, or it cannot be read."""
+    from minirospy.idl.load import get_message_class
+
+    try:
+        found = get_message_class(name)
+    except (MinirospyError, ImportError, SyntaxError):
+        return None
+    return InterfaceType.of(found) if found is not None else None
+
+
+def type_of_text(name: str, text: str) -> InterfaceType | None:
+    """Return the type that a full text defines; None where it does not parse."""
+    from minirospy.idl.load import class_from_text
+
+    try:
+        return InterfaceType.of(class_from_text(name, text))
+    except MinirospyError:
+        return None
+
+
+class TypeTexts:
+    """Message types by topic. Importing a type's module takes milliseconds: it is done in a worker, once."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._installed: dict[str, InterfaceType | None] = {}
+        self._rpc = AsyncRpcClient()
+
+    async def of_topic(self, topic: str, type_: str, publishers: tuple[str, ...]) -> InterfaceType | None:
+        """Return the type of a topic's messages; where it is not installed here, a publisher is queried.
+
+        None where neither knows its text.
+        """
+        found = await self.installed(type_)
+        return found or await self._from_publishers(topic, publishers)
+
+    async def installed(self, name: str) -> InterfaceType | None:
+        """Return an installed type, None where there is none of the name."""
+        if name not in self._installed:
+            loop = asyncio.get_running_loop()
+            self._installed[name] = await loop.run_in_executor(None, installed_type, name)
+        return self._installed[name]
+
+    async def _from_publishers(self, topic: str, publishers: tuple[str, ...]) -> InterfaceType | None:
+        for publisher in publishers:
+            with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
+                header = await self._header_of(topic, publisher)
+                text = header.get("message_definition", "")
+                if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":  # a message without fields
+                    return InterfaceType(header["type"], header["md5sum"], text)
+        return None
+
+    async def _header_of(self, topic: str, publisher: str) -> Header:
+        """Return a publisher's connection header: connect as a subscriber, and hang up."""
+        uri = await self._node._node.master("lookupNode", publisher)
+        answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
+        match answer:
+            case [1, _, ["TCPROS", str(host), int(port), *_]]:
+                sock = await tcp.connect(host, port)
+            case _:
+                raise WireError(f"{uri} answered requestTopic for {topic} with {answer!r}")
+        try:
+            await tcp.send_header(sock, subscriber_header(topic, InterfaceType(ANY, ANY), self._node.name))
+            header = await tcp.receive_header(sock)
+            check_publisher(header, topic, InterfaceType(ANY, ANY))
+        finally:
+            sock.close()
+        return header
+
+    async def close(self) -> None:
+        """Close the connections."""
+        with contextlib.suppress(RpcError):
+            await self._rpc.close()
+
+
+@dataclass(frozen=True)
+class ServiceInfo:
+    """A service's type: full texts of request and response."""
+
+    name: str
+    type: str
+    md5sum: str
+    request: InterfaceType
+    response: InterfaceType
+
+
+class ServiceTypes:
+    """The types of services, found once for each service and its providers."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[tuple[str, ...], ServiceInfo | None, float]] = {}
+
+    def __getitem__(self, name: str) -> ServiceInfo | None:
+        """Return a service's type; None where it is not known, or not installed here."""
+        known = self._known.get(name)
+        return known[1] if known else None
+
+    def needs_look(self, name: str, nodes: tuple[str, ...]) -> bool:
+        """Return whether a service is new, has moved to another node, or did not answer a while ago."""
+        known = self._known.get(name)
+        return known is None or known[0] != nodes or (known[1] is None and time.monotonic() >= known[2])
+
+    def found(self, name: str, nodes: tuple[str, ...], header: Mapping[str, str]) -> None:
+        """Record the type that a service's node has named."""
+        self._known[name] = (nodes, _described(name, header), time.monotonic() + _AGAIN_SECONDS)
+
+    def failed(self, name: str, nodes: tuple[str, ...]) -> None:
+        """Record that a service did not answer."""
+        self._known[name] = (nodes, None, time.monotonic() + _AGAIN_SECONDS)
+
+    def keep(self, names: Mapping[str, object]) -> None:
+        """Forget the services that are no more."""
+        for name in [name for name in self._known if name not in names]:
+            del self._known[name]
+
+
+def _described(name: str, header: Mapping[str, str]) -> ServiceInfo | None:
+    from minirospy.idl.load import get_service_class
+
+    type_ = header.get("type", "")
+    try:
+        found: Any = get_service_class(type_)
+    except (MinirospyError, ImportError, SyntaxError):
+        return None
+    if found is None or header.get("md5sum") not in (ANY, found._md5sum):
+        return None
+    return ServiceInfo(
+        name,
+        type_,
+        found._md5sum,
+        InterfaceType.of(found._request_class),
+        InterfaceType.of(found._response_class),
+    )

@@ -1,0 +1,187 @@
+"""A listening socket and its connections, whose number is limited."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import logging
+import socket
+import ssl
+from collections.abc import Callable, Mapping, Sequence
+
+from minirospy.bridge.access import Access, Credentials, Grant, Refusal
+from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
+from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
+from minirospy.errors import BridgeError
+from minirospy.runtime.transport import tcp
+from minirospy.runtime.transport.limits import is_file_limit
+
+__all__ = ["Listener"]
+
+_log = logging.getLogger(__name__)
+
+_ACCEPTS_A_TURN = 50
+_BUSY = (
+    b"HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Type: text/plain\r\n"
+    b"Retry-After: 5\r\nContent-Length: 22\r\n\r\ntoo many connections.\n"
+)
+
+
+class Listener:
+    """Serves doors (protocols over WebSocket) and pages (HTTP) at one port."""
+
+    def __init__(
+        self,
+        doors: Sequence[Door],
+        access: Access,
+        *,
+        limits: Limits | None = None,
+        pages: Mapping[str, HttpHandler] | None = None,
+        tls: ssl.SSLContext | None = None,
+        on_change: Callable[[int], object] = lambda _: None,
+    ) -> None:
+        """``pages``: path -> what answers it. ``on_change`` is called with the number of connections."""
+        self.doors = doors
+        self.limits = limits or Limits()
+        self.connections: set[Connection] = set()
+        self.refused = 0
+        """Connections that were refused because there were too many."""
+        self.host = ""
+        self.port = 0
+        self._access = access
+        self._pages = dict(pages or {})
+        self._tls = tls
+        self._on_change = on_change
+        self._socks: list[socket.socket] = []
+        self._server: asyncio.Server | None = None
+
+    @property
+    def is_encrypted(self) -> bool:
+        """Whether clients use wss and https."""
+        return self._tls is not None
+
+    async def open(self, host: str, port: int) -> None:
+        """Listen; port 0 takes a free one. Raises BridgeError."""
+        loop = asyncio.get_running_loop()
+        try:
+            sock = tcp.bind(host, port)
+        except OSError as error:
+            hint = " (another bridge may be running: give --port)" if error.errno == errno.EADDRINUSE else ""
+            raise BridgeError(f"cannot listen at {host}:{port}: {error.strerror or error}{hint}") from error
+        sock.setblocking(False)
+        sock.listen(128)
+        self.host, self.port = host, sock.getsockname()[1]
+        if self._tls:
+            self._server = await loop.create_server(
+                lambda: TlsPipe(self._connected_tls),
+                sock=sock,
+                ssl=self._tls,
+                ssl_handshake_timeout=self.limits.handshake_seconds,
+            )
+        else:
+            self._socks.append(sock)
+            loop.add_reader(sock, self._accept, sock)
+
+    async def close(self) -> None:
+        """End all connections. Idempotent."""
+        loop = asyncio.get_running_loop()
+        for sock in self._socks:
+            loop.remove_reader(sock)
+            sock.close()
+        self._socks.clear()
+        server, self._server = self._server, None
+        if server:
+            server.close()
+        for connection in list(self.connections):
+            connection.close_websocket(1001, "the bridge is shut down")
+        for _ in range(10):
+            if not self.connections:
+                return
+            await asyncio.sleep(0.02)
+        for connection in list(self.connections):
+            connection.abort()
+
+    # --- Site
+
+    def check(self, credentials: Credentials) -> Grant | Refusal:
+        """Return a request's rights, or why it is refused."""
+        return self._access.check(credentials)
+
+    def page(self, path: str) -> HttpHandler | None:
+        """Return what answers a path."""
+        return self._pages.get(path)
+
+    def left(self, connection: Connection) -> None:
+        """Forget a connection."""
+        self.connections.discard(connection)
+        self._on_change(len(self.connections))
+
+    # --- within
+
+    def _accept(self, listening: socket.socket) -> None:
+        for _ in range(_ACCEPTS_A_TURN):
+            try:
+                sock, address = listening.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                if is_file_limit(error):
+                    _log.error("no connection: %s", error)
+                    self._rest(listening)
+                return
+            sock.setblocking(False)
+            if len(self.connections) >= self.limits.connections:
+                self.refused += 1
+                with contextlib.suppress(OSError):
+                    sock.send(_BUSY)
+                    sock.shutdown(socket.SHUT_WR)
+                sock.close()
+                continue
+            with contextlib.suppress(OSError):
+                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._connected(sock, str(address[0]))
+
+    def _rest(self, listening: socket.socket) -> None:
+        """Accept nothing for a second: the listening socket stays readable, and the loop would spin."""
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(listening)
+
+        def resume() -> None:
+            if listening in self._socks:
+                loop.add_reader(listening, self._accept, listening)
+
+        loop.call_later(1.0, resume)
+
+    def _connected(self, sock: socket.socket, peer: str) -> None:
+        loop = asyncio.get_running_loop()
+        relay = _Relay()
+        pipe = PlainPipe(sock, loop, relay)
+        relay.target = self._add(Connection(self, pipe, peer, loop))
+        pipe.resume()
+
+    def _connected_tls(self, pipe: TlsPipe, peer: str) -> PipeEvents | None:
+        if len(self.connections) >= self.limits.connections:
+            self.refused += 1
+            return None
+        return self._add(Connection(self, pipe, peer, asyncio.get_running_loop()))
+
+    def _add(self, connection: Connection) -> Connection:
+        self.connections.add(connection)
+        self._on_change(len(self.connections))
+        return connection
+
+
+class _Relay:
+    """The events of a pipe, for the connection that is made with the pipe."""
+
+    target: Connection
+
+    def received(self, data: bytes) -> None:
+        self.target.received(data)
+
+    def writable(self) -> None:
+        self.target.writable()
+
+    def ended(self) -> None:
+        self.target.ended()

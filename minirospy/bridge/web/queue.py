@@ -1,0 +1,132 @@
+"""The queue of what is to be sent to one client: bounded, oldest first, and always the newest message of each topic.
+
+Pure. A message waits under a key (its topic or subscription). Where the bound is passed, the key's own oldest message is
+dropped, then the oldest of the key that holds the most bytes; so a camera does not displace what is small. Answers
+(``put_answer``) are never dropped: a client that does not read them is disconnected by the caller.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict, deque
+from collections.abc import Hashable
+from typing import NamedTuple
+
+__all__ = ["DEFAULT_LIMIT", "MOST_ANSWERS", "Piece", "SendQueue"]
+
+DEFAULT_LIMIT = 10_000_000
+"""Bytes of messages that may wait for a client."""
+
+MOST_ANSWERS = 64_000_000
+"""Bytes of answers that may wait for a client which does not read them."""
+
+Piece = bytes | memoryview | bytearray
+
+
+class _Entry(NamedTuple):
+    key: Hashable | None
+    pieces: tuple[Piece, ...]
+    size: int
+
+
+class _Waiting:
+    """The messages that wait under one key."""
+
+    __slots__ = ("numbers", "size")
+
+    def __init__(self) -> None:
+        self.numbers: deque[int] = deque()
+        self.size = 0
+
+
+class SendQueue:
+    """What waits for one client, in the order of arrival."""
+
+    def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
+        """``limit``: bytes of messages; a single message may be larger, and then waits alone."""
+        self.limit = limit
+        self.size = 0
+        """Bytes of the messages that wait."""
+        self.answers = 0
+        """Bytes of the answers that wait."""
+        self.sent = 0
+        """Messages that were popped."""
+        self.sent_bytes = 0
+        self.dropped = 0
+        """How many messages gave way to newer ones."""
+        self.dropped_of: Counter[Hashable] = Counter()
+        """The same by key, of the keys that are in use."""
+        self._number = 0
+        self._entries: OrderedDict[int, _Entry] = OrderedDict()
+        self._waiting: dict[Hashable, _Waiting] = {}
+
+    def __len__(self) -> int:
+        """Return the number of messages and answers that wait."""
+        return len(self._entries)
+
+    @property
+    def is_overrun(self) -> bool:
+        """Whether more answers wait than a client that reads would leave."""
+        return self.answers > MOST_ANSWERS
+
+    def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
+        """Append a message; older ones are dropped where the bound is passed, with ``newest_only`` all of its key."""
+        size = sum(map(len, pieces))
+        waiting = self._waiting.get(key)
+        if waiting is None:
+            waiting = self._waiting[key] = _Waiting()
+
+        while waiting.numbers and (newest_only or self.size + size > self.limit):
+            self._drop_oldest(key)
+        while self.size and self.size + size > self.limit:
+            self._drop_oldest(max(self._waiting, key=lambda each: self._waiting[each].size))
+
+        self._number += 1
+        self._entries[self._number] = _Entry(key, pieces, size)
+        self._waiting.setdefault(key, waiting)
+        waiting.numbers.append(self._number)
+        waiting.size += size
+        self.size += size
+
+    def put_answer(self, pieces: tuple[Piece, ...]) -> None:
+        """Append what is never dropped."""
+        size = sum(map(len, pieces))
+        self._number += 1
+        self._entries[self._number] = _Entry(None, pieces, size)
+        self.answers += size
+
+    def pop(self) -> tuple[Piece, ...] | None:
+        """Return the oldest entry's pieces; None where nothing waits."""
+        if not self._entries:
+            return None
+        _, entry = self._entries.popitem(last=False)
+        if entry.key is None:
+            self.answers -= entry.size
+            return entry.pieces
+        waiting = self._waiting[entry.key]
+        waiting.numbers.popleft()
+        self._shrunk(entry.key, waiting, entry.size)
+        self.sent += 1
+        self.sent_bytes += entry.size
+        return entry.pieces
+
+    def discard(self, key: Hashable) -> None:
+        """Remove the messages of a key, which nobody wants any more; they do not count as dropped."""
+        self.dropped_of.pop(key, None)
+        waiting = self._waiting.pop(key, None)
+        if waiting:
+            for number in waiting.numbers:
+                del self._entries[number]
+            self.size -= waiting.size
+
+    def _drop_oldest(self, key: Hashable) -> None:
+        waiting = self._waiting[key]
+        entry = self._entries.pop(waiting.numbers.popleft())
+        self.dropped += 1
+        self.dropped_of[key] += 1
+        self._shrunk(key, waiting, entry.size)
+
+    def _shrunk(self, key: Hashable, waiting: _Waiting, size: int) -> None:
+        waiting.size -= size
+        self.size -= size
+        if not waiting.numbers:
+            self._waiting.pop(key, None)

@@ -1,0 +1,230 @@
+"""`minirospy bridge`: the graph for browsers, phones and programs without ROS. How to use it: docs/bridge.md."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
+
+if TYPE_CHECKING:
+    from minirospy.bridge.bridge import Bridge, BridgeOptions
+    from minirospy.bridge.tokens import Tokens
+
+__all__ = ["COMMAND", "main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return COMMAND.main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        "minirospy bridge",
+        "Opens the graph to browsers and programs without ROS, by the Foxglove WebSocket protocol: Foxglove, Lichtblick. "
+        "Only programs of this machine may connect, unless --listen is given.",
+    )
+    parser.add_argument(
+        "--port", type=int, default=8765, help="port of the Foxglove protocol (8765); 0 takes a free one"
+    )
+    parser.add_argument(
+        "--listen",
+        action="store_true",
+        help="let other machines connect, with a token; prints their links and a QR code",
+    )
+    parser.add_argument(
+        "--address", default="", help="the address to listen at (127.0.0.1; with --listen 0.0.0.0)"
+    )
+    parser.add_argument(
+        "--token", default="", help="the read-write token (default: one that is kept in ROS_HOME)"
+    )
+    parser.add_argument(
+        "--read-token", default="", help="the read-only token (default: one that is kept in ROS_HOME)"
+    )
+    parser.add_argument("--new-tokens", action="store_true", help="replace the tokens that are kept")
+    parser.add_argument(
+        "--read-only", action="store_true", help="let nobody publish, call services or set parameters"
+    )
+    parser.add_argument(
+        "--origin",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="pages that may connect, as https://*.example.org",
+    )
+    parser.add_argument(
+        "--host-name",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a name by which clients reach this machine",
+    )
+    for kind in ("topics", "services", "params"):
+        parser.add_argument(
+            f"--{kind}",
+            action="append",
+            default=[],
+            metavar="GLOB",
+            help=f"{kind} that clients may use (all)",
+        )
+        parser.add_argument(
+            f"--deny-{kind}",
+            action="append",
+            default=[],
+            metavar="GLOB",
+            help=f"{kind} that they may not use",
+        )
+    parser.add_argument(
+        "--publish", action="append", default=[], metavar="GLOB", help="topics that clients may publish (all)"
+    )
+    parser.add_argument("--cert", default="", metavar="FILE", help="serve wss with this certificate (PEM)")
+    parser.add_argument("--key", default="", metavar="FILE", help="its key (PEM)")
+    parser.add_argument(
+        "--buffer",
+        type=int,
+        default=10_000_000,
+        metavar="BYTES",
+        help="what may wait for a slow client before old messages are dropped (10000000)",
+    )
+    parser.add_argument(
+        "--connections", type=int, default=256, metavar="COUNT", help="how many may be open (256)"
+    )
+    parser.add_argument("--name", default="minirospy_bridge", help="the node's name")
+    parser.add_argument(
+        "--status", action="store_true", help="print what a running bridge serves, and to whom"
+    )
+    parser.add_argument("--json", action="store_true", help="with --status: as JSON")
+    return parser
+
+
+def _bridge(
+    port: int,
+    listen: bool,
+    address: str,
+    token: str,
+    read_token: str,
+    new_tokens: bool,
+    read_only: bool,
+    origin: Sequence[str],
+    host_name: Sequence[str],
+    topics: Sequence[str],
+    deny_topics: Sequence[str],
+    services: Sequence[str],
+    deny_services: Sequence[str],
+    params: Sequence[str],
+    deny_params: Sequence[str],
+    publish: Sequence[str],
+    cert: str,
+    key: str,
+    buffer: int,
+    connections: int,
+    name: str,
+    status: bool,
+    json: bool,
+) -> int:
+    from minirospy.bridge.serve import require_libraries
+
+    _check_range("port", port, 0, 65535)
+    if status:
+        from minirospy.cli.bridge_status import show_status
+
+        return show_status(port, token, as_json=json)
+    if json:
+        raise Misuse("--json is for --status")
+    _check_range("buffer", buffer, 1, 1 << 40)
+    _check_range("connections", connections, 1, 100_000)
+    require_libraries()
+
+    from minirospy.bridge.access import Access, NameFilter, is_loopback
+    from minirospy.bridge.bridge import Bridge, BridgeOptions
+    from minirospy.bridge.foxglove.door import CAPABILITIES
+    from minirospy.bridge.graph import Filters
+    from minirospy.bridge.serve import run
+    from minirospy.bridge.web.connection import Limits
+
+    address = address or ("0.0.0.0" if listen else "127.0.0.1")
+    beyond = not is_loopback(address)
+    if beyond and not listen:
+        raise Misuse(f"--address {address} lets other machines connect: add --listen")
+    tokens = _tokens(token, read_token, beyond=beyond, renews=new_tokens)
+    options = BridgeOptions(
+        address=address,
+        foxglove_port=port,
+        access=Access(
+            hosts=(*host_name, *_own_names()),
+            origins=tuple(origin),
+            read_token=tokens.read,
+            write_token="" if read_only else tokens.write,
+            requires_token=beyond or bool(token or read_token),
+            default_is_read=read_only,
+        ),
+        limits=Limits(queue=buffer, connections=connections),
+        filters=Filters(
+            topics=NameFilter.of(topics, deny_topics),
+            publishable=NameFilter.of(publish, deny_topics),
+            services=NameFilter.of(services, deny_services),
+            parameters=NameFilter.of(params, deny_params),
+        ),
+        capabilities=CAPABILITIES,
+        certificate=cert,
+        key=key,
+    )
+    return run(
+        name, (), lambda node: Bridge(node, options), lambda bridge: _announce(bridge, options, tokens)
+    )
+
+
+def _check_range(name: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise Misuse(f"--{name} {value} is not between {low} and {high}")
+
+
+def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
+    from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.environment import Environment
+
+    if write or read:
+        return Tokens(write, read)
+    if beyond or renews:
+        return kept_tokens(Environment.read().home, renews=renews)
+    return Tokens("", "")
+
+
+def _own_names() -> list[str]:
+    import socket
+
+    name = socket.gethostname()
+    return [name, f"{name.partition('.')[0]}.local"]
+
+
+def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
+    from minirospy.bridge.access import is_loopback
+    from minirospy.bridge.addresses import links, own_addresses, qr_code
+
+    listener = bridge.listeners["foxglove"]
+    is_any = options.address in ("0.0.0.0", "::")
+    addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
+    found = links(addresses, listener.port, encrypted=listener.is_encrypted)
+    print(f"Foxglove protocol at {found.websocket[0]}", flush=True)
+    if not options.access.requires_token:
+        print(f"open in Foxglove:   {found.foxglove}")
+        print(f"open in Lichtblick: {found.lichtblick}", flush=True)
+        return
+
+    reached = own_addresses() if is_any else addresses
+    remote = links(reached or addresses, listener.port, encrypted=listener.is_encrypted)
+    for rights, token in (("read-only", tokens.read), ("read-write", options.access.write_token)):
+        if token:
+            print(f"{rights}: give the front end this address (it has the token in it)")
+            for address in remote.websocket:
+                print(f"  {address}/?token={token}")
+    shown = tokens.read or options.access.write_token
+    if sys.stdout.isatty():
+        print(qr_code(f"{remote.websocket[0]}/?token={shown}"), end="")
+    sys.stdout.flush()
+
+
+COMMAND = Command("minirospy bridge", _parser, _bridge)
