@@ -48,9 +48,11 @@ class Scene:
         """Method and arguments of each call."""
         return [(call.method, call.args) for call in (parse_call(body) for _, body in self.bodies)]
 
-    def begin(self, uri: str, body: bytes, timeout: float, done: Callable[[bytes | RpcError], None]) -> None:
+    def begin(
+        self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[bytes | RpcError], None]
+    ) -> None:
         assert uri not in self.under_way, "a node is called once at a time"
-        self.bodies.append((uri, body))
+        self.bodies.append((uri, body if isinstance(body, bytes) else b"".join(body)))
         self.under_way[uri] = done
 
     def notify(self, uris: list[str], topic: str) -> None:
@@ -198,5 +200,82 @@ def test_nothing_is_sent_after_close(monkeypatch: pytest.MonkeyPatch) -> None:
         await scene.notifier.close()
         await clock.advance(1.0)
         assert not scene.bodies
+
+    run_manually(scene)
+
+
+def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A list of 1,000 is followed by a pause of 50 ms; other topics of the node are not delayed."""
+
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        (uri,) = ALIVE[:1]
+        lists = {"/many": ["http://x:1/"] * 1000, "/few": ["http://x:1/"]}
+        monkeypatch.setattr(scene, "publisher_uris", lambda topic: list(lists[topic]))
+        scene.notify([uri], "/many")
+        await scene.answer(clock, [uri], is_dead=False)
+
+        for _ in range(5):
+            scene.notify([uri], "/many")
+        scene.notify([uri], "/few")
+        await scene.answer(clock, [uri], is_dead=False)
+        await clock.advance(0.03)
+        assert [args[1] for _, args in scene.calls] == ["/many", "/few"]
+
+        await clock.advance(0.02)
+        await scene.answer(clock, [uri], is_dead=False)
+        assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
+        # A node whose pause is over takes neither memory nor time.
+        await clock.advance(0.06)
+        assert not scene.notifier._nodes
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_an_update_that_waited_lists_later_publishers_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        one, other = ALIVE[:2]
+        scene.publishers = ["http://x:1/"] * 300
+        scene.notify([one], "/many")
+        await scene.answer(clock, [one], is_dead=False)
+
+        # This one pauses for 15 ms, while a publisher registers.
+        scene.notify([one, other], "/many")
+        await scene.answer(clock, [other], is_dead=False)
+        scene.publishers.append("http://x:2/")
+        await scene.answer(clock, [one], is_dead=False)
+        lists = [args[2] for _, args in scene.calls]
+        assert [len(each) for each in lists if isinstance(each, list)] == [300, 300, 301]
+        await scene.notifier.close()
+
+    run_manually(scene)
+
+
+def test_a_node_on_the_loop_is_notified_without_a_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        scene = Scene(monkeypatch)
+        (uri,) = ALIVE[:1]
+        received: list[tuple[str, int]] = []
+        monkeypatch.setattr(
+            scene, "publisher_uris", lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1)
+        )
+        scene.notifier.here[uri] = lambda topic, uris: received.append((topic, len(uris)))
+        for topic in ("/many", "/few", "/few", "/many"):
+            scene.notify([uri], topic)
+        await clock.advance(0.0)
+        assert received == [("/many", 1000), ("/few", 1)]
+
+        scene.notify([uri], "/many")
+        await clock.advance(0.04)
+        assert len(received) == 2
+        await clock.advance(0.02)
+        assert received[2:] == [("/many", 1000)]
+        await clock.advance(0.06)
+        assert not scene.notifier._nodes
+        assert not scene.under_way
+        assert not scene.notifier._line.under_way
+        await scene.notifier.close()
 
     run_manually(scene)

@@ -166,68 +166,6 @@ def test_a_bad_uri_is_reported_immediately() -> None:
     run(test)
 
 
-def test_updates_of_many_publishers_are_rate_limited() -> None:
-    async def test() -> None:
-        received: list[tuple[float, str, int]] = []
-        loop = asyncio.get_running_loop()
-
-        def serve(method: str, args: Any) -> list[Any]:
-            received.append((loop.time(), args[1], len(args[2])))
-            return [1, "", 0]
-
-        server = RpcServer(serve)
-        await server.start()
-        uri = f"http://127.0.0.1:{server.port}/"
-        lists = {"/many": ["http://x:1/"] * 1000, "/few": ["http://x:1/"]}
-        notifier = Notifier(Publishers(lambda topic: lists[topic]), Turns(), 5.0)
-        notifier.send(PublisherUpdate(uri, "/many"))
-        await until(lambda: len(received) == 1)
-        for _ in range(5):
-            notifier.send(PublisherUpdate(uri, "/many"))
-        notifier.send(PublisherUpdate(uri, "/few"))
-        await until(lambda: len(received) == 3)
-        assert [(topic, count) for _, topic, count in received] == [
-            ("/many", 1000),
-            ("/few", 1),
-            ("/many", 1000),
-        ]
-        assert received[2][0] - received[0][0] > 0.05
-        # It rests: a node whose pause is over takes neither memory nor time.
-        await until(lambda: not notifier._nodes)
-        await notifier.close()
-        await server.close()
-
-    run(test)
-
-
-def test_an_update_that_waited_lists_later_publishers_too() -> None:
-    async def test() -> None:
-        received: list[int] = []
-
-        def serve(_: str, args: Any) -> list[Any]:
-            received.append(len(args[2]))
-            return [1, "", 0]
-
-        server = RpcServer(serve)
-        await server.start()
-        uri = f"http://127.0.0.1:{server.port}/"
-        publishers = ["http://x:1/"] * 300
-        notifier = Notifier(Publishers(lambda _: list(publishers)), Turns(), 5.0)
-        notifier.send(PublisherUpdate(uri, "/many"))
-        await until(lambda: received)
-        # This one pauses, while a publisher comes at a time when nobody subscribes.
-        notifier.send(PublisherUpdate(uri, "/many"))
-        notifier.send(PublisherUpdate(f"http://127.0.0.1:{server.port}/other", "/many"))
-        await until(lambda: len(received) == 2)
-        publishers.append("http://x:2/")
-        await until(lambda: len(received) == 3)
-        assert received == [300, 300, 301]
-        await notifier.close()
-        await server.close()
-
-    run(test)
-
-
 def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -295,35 +233,5 @@ def test_unrequested_bytes_of_a_server_are_not_an_answer() -> None:
         await client.close()
         await until(lambda: ended == 3)
         server.close()
-
-    run(test)
-
-
-def test_a_node_on_the_loop_is_notified_without_a_call() -> None:
-    async def test() -> None:
-        received: list[tuple[float, str, int]] = []
-        loop = asyncio.get_running_loop()
-        notifier = Notifier(
-            Publishers(lambda topic: ["http://x:1/"] * (1000 if topic == "/many" else 1)), Turns(), 5.0
-        )
-        # Nobody listens there.
-        notifier.here["http://127.0.0.1:9/"] = lambda topic, uris: received.append(
-            (loop.time(), topic, len(uris))
-        )
-        for topic in ("/many", "/few", "/few", "/many"):
-            notifier.send(PublisherUpdate("http://127.0.0.1:9/", topic))
-        await until(lambda: len(received) == 2)
-        notifier.send(PublisherUpdate("http://127.0.0.1:9/", "/many"))
-        await until(lambda: not notifier._nodes)
-
-        assert [(topic, count) for _, topic, count in received] == [
-            ("/many", 1000),
-            ("/few", 1),
-            ("/many", 1000),
-        ]
-        assert received[2][0] - received[0][0] > 0.05
-        assert not notifier._line.under_way
-
-        await notifier.close()
 
     run(test)
