@@ -46,7 +46,7 @@ def test_contributing_names_files_that_exist() -> None:
 
 
 def test_named_functions_exist() -> None:
-    """`_hz` in `cli/ros/rostopic.py`, `Node.close` in `runtime/node/node.py`."""
+    """`_hz` in `cli/ros/rostopic_rates.py`, `Node.close` in `runtime/node/node.py`."""
     named = re.findall(r"`([\w.]+)` in `([\w/]+/\w+\.py)`", TEXT)
     assert len(named) >= 5
     for name, path in named:

@@ -11,7 +11,7 @@ import argparse
 import itertools
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.errors import UsageError, did_you_mean
@@ -26,6 +26,7 @@ __all__ = [
     "Parser",
     "attach_completer",
     "completer_of",
+    "integer",
     "split_assignments",
 ]
 
@@ -269,6 +270,18 @@ def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     assigned = [word for word in words if ":=" in word]
     values = dict(word.split(":=", 1) for word in assigned if not word.startswith("__"))
     return [word for word in words if ":=" not in word], values
+
+
+def integer(name: str) -> Callable[[str], int]:
+    """Return a parser of integers; ``name`` is the value's name in ROS's error."""
+
+    def read(text: str) -> int:
+        try:
+            return int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{name} must be an integer") from None
+
+    return read
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:

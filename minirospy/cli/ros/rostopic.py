@@ -1,34 +1,31 @@
-"""rostopic: which topics there are, what goes over them; publishing by hand.
+"""rostopic: which topics there are, and the messages that go over them.
 
+What measures is in `rostopic_rates.py`, what publishes in `rostopic_pub.py`.
 Source: http://wiki.ros.org/rostopic. What is printed is what ROS prints.
 """
 
 from __future__ import annotations
 
-import re
 import sys
 from functools import partial
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from minirospy.cli.command import RosText, WordedError, tool_node, warn_unpublished
-from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.parser import Misuse, Parser, integer
+from minirospy.cli.ros import rostopic_pub, rostopic_rates
 from minirospy.cli.verbs import Family, HelpStatus, Verb
 from minirospy.errors import NotFoundError
-from minirospy.idl.protocols import is_stamped
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from minirospy.introspect.streams import Received, ToolNode
     from minirospy.names import Arguments
 
 __all__ = ["FAMILY", "main"]
 
 _CLEAR_SCREEN = "\033[2J\033[;H"
-_SHIELD = "\0"
-_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -207,7 +204,7 @@ def _echo_parser() -> Parser:
     add(
         "-w",
         dest="width",
-        type=_integer("NUM_WIDTH"),
+        type=integer("NUM_WIDTH"),
         metavar="NUM_WIDTH",
         help="fixed width for numeric values",
     )
@@ -223,7 +220,7 @@ def _echo_parser() -> Parser:
     add("--noarr", action="store_true", help="exclude arrays")
     add("-c", "--clear", action="store_true", help="clear screen before printing next message")
     add("-a", "--all", action="store_true", help="display all message in bag, only valid with -b option")
-    add("-n", dest="count", type=_integer("COUNT"), metavar="COUNT", help="number of messages to echo")
+    add("-n", dest="count", type=integer("COUNT"), metavar="COUNT", help="number of messages to echo")
     add("--offset", action="store_true", help="display time as offsets from current time (in seconds)")
     return parser
 
@@ -299,300 +296,11 @@ def _echo(
                 return
 
 
-def _hz_parser() -> Parser:
-    parser = Parser(
-        "rostopic hz",
-        "Print the rate of messages once a second.",
-        "rostopic hz [options] /topic_0 [/topic_1 [topic_2 [..]]]",
-        missing="topic must be specified",
-    )
-
-    _add_topics(parser)
-    _add_window(parser, default=0)
-    parser.add_argument(
-        "--filter",
-        metavar="EXPR",
-        help="only measure messages matching the specified Python expression",
-        completer="nothing",
-    )
-    parser.add_argument(
-        "--wall-time",
-        action="store_true",
-        help="calculates rate using wall time which can be helpful when clock isn't published during simulation",
-    )
-
-    _add_tcp_nodelay(parser)
-    return parser
-
-
-def _hz(
-    topics: Sequence[str],
-    window: int,
-    filter: str | None,
-    wall_time: bool,
-    tcpnodelay: bool,
-    arguments: Arguments | None = None,
-) -> None:
-    from minirospy.introspect.echo import Filter
-    from minirospy.introspect.rates import RateWindow, rate_text
-
-    keep = Filter(filter) if filter else None
-    windows: dict[str, RateWindow] = {}
-    with tool_node("rostopic", arguments, ros_time=not wall_time) as node:
-        for name in _published_topics(topics, arguments):
-            measured = windows[name] = RateWindow(window)
-
-            def count(received: Received, topic: str = name, measured: RateWindow = measured) -> None:
-                if keep is None or keep(node.classes.read(received), topic):
-                    measured.add(received.time)
-
-            _measure(node, name, count, tcpnodelay)
-        while not node.wait(1.0):
-            print(rate_text({name: each.report() for name, each in windows.items()}), flush=True)
-
-
-def _bw_parser() -> Parser:
-    parser = Parser(
-        "rostopic bw",
-        "Print the bandwidth that topics use once a second.",
-        "rostopic bw /topic",
-        missing="topic must be specified",
-    )
-    _add_topics(parser)
-    _add_window(parser, default=100)
-    return parser
-
-
-def _bw(topics: Sequence[str], window: int, arguments: Arguments | None = None) -> None:
-    import time
-
-    from minirospy.introspect.rates import BandwidthWindow, bandwidth_text
-
-    windows: dict[str, BandwidthWindow] = {}
-    with tool_node("rostopic", arguments) as node:
-        for name in _published_topics(topics, arguments):
-            measured = windows[name] = BandwidthWindow(window)
-
-            def add(received: Received, measured: BandwidthWindow = measured) -> None:
-                measured.add(received.time, len(received.body))
-
-            _measure(node, name, add)
-        while not node.wait(1.0):
-            now = time.time()
-            text = bandwidth_text({name: each.report(now) for name, each in windows.items()})
-            if text:
-                print(text, flush=True)
-
-
-def _delay_parser() -> Parser:
-    parser = Parser(
-        "rostopic delay",
-        "Print the delay of messages, from the stamps in their headers to their arrival.",
-        "rostopic delay [options] /topic",
-        ros_argparse="rostopic",
-    )
-    # As ROS spells it.
-    parser.add_argument("topic", help="topic name to be calcurated the delay", completer="topics")
-    parser.add_argument(
-        "-w",
-        "--window",
-        type=int,
-        default=0,
-        metavar="WINDOW_SIZE",
-        help="window size, in # of messages, for calculating rate",
-    )
-    _add_tcp_nodelay(parser)
-    return parser
-
-
-def _delay(topic: str, window: int, tcpnodelay: bool, arguments: Arguments | None = None) -> None:
-    from minirospy.introspect.rates import DelayWindow, delay_text
-
-    measured = DelayWindow(window)
-    with tool_node("rostopic", arguments, ros_time=True) as node:
-        (name,) = _published_topics([topic], arguments)
-        unstamped: list[str] = []
-
-        def add(received: Received) -> None:
-            message = node.classes.read(received)
-            if is_stamped(message):
-                measured.add(received.time, message.header.stamp.to_sec())
-            else:
-                unstamped.append(message._type)
-                node.stop()
-
-        _measure(node, name, add, tcpnodelay)
-        while not node.wait(1.0):
-            print(delay_text(measured.report()), flush=True)
-        if unstamped:
-            raise NotFoundError(
-                "header", name, hint=f"messages of [{unstamped[0]}] have no stamp to measure by"
-            )
-
-
-def _measure(
-    node: ToolNode, topic: str, add: Callable[[Received], object], tcp_nodelay: bool = False
-) -> None:
-    node.measure(topic, add, tcp_nodelay=tcp_nodelay)
-    print(f"subscribed to [{topic}]", flush=True)
-
-
-def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, also where a field of one is named; warn of one that nobody publishes yet."""
-    found = []
-    with Graph.open("rostopic", arguments=arguments) as graph:
-        for name in map(graph.resolve, names):
-            field = topics.find_topic(graph, name)
-            found.append(field.topic if field else name)
-            if not field:
-                warn_unpublished(graph, name)
-    return list(dict.fromkeys(found))
-
-
-# --- publishing
-
-
-class _PubParser(Parser):
-    """Accepts negative numbers as values beside an option that is called `-1`."""
-
-    def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, with the negative numbers among the values."""
-        options = super().parse(
-            [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
-        )
-        options["args"] = [word.removeprefix(_SHIELD) for word in cast("list[str]", options["args"])]
-        return options
-
-
-def _pub_parser() -> Parser:
-    parser = _PubParser(
-        "rostopic pub",
-        "Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
-        "rostopic pub /topic type [args...]",
-        missing={"topic": "/topic must be specified", "type": "topic type must be specified"},
-        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
-        "Without arguments, messages are read from standard input, with --- between them.",
-    )
-
-    add = parser.add_argument
-    add("topic", help="the topic's name", completer="topics")
-    add("type", help="the message type, as std_msgs/Bool", completer="topic_type")
-    add(
-        "args",
-        nargs="*",
-        default=[],
-        help="the message's values; `now` is the time, header: auto is stamped",
-        completer="message_text",
-    )
-
-    add("-v", dest="verbose", action="store_true", help="print verbose output")
-    add(
-        "-r",
-        "--rate",
-        type=_positive,
-        metavar="RATE",
-        help="publishing rate (hz).  For -f and stdin input, this defaults to 10.  Otherwise it is not set.",
-    )
-    add("-1", "--once", action="store_true", help="publish one message and exit")
-    add("-f", "--file", metavar="FILE", help="read args from YAML file (Bagy)", completer="files")
-    add(
-        "-l",
-        "--latch",
-        action="store_true",
-        help="enable latching for -f, -r and piped input.  This latches the first message.",
-    )
-    add(
-        "-s",
-        "--substitute-keywords",
-        action="store_true",
-        help="When publishing with a rate, performs keyword ('now' or 'auto') substitution for each message",
-    )
-    add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
-
-    # Before Noetic, -s was called so.
-    parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
-    return parser
-
-
-def _pub(
-    topic: str,
-    type: str,
-    args: Sequence[str],
-    verbose: bool,
-    rate: float | None,
-    once: bool,
-    file: str | None,
-    latch: bool,
-    substitute_keywords: bool,
-    use_rostime: bool,
-    arguments: Arguments | None = None,
-) -> None:
-    if once and rate is not None:
-        raise Misuse("-1 and -r exclude each other", "You cannot select both -r and -1 (--once)")
-    if file is not None and args:
-        raise Misuse("-f and values on the command line exclude each other", "args conflict with -f setting")
-
-    from minirospy.cli.ros.rostopic_pub import Publishing, publish
-
-    publish(
-        Publishing(topic, type, args, verbose, rate, once, file, latch, substitute_keywords, use_rostime),
-        arguments,
-    )
-
-
-def _positive(text: str) -> float:
-    import argparse
-
-    try:
-        rate = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError("rate must be a number") from None
-    if not 0.0 < rate < 1e6:
-        raise argparse.ArgumentTypeError("rate must be greater than zero")
-    return rate
-
-
 # --- arguments that several verbs take
 
 
 def _add_topic(parser: Parser) -> None:
     parser.add_argument("topic", help="the topic's name", completer="topics")
-
-
-def _add_topics(parser: Parser) -> None:
-    parser.add_argument("topics", nargs="+", metavar="topic", help="names of topics", completer="topics")
-
-
-def _add_window(parser: Parser, default: int) -> None:
-    parser.add_argument(
-        "-w",
-        "--window",
-        type=_integer("window size"),
-        default=default,
-        help="window size, in # of messages, for calculating rate",
-    )
-
-
-def _integer(name: str) -> Callable[[str], int]:
-    """Return a parser of integers; ``name`` is the value's name in ROS's error."""
-
-    def read(text: str) -> int:
-        import argparse
-
-        try:
-            return int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{name} must be an integer") from None
-
-    return read
-
-
-def _add_tcp_nodelay(parser: Parser) -> None:
-    parser.add_argument(
-        "--tcpnodelay",
-        action="store_true",
-        help="use the TCP_NODELAY transport hint when subscribing to topics",
-    )
 
 
 def _add_bag(parser: Parser, help: str) -> None:
@@ -603,11 +311,11 @@ FAMILY = Family(
     "rostopic",
     "rostopic is a command-line tool for printing information about ROS Topics.",
     (
-        Verb("bw", "display bandwidth used by topic", _bw_parser, _bw),
-        Verb("delay", "display delay of topic from timestamp in header", _delay_parser, _delay),
+        rostopic_rates.BW,
+        rostopic_rates.DELAY,
         Verb("echo", "print messages to screen", _echo_parser, _echo),
         Verb("find", "find topics by type", _find_parser, _find),
-        Verb("hz", "display publishing rate of topic    ", _hz_parser, _hz),
+        rostopic_rates.HZ,
         Verb(
             "info",
             "print information about active topic",
@@ -616,7 +324,7 @@ FAMILY = Family(
             {"topic": RosText("ERROR: Unknown topic {name}")},
         ),
         Verb("list", "list active topics", _list_parser, _list),
-        Verb("pub", "publish data to topic", _pub_parser, _pub),
+        rostopic_pub.VERB,
         Verb("type", "print topic or field type", _type_parser, _type),
     ),
     "Type rostopic <command> -h for more detailed usage, e.g. 'rostopic echo -h'",

@@ -5,17 +5,16 @@ Source: http://wiki.ros.org/rostopic#rostopic_pub. What is printed is what ROS p
 
 from __future__ import annotations
 
+import argparse
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+import re
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from minirospy.cli.command import RosText, WordedError, tool_node, warn
-from minirospy.cli.parser import Misuse
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Verb
 from minirospy.errors import MessageException, NotFoundError, SerializationError, UsageError, ValueTextError
-from minirospy.idl.load import message_class
-from minirospy.idl.message import get_printable_message_args
-from minirospy.introspect.echo import fill_message
 from minirospy.introspect.graph import Graph, why_illegal
-from minirospy.introspect.publishing import publish_all, values_to_publish
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -24,7 +23,10 @@ if TYPE_CHECKING:
     from minirospy.introspect.streams import ToolNode, TopicPublisher
     from minirospy.names import Arguments
 
-__all__ = ["Publishing", "publish"]
+__all__ = ["VERB"]
+
+_SHIELD = "\0"
+_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 
 _LATCH_SECONDS = 3.0
 _FILE_RATE = 10.0
@@ -33,7 +35,103 @@ _REGISTERED_CONNECT_SECONDS = 2.0
 _CLOCK_SECONDS = 1.0
 
 
-class Publishing(NamedTuple):
+class _PubParser(Parser):
+    """Accepts negative numbers as values beside an option that is called `-1`."""
+
+    def parse(self, words: Sequence[str]) -> dict[str, object]:
+        """Return the arguments by name, with the negative numbers among the values."""
+        options = super().parse(
+            [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
+        )
+        options["args"] = [word.removeprefix(_SHIELD) for word in cast("list[str]", options["args"])]
+        return options
+
+
+def _pub_parser() -> Parser:
+    parser = _PubParser(
+        "rostopic pub",
+        "Publish to a topic: one message that stays (latched) until Ctrl-C, or by options.",
+        "rostopic pub /topic type [args...]",
+        missing={"topic": "/topic must be specified", "type": "topic type must be specified"},
+        epilog='Arguments are YAML: one dictionary ("data: True"), or a value for each field in order. '
+        "Without arguments, messages are read from standard input, with --- between them.",
+    )
+
+    add = parser.add_argument
+    add("topic", help="the topic's name", completer="topics")
+    add("type", help="the message type, as std_msgs/Bool", completer="topic_type")
+    add(
+        "args",
+        nargs="*",
+        default=[],
+        help="the message's values; `now` is the time, header: auto is stamped",
+        completer="message_text",
+    )
+
+    add("-v", dest="verbose", action="store_true", help="print verbose output")
+    add(
+        "-r",
+        "--rate",
+        type=_positive,
+        metavar="RATE",
+        help="publishing rate (hz).  For -f and stdin input, this defaults to 10.  Otherwise it is not set.",
+    )
+    add("-1", "--once", action="store_true", help="publish one message and exit")
+    add("-f", "--file", metavar="FILE", help="read args from YAML file (Bagy)", completer="files")
+    add(
+        "-l",
+        "--latch",
+        action="store_true",
+        help="enable latching for -f, -r and piped input.  This latches the first message.",
+    )
+    add(
+        "-s",
+        "--substitute-keywords",
+        action="store_true",
+        help="When publishing with a rate, performs keyword ('now' or 'auto') substitution for each message",
+    )
+    add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
+
+    # Before Noetic, -s was called so.
+    parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
+    return parser
+
+
+def _pub(
+    topic: str,
+    type: str,
+    args: Sequence[str],
+    verbose: bool,
+    rate: float | None,
+    once: bool,
+    file: str | None,
+    latch: bool,
+    substitute_keywords: bool,
+    use_rostime: bool,
+    arguments: Arguments | None = None,
+) -> None:
+    if once and rate is not None:
+        raise Misuse("-1 and -r exclude each other", "You cannot select both -r and -1 (--once)")
+    if file is not None and args:
+        raise Misuse("-f and values on the command line exclude each other", "args conflict with -f setting")
+
+    _publish(
+        _Publishing(topic, type, args, verbose, rate, once, file, latch, substitute_keywords, use_rostime),
+        arguments,
+    )
+
+
+def _positive(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError("rate must be a number") from None
+    if not 0.0 < rate < 1e6:
+        raise argparse.ArgumentTypeError("rate must be greater than zero")
+    return rate
+
+
+class _Publishing(NamedTuple):
     """The arguments of `rostopic pub`."""
 
     topic: str
@@ -48,8 +146,12 @@ class Publishing(NamedTuple):
     use_rostime: bool
 
 
-def publish(options: Publishing, arguments: Arguments | None) -> None:
+def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     """Publish, with the remapping arguments that were among the words of the command line."""
+    # Imported here: the other verbs need no message classes.
+    from minirospy.introspect.echo import fill_message
+    from minirospy.introspect.publishing import publish_all, values_to_publish
+
     cls = _message_class(options.type)
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
@@ -95,6 +197,8 @@ def publish(options: Publishing, arguments: Arguments | None) -> None:
 
 
 def _message_class(type_: str) -> type[Message]:
+    from minirospy.idl.load import message_class
+
     try:
         return message_class(type_)
     except NotFoundError as error:
@@ -103,7 +207,7 @@ def _message_class(type_: str) -> type[Message]:
         raise WordedError(error, RosText(f"ERROR: invalid message type: {type_}.\n{hint}")) from error
 
 
-def _first_values(all_values: Iterator[list[object]], options: Publishing) -> list[object]:
+def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> list[object]:
     """Return the values of the first message. Raises WordedError, and Misuse where an argument is not YAML."""
     try:
         return next(all_values)
@@ -127,6 +231,9 @@ def _ros_argument_error(text: str) -> str:
 
 
 def _filled(cls: type[Message], values: list[object]) -> Message:
+    from minirospy.idl.message import get_printable_message_args
+    from minirospy.introspect.echo import fill_message
+
     try:
         return fill_message(cls, values)
     except MessageException as error:
@@ -142,7 +249,7 @@ def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
         warn(f"topic [{topic}] is of type [{other}] already, not [{type_}]")
 
 
-def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options: Publishing) -> None:
+def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options: _Publishing) -> None:
     how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
     print(f"publishing and latching {shown}{how_long}", flush=True)
@@ -150,3 +257,6 @@ def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options:
     while not node.wait(_LATCH_SECONDS):
         if options.once:
             return
+
+
+VERB = Verb("pub", "publish data to topic", _pub_parser, _pub)
