@@ -10,12 +10,12 @@ import asyncio
 import contextlib
 import logging
 import socket
-from collections import deque
 from collections.abc import Awaitable, Generator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
 from minirospy.errors import RpcFault, RpcProtocolError
+from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
 from minirospy.steps import ALONE, Steps, is_small
 from minirospy.wire.http import (
     MAX_BODY,
@@ -50,9 +50,6 @@ _ALONE_BODY = 1024 * 1024
 
 _PROGRESS = 65536
 """Bytes that have moved restart the time limit: a poor radio may need long for a large value."""
-
-_MOST_UNREAD = 256 * 1024
-"""Bytes of answers that wait for a client to read them, before it gets no more."""
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
@@ -96,7 +93,6 @@ class Connection:
         "_sock",
         "_state",
         "_task",
-        "_unread",
         "_waiting",
         "_work",
         "_work_bytes",
@@ -110,9 +106,7 @@ class Connection:
         self._reader = HttpReader()
         self._state: State = _OPEN
 
-        self._out: deque[memoryview] = deque()
-        # Bytes in there.
-        self._unread = 0
+        self._out = Outbox(sock)
         self._waiting: list[HttpMessage] = []
         self._has_deadline = False
         # Bytes since the time limit was set.
@@ -155,8 +149,7 @@ class Connection:
         self._sock.close()
         self._server.connections.pop(self, None)
         self._drop_request()
-        self._out.clear()
-        self._count_unread(-self._unread)
+        self._count_unread(-self._out.clear())
         self._server.deadlines.drop(self)
 
     def received(self, data: bytes) -> None:
@@ -448,29 +441,20 @@ class Connection:
         """Send what the socket takes, and keep the rest."""
         if self._state is _ENDED:
             return
-        sent = 0
+        was_empty = not self._out
+        try:
+            kept = self._out.write(pieces)
+        except OSError:
+            self.end()
+            return
+        if not kept:
+            return
 
-        if not self._out:
-            try:
-                sent = self._sock.send(pieces[0])
-            except (BlockingIOError, InterruptedError):
-                pass
-            except OSError:
-                self.end()
-                return
-            if len(pieces) == 1 and sent == len(pieces[0]):
-                return
+        if was_empty:
             self._loop.add_writer(self._fd, self._writable)
-
-        left = sent
-        for piece in pieces:
-            if left < len(piece):
-                self._out.append(memoryview(piece)[left:])
-            left = max(0, left - len(piece))
-
-        self._count_unread(sum(map(len, pieces)) - sent)
+        self._count_unread(kept)
         self._set_deadline()
-        if self._state is _OPEN and self._unread > _MOST_UNREAD:
+        if self._state is _OPEN and self._out.size > MOST_UNREAD:
             # The client does not read its answers: it gets no more of them, and is not read from.
             self._state = _FULL
             self._stop_reading()
@@ -478,9 +462,8 @@ class Connection:
 
     def _count_unread(self, more: int) -> None:
         """Count bytes that were added to the answers that wait, or taken from them."""
-        self._unread += more
         self._server.unread += more
-        if not self._unread:
+        if not self._out:
             self._server.slow.pop(self, None)
         elif more < 0:
             self._server.slow.move_to_end(self)
@@ -488,20 +471,8 @@ class Connection:
             self._server.slow.setdefault(self, None)
 
     def _writable(self) -> None:
-        sent = 0
         try:
-            while self._out and sent < _MOST_UNREAD:
-                piece = self._out[0][:_MOST_UNREAD]
-                count = self._sock.send(piece)
-                sent += count
-                if count < len(self._out[0]):
-                    self._out[0] = self._out[0][count:]
-                else:
-                    self._out.popleft()
-                if count < len(piece):
-                    break
-        except (BlockingIOError, InterruptedError):
-            pass
+            sent = self._out.flush()
         except OSError:
             self.end()
             return
