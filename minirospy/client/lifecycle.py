@@ -52,6 +52,8 @@ class Lifecycle:
 
         self.hooks: list[Callable[[], object]] = []
         """Called while is_shutdown() is false."""
+        self.late_hooks: list[Callable[[], object]] = []
+        """Called after those, also after the ones that a hook has added."""
         self.interrupts: list[Callable[[], object]] = []
         """Called once is_shutdown() is true, before the node leaves the graph: they end what blocks."""
 
@@ -87,6 +89,7 @@ class Lifecycle:
             self.machine.phase = Phase.HOOKS
             try:
                 self._run(self.hooks)
+                self._run(self.late_hooks)
             finally:
                 with self._lock:
                     # A hook that is added from now on is called immediately.

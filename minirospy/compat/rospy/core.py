@@ -58,9 +58,8 @@ def is_shutdown_requested() -> bool:
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
     """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raises TypeError."""
-    add, hook = current_session().lifecycle.add_hook, _given_reason(h)
-    # A hook that a hook adds runs after the others.
-    add(lambda: add(hook))
+    lifecycle = current_session().lifecycle
+    lifecycle.add_hook(_given_reason(h), lifecycle.late_hooks)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
