@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 
 from minirospy import names
-from minirospy.client import log
+from minirospy.client import log_setup
 from minirospy.client.exit_messages import suppress_tracebacks
 from minirospy.client.identity import private_parameters
 from minirospy.client.session import Session, current_session, replace_session_in_fork
@@ -64,7 +64,7 @@ def init_node(
     if session.is_shutdown():
         raise session.lifecycle.interrupted("rospy shutdown")
 
-    log.configure(session, log_level, session.identity.arguments.special.get("__log"))
+    log_setup.configure(session, log_level, session.identity.arguments.special.get("__log"))
     session.open_node(xmlrpc_port, tcpros_port)
     _wait_for_master(session)
     _set_parameters(session, parameters)
@@ -72,7 +72,7 @@ def init_node(
         start_clock()
     session.has_time = True
     session.publish_node()
-    log.start(session, rosout=not disable_rosout)
+    log_setup.start(session, rosout=not disable_rosout)
 
 
 def start_clock() -> None:

@@ -1,6 +1,6 @@
 """rosgraph.roslogging, provided by minirospy: the handler that logging configuration files name and programs derive from."""
 
-from minirospy.client.log import RosStreamHandler
+from minirospy.client.log_handlers import RosStreamHandler
 from minirospy.compat.rosgraph.roslogging import LoggingException, RospyLogger, configure_logging
 from minirospy.compat.rosgraph.roslogging import _color_reset as _color_reset
 from minirospy.compat.rosgraph.roslogging import _defaultFormatter as _defaultFormatter

@@ -1,0 +1,169 @@
+"""Where log lines go: the handlers for the terminal and for /rosout.
+
+Source: http://wiki.ros.org/rospy/Overview/Logging.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+from minirospy.client.session import current_session
+from minirospy.clock import SimulatedClock
+from minirospy.log_levels import SEVERITIES, ros_level
+
+__all__ = ["DeferringHandler", "RosOutHandler", "RosStreamHandler"]
+
+_COLOUR = {
+    logging.DEBUG: "\033[32m",
+    logging.WARNING: "\033[33m",
+    logging.ERROR: "\033[31m",
+    logging.CRITICAL: "\033[31m",
+}
+_DEFAULT_FORMAT = "[${severity}] [${time}]: ${message}"
+_FIELD = re.compile(r"\$\{(\w+)(?::([^}]*))?\}")
+_text = logging.Formatter()
+
+
+class DeferringHandler(logging.Handler):
+    """Files and streams are not reentrant: a signal waits until a record is written."""
+
+    def handle(self, record: logging.LogRecord) -> bool:
+        """Write one record."""
+        with current_session().lifecycle.deferral:
+            return super().handle(record)
+
+
+class RosStreamHandler(DeferringHandler):
+    """Lines as rospy prints them: debug and info to stdout, the rest to stderr, coloured on a terminal.
+
+    ROSCONSOLE_FORMAT chooses the form (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
+    """
+
+    def __init__(
+        self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
+    ) -> None:
+        """``stdout``, ``stderr``: where to write; None: what ``sys`` has while a line is written."""
+        super().__init__()
+        self._colorize = colorize
+        self._stdout = stdout
+        self._stderr = stderr
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line. A message that does not take its arguments raises TypeError, as rospy's does."""
+        line = _line(record)
+        is_fine = record.levelno < logging.WARNING
+        stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
+
+        try:
+            colour = _COLOUR.get(record.levelno) if self._colorize else None
+            if colour and stream.isatty():
+                line = f"{colour}{line}\033[0m"
+            try:
+                stream.write(line + "\n")
+            except UnicodeEncodeError:
+                # A terminal that has not every letter, as on Windows.
+                encoding = stream.encoding or "ascii"
+                stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+            stream.flush()
+        except RuntimeError:
+            # A signal handler logs while the line that it interrupted is being written.
+            with contextlib.suppress(OSError, ValueError):
+                os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
+        except (OSError, ValueError, AttributeError):
+            # Without a terminal, or with one that was closed, which is not an error of the program.
+            pass
+
+
+class RosOutHandler(DeferringHandler):
+    """Log records to /rosout (http://wiki.ros.org/rosout); for a logger of the program's own, too."""
+
+    def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
+        """``tell_topics``: say what the node publishes in each line."""
+        from rosgraph_msgs.msg import Log
+
+        from minirospy.client.publisher import Publisher
+
+        super().__init__(level)
+        self._publisher = Publisher("/rosout", Log, latch=True, queue_size=100)
+        self._tell_topics = tell_topics
+        self._busy = threading.local()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Publish one record, unless publishing itself is what logs."""
+        session = current_session()
+        node = session.node
+        if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
+            return
+
+        self._busy.yes = True
+        try:
+            message = self._publisher.data_class()
+            stamp = message.header.stamp
+            stamp.secs, stamp.nsecs = divmod(session.clock.now(), 10**9)
+            message.level = ros_level(record.levelno)
+            message.name = session.name
+            message.msg = _message(record)
+            message.file = record.filename
+            message.function = record.funcName or ""
+            message.line = record.lineno
+            if self._tell_topics:
+                message.topics = list(node.publications)
+            self._publisher.publish(message)
+        except Exception as error:  # noqa: BLE001 - a log line must never stop the program that logs
+            print(f"Unable to report rosout: {error}", file=sys.stderr)
+        finally:
+            self._busy.yes = False
+
+
+def _message(record: logging.LogRecord) -> str:
+    text = record.getMessage()
+    if record.exc_info and not record.exc_text:
+        record.exc_text = _text.formatException(record.exc_info)
+    return f"{text}\n{record.exc_text}" if record.exc_text else text
+
+
+def _line(record: logging.LogRecord) -> str:
+    message = _message(record)
+    severity = SEVERITIES.get(record.levelno, record.levelname)
+    template = os.environ.get("ROSCONSOLE_FORMAT")
+    if not template or template == _DEFAULT_FORMAT:
+        return f"[{severity}] [{_stamp(record)}]: {message}"
+    fields: dict[str, Callable[[str | None], object]] = {
+        "severity": lambda _: severity,
+        "message": lambda _: message,
+        "time": lambda form: _stamp(record, form),
+        "walltime": lambda form: _wall_time(record, form),
+        "thread": lambda _: record.thread,
+        "logger": lambda _: record.name,
+        "file": lambda _: record.pathname,
+        "line": lambda _: record.lineno,
+        "function": lambda _: record.funcName,
+        "node": lambda _: current_session().name,
+    }
+
+    def field(found: re.Match[str]) -> str:
+        name, form = found.groups()
+        if name not in fields or (form is not None and name not in ("time", "walltime")):
+            return found[0]
+        return str(fields[name](form))
+
+    return _FIELD.sub(field, template)
+
+
+def _wall_time(record: logging.LogRecord, form: str | None = None) -> str:
+    return f"{record.created:f}" if form is None else time.strftime(form, time.localtime(record.created))
+
+
+def _stamp(record: logging.LogRecord, form: str | None = None) -> str:
+    """Wall time, and behind it the simulated time where that is used."""
+    wall = _wall_time(record, form)
+    clock = current_session().clock
+    return f"{wall}, {clock.now() / 1e9:f}" if isinstance(clock, SimulatedClock) else wall

@@ -1,0 +1,186 @@
+"""The logging of a node from init_node on: which handlers its loggers have, its log file, its logger services.
+
+Source: http://wiki.ros.org/rospy/Overview/Logging.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from minirospy.client.log_handlers import DeferringHandler, RosOutHandler, RosStreamHandler
+from minirospy.log_levels import DEBUG, PYTHON_LEVELS, logger_levels, set_logger_level
+
+if TYPE_CHECKING:
+    from roscpp.srv import SetLoggerLevelRequest
+
+    from minirospy.client.session import Session
+
+__all__ = ["configure", "start"]
+
+_FILE_FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
+_FILE_BYTES = 50_000_000
+_FILE_BACKUPS = 4
+_rosout = logging.getLogger("rosout")
+_log = logging.getLogger(__name__)
+
+
+def configure(session: Session, log_level: int | None, log_file: str | None) -> None:
+    """Set up the handlers for the node: terminal, log file. ``log_file``: the ``__log:=`` argument.
+
+    A configuration of the user's own (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in
+    ROS_HOME) is followed instead, as http://wiki.ros.org/rospy/Overview/Logging has it. A file that cannot be
+    written or read is reported in one line. Raises ValueError on a log level that is not one of rospy's.
+    """
+    if log_level is not None and log_level not in PYTHON_LEVELS:
+        raise ValueError(
+            f"log_level [{log_level}] is not one of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
+        )
+    path = (
+        Path(log_file).absolute()
+        if log_file
+        else session.identity.environment.log_dir / _log_file_name(session.name)
+    )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
+    # For a configuration file of the user's, and for programs that look for their log.
+    os.environ["ROS_LOG_FILENAME"] = str(path)
+    if not _configured_by_file(session):
+        _rosout.setLevel(logging.INFO)
+        _add_handler(session, _rosout, RosStreamHandler())
+        _log_to_file(session, path)
+    if log_level is not None:
+        _rosout.setLevel(PYTHON_LEVELS[log_level])
+    # Warnings of the library itself go to the same places.
+    ours = logging.getLogger("minirospy")
+    ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
+    terminal = RosStreamHandler()
+    terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
+    _add_handler(session, ours, terminal)
+    if path.parent.parent == session.identity.environment.log_dir:
+        _link_latest(path.parent)
+
+
+def start(session: Session, *, rosout: bool) -> None:
+    """Offer the node's logger services, and publish to ``/rosout`` where ``rosout`` is set."""
+    _offer_logger_services()
+    if rosout:
+        _start_rosout(session)
+    _log.debug("init_node, name[%s], pid[%s]", session.name, os.getpid())
+
+
+def _start_rosout(session: Session) -> None:
+    """Publish log lines to /rosout."""
+    from minirospy.client.params import get_param
+
+    tell_topics = not get_param("/rosout_disable_topics_generation", False)
+    _add_handler(session, _rosout, RosOutHandler(tell_topics=tell_topics))
+
+
+def _add_handler(session: Session, logger: logging.Logger, handler: logging.Handler) -> None:
+    """Add ``handler`` to ``logger`` until the process becomes another node."""
+    logger.addHandler(handler)
+    session.on_replaced.append(lambda: logger.removeHandler(handler))
+
+
+def _offer_logger_services() -> None:
+    """Offer the node's services that list and set the levels of its loggers."""
+    from roscpp.msg import Logger
+    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
+
+    from minirospy.client.services import Service
+
+    def get_loggers(request: object) -> GetLoggersResponse:
+        levels = logger_levels(sorted(logging.root.manager.loggerDict))
+        return GetLoggersResponse([Logger(*each) for each in levels.items()])
+
+    def set_level(request: SetLoggerLevelRequest) -> SetLoggerLevelResponse:
+        try:
+            set_logger_level(request.logger, request.level)
+        except ValueError as error:
+            _log.error("log level of logger [%s]: %s", request.logger, error)
+        return SetLoggerLevelResponse()
+
+    Service("~get_loggers", GetLoggers, get_loggers)
+    Service("~set_logger_level", SetLoggerLevel, set_level)
+
+
+def _configured_by_file(session: Session) -> bool:
+    """Follow the user's own configuration of ``logging``, where there is one."""
+    named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
+    folder = session.identity.environment.home / "config"
+    found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
+    for path in [Path(named)] if named else [path for path in found if path.is_file()]:
+        import logging.config
+
+        try:
+            if not path.is_file():
+                raise FileNotFoundError("the file does not exist")
+            if path.suffix in (".yaml", ".yml"):
+                import yaml
+
+                with path.open(encoding="utf-8") as file:
+                    logging.config.dictConfig({"disable_existing_loggers": False, **yaml.safe_load(file)})
+            else:
+                logging.config.fileConfig(path, disable_existing_loggers=False)
+        except Exception as error:  # noqa: BLE001 - a file that a person wrote; logging raises all sorts
+            why = " ".join(str(error).split()) or type(error).__name__
+            _warn(f"cannot load logging configuration file [{path}], the usual one is used: {why}")
+            continue
+        return True
+    return False
+
+
+def _log_to_file(session: Session, path: Path) -> None:
+    """All loggers to the node's file, as rospy has it, and nothing twice on the terminal."""
+    from minirospy.runtime.master.log_file import LogFileHandler
+
+    class RotatingFileHandler(DeferringHandler, LogFileHandler):
+        """Of the name that programs find among the root logger's handlers with rospy."""
+
+    try:
+        file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
+    except OSError as error:
+        if path.parent.is_dir():
+            _warn(f"cannot write the log file [{path}]: {error.strerror}")
+        return
+    file.setFormatter(logging.Formatter(_FILE_FORMAT))
+    root = logging.root
+    if not root.handlers:
+        root.setLevel(logging.INFO)
+    # Handlers that the program itself gave the root before (basicConfig) stay, where rospy takes them
+    # away; but what rosout has written to the terminal is not written there again.
+    for handler in root.handlers:
+        if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
+            handler.addFilter(_is_not_ours)
+    _add_handler(session, root, file)
+
+
+def _is_not_ours(record: logging.LogRecord) -> bool:
+    return record.name.partition(".")[0] not in ("rosout", "minirospy")
+
+
+def _link_latest(folder: Path) -> None:
+    """``latest`` beside the folder of a run is a link to it."""
+    link = folder.parent / "latest"
+    # No links on this file system, or another node was faster.
+    with contextlib.suppress(OSError, NotImplementedError):
+        if link.is_symlink():
+            if link.resolve() == folder.resolve():
+                return
+            link.unlink()
+        link.symlink_to(folder, target_is_directory=True)
+
+
+def _log_file_name(node_name: str) -> str:
+    return node_name.strip("/").replace("/", "_") + ".log"
+
+
+def _warn(text: str) -> None:
+    print(f"WARNING: {text}", file=sys.stderr)
