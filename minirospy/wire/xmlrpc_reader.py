@@ -22,7 +22,10 @@ _MAX_ELEMENTS = 1_000_000
 
 _MIB = 1024 * 1024
 _MAX_MEMORY = 64 * _MIB
-"""Of the long texts of one document: a character beyond U+FFFF makes each one of its text take four bytes."""
+"""Of the long texts of one document."""
+
+_MAX_WIDE = 16 * _MIB
+"""Of one text in which a character beyond U+00FF makes each one take two or four bytes: all of it is copied then."""
 
 _MAX_TOKEN = 65536
 """Bytes of a tag, a comment or the like."""
@@ -228,10 +231,14 @@ class Reader:
 
         # All characters take as much as the widest one.
         width = max(self._width, _width(more))
-        self._memory += width * (len(joined) + len(more)) - self._width * len(joined)
+        memory = width * (len(joined) + len(more))
+        self._memory += memory - self._width * len(joined)
         self._width = width
         if self._memory > _MAX_MEMORY:
             raise RpcProtocolError(f"a value of more than {_MAX_MEMORY // _MIB} MiB in memory", status=413)
+        if width > 1 and memory > _MAX_WIDE:
+            most = _MAX_WIDE // _MIB
+            raise RpcProtocolError(f"a text of wide characters of more than {most} MiB in memory", status=413)
 
         # Python copies nothing where a local variable is the only one that refers to a text.
         joined += more

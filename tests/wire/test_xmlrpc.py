@@ -205,15 +205,21 @@ def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
 
 
 def test_memory_of_a_text_is_that_of_its_widest_character() -> None:
-    # 20 MiB of ASCII are within the limit; with one character that needs four bytes they are not.
-    text = b"<methodCall><value>" + b"x" * 20 * 1024 * 1024
+    # 6 MiB of ASCII are within the limit; with one character that needs four bytes they are not.
+    text = b"<methodCall><value>" + b"x" * 6 * 1024 * 1024
     for wide, is_refused in ((b"", False), ("\u20ac".encode(), False), ("\U0001f600".encode(), True)):
         steps = parse_call_in_steps(text + wide + b"</value><methodName>m</methodName></methodCall>")
         if is_refused:
-            with pytest.raises(RpcProtocolError, match="more than 64 MiB in memory"):
+            with pytest.raises(RpcProtocolError, match="wide characters of more than 16 MiB in memory"):
                 finish(steps)
         else:
-            assert len(finish(steps).args[0]) >= 20 * 1024 * 1024
+            assert len(finish(steps).args[0]) >= 6 * 1024 * 1024
+
+
+def test_a_short_wide_text_may_come_with_a_long_narrow_one() -> None:
+    narrow, wide = "x" * 20 * 1024 * 1024, "\u20ac" * 100_000
+    body = f"<methodCall><methodName>m</methodName><value>{narrow}</value><value>{wide}</value></methodCall>"
+    assert finish(parse_call_in_steps(body.encode())).args == [narrow, wide]
 
 
 def test_width_of_a_text_is_not_that_of_the_one_before() -> None:
@@ -233,6 +239,7 @@ def test_lines_of_a_text_are_one_piece() -> None:
 
 def test_limits_are_as_documented() -> None:
     assert (MAX_DEPTH, xmlrpc_reader._MAX_ELEMENTS, xmlrpc_reader._MAX_MEMORY) == (64, 10**6, 64 * 2**20)
+    assert xmlrpc_reader._MAX_WIDE == 16 * 2**20
     assert (xmlrpc_reader._MAX_TOKEN, xmlrpc_reader._MAX_SCALAR) == (64 * 2**10, 2048)
 
 
