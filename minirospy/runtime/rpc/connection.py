@@ -82,6 +82,7 @@ class Connection:
     __slots__ = (
         "_fd",
         "_has_deadline",
+        "_has_requested",
         "_held",
         "_loop",
         "_moved",
@@ -109,6 +110,7 @@ class Connection:
         self._out = Outbox(sock)
         self._waiting: list[HttpMessage] = []
         self._has_deadline = False
+        self._has_requested = False
         # Bytes since the time limit was set.
         self._moved = 0
 
@@ -173,6 +175,8 @@ class Connection:
 
         self._moved += len(data)
         self._waiting += messages
+        if messages:
+            self._has_requested = True
         self._answer_waiting()
         self._set_deadline()
 
@@ -186,6 +190,11 @@ class Connection:
             return b""
 
     def readable(self) -> None:
+        """Read, as there is something, unless others come first: the loop calls this again in its next iteration."""
+        if self._server.admit() or self._has_requested:
+            self.read()
+
+    def read(self) -> None:
         """Read what there is: the rest of a long request in steps, as what a client sends that was refused."""
         if not self._held and self._state is not _REFUSED:
             self._take(self._receive())

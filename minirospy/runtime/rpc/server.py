@@ -44,9 +44,15 @@ _BACKLOG = 4096
 """Connections that wait to be accepted. Of a client that finds no room the kernel drops the first segments, and sends
 them again after a growing time: 1, 3, 7 s if it has not connected, up to 25 s for its request if it has."""
 
-_ACCEPTS_AT_ONCE = 256
+_ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 256, 0.006
 _READ_SECONDS = 0.003
-"""Connections in one turn of the loop, some 9 ms, and how long they are read from immediately."""
+"""Connections in one turn of the loop, how long that may take, and how long they are read from immediately."""
+
+_READS_AT_ONCE = 64
+"""Connections that are read from before new ones are accepted, some 2 ms: thousands may have data, or end, at a time."""
+
+_MOST_READS = 4
+"""As often in one iteration of the loop; after that, connections that have requested nothing yet wait for the next one."""
 
 
 Dispatch = Callable[[str, list[Any]], object]
@@ -96,6 +102,11 @@ class RpcServer:
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
+        # Those at which nobody is accepted for a moment.
+        self._resting: set[socket.socket] = set()
+        # Connections that were read from since new ones were accepted; how often that was in this iteration of the loop.
+        self._reads = 0
+        self._rounds = 0
         self.deadlines: Deadlines[Connection] = Deadlines(Connection.end)
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
         self._limited_log = RateLimitedLogger(_log)
@@ -157,14 +168,36 @@ class RpcServer:
         self._listening.append(sock)
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
+    def admit(self) -> bool:
+        """Return whether a connection that has requested nothing yet is read from in this iteration of the loop.
+
+        The caller is about to read from one. Now and then those that wait to be accepted come first.
+        """
+        self._reads += 1
+        if self._reads >= _READS_AT_ONCE and self._rounds < _MOST_READS:
+            if not self._rounds:
+                asyncio.get_running_loop().call_soon(self._start_iteration)
+            self._reads = 0
+            self._rounds += 1
+            for sock in list(self._listening):
+                if sock not in self._resting:
+                    self._accept(sock, _READS_AT_ONCE)
+        return self._rounds < _MOST_READS
+
+    def _start_iteration(self) -> None:
+        self._reads = self._rounds = 0
+
     def _watch_again(self, sock: socket.socket) -> None:
+        self._resting.discard(sock)
         if sock in self._listening:
             asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
-    def _accept(self, sock: socket.socket) -> None:
+    def _accept(self, sock: socket.socket, most: int = _ACCEPTS_AT_ONCE) -> None:
         loop = asyncio.get_running_loop()
-        end = time.perf_counter() + _READ_SECONDS
-        for _ in range(_ACCEPTS_AT_ONCE):
+        start = now = time.perf_counter()
+        for _ in range(most):
+            if now - start >= _ACCEPT_SECONDS:
+                return
             try:
                 peer, address = sock.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -174,12 +207,14 @@ class RpcServer:
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)
+                self._resting.add(sock)
                 loop.call_later(0.05, self._watch_again, sock)
                 return
             if peer.family not in sockets.FAMILIES or self._allows(peer, address[0]):
-                self._serve(peer, loop, reads=time.perf_counter() < end)
+                self._serve(peer, loop, reads=now - start < _READ_SECONDS)
             else:
                 peer.close()
+            now = time.perf_counter()
 
     def _serve(self, peer: socket.socket, loop: asyncio.AbstractEventLoop, *, reads: bool) -> None:
         try:
@@ -194,7 +229,7 @@ class RpcServer:
         self.connections[connection] = None
         if reads:
             # Mostly the first request is there by now.
-            connection.readable()
+            connection.read()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
         """Log that a request was refused; a flood of them is summed up."""

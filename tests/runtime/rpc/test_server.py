@@ -6,11 +6,13 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from minirospy.runtime.rpc import connection as connections
+from minirospy.runtime.rpc import server as servers
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.wire.http import HttpReader, serialize_request
@@ -200,3 +202,56 @@ def test_a_client_that_does_not_read_its_answers_is_not_read_from() -> None:
         await server.close()
 
     asyncio.run(scene())
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> None:
+    crowd, left = 400, []
+
+    async def scene() -> None:
+        server = RpcServer(lambda method, args: left.append(len(server.connections)) or 0)
+        await server.start()
+        with contextlib.ExitStack() as stack:
+            good = stack.enter_context(connect(server))
+            if is_known:
+                good.sendall(call("getPid"))
+                await until(lambda: left)
+            silent = [connect(server) for _ in range(crowd)]
+            await until(lambda: len(server.connections) == crowd + 1)
+            for sock in silent:
+                sock.close()
+            # Its request comes after all of theirs have ended.
+            if not is_known:
+                good = stack.enter_context(connect(server))
+            good.sendall(call("getPid"))
+            await until(lambda: len(left) == 1 + is_known)
+            await until(lambda: len(server.connections) <= 2)
+        await server.close()
+
+    asyncio.run(scene())
+    assert left[-1] > crowd // 4
+
+
+def test_connections_are_accepted_for_some_milliseconds_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+
+    def clock() -> float:
+        nonlocal now
+        now += 0.001
+        return now
+
+    async def scene() -> tuple[int, int]:
+        server = RpcServer(lambda method, args: 0)
+        await server.start()
+        with contextlib.ExitStack() as stack:
+            for _ in range(50):
+                stack.enter_context(connect(server))
+            server._accept(server._listening[0])
+            accepted = len(server.connections)
+            await until(lambda: len(server.connections) == 50)
+        await server.close()
+        return accepted, len(server.connections)
+
+    monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
+    accepted, _ = asyncio.run(scene())
+    assert accepted == 6
