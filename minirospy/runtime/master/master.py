@@ -23,6 +23,7 @@ from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import MasterApi, Notice, key_of_node, nothing
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
+from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
@@ -54,8 +55,9 @@ _RESTART_SECONDS = 600.0
 """A master that starts so soon after the last sign of the one that was killed takes its session up."""
 
 _COLLECT_SECONDS = 60.0
-_COLLECT = (5000, 10, 1_000_000_000)
-"""The garbage collector's thresholds: the oldest generation is not collected by itself."""
+_COLLECT = (2000, 5, 1_000_000_000)
+"""The garbage collector's thresholds: 10,000 objects at most are looked at, for some 4 ms; the oldest generation is not
+collected by itself."""
 
 _OWN_NODE = "/rosout"
 
@@ -149,6 +151,7 @@ class Master(MasterApi):
                 self._journal.close()
             raise
         if self._owns_process:
+            return_large_blocks()
             self._collect()
         if nodes:
             self._checking = asyncio.ensure_future(self._check(nodes))
@@ -385,7 +388,8 @@ class Master(MasterApi):
         """
         registry = self.registry
         uris, types = registry.nodes(), registry.topic_types()
-        publications, subscriptions = list(registry.publications()), list(registry.all_subscriptions())
+        # Each of them is a copy.
+        publications, subscriptions = registry.publications(), registry.all_subscriptions()
         offers, parameters = list(registry.offers()), list(self.parameters.subscriptions())
         tree = self.parameters.get("/")
         return chain(
