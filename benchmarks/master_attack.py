@@ -75,25 +75,29 @@ def run_control() -> None:
 
 def run_nodes(port: int, count: int) -> None:
     """Register nodes of three publications and three subscriptions, and unregister them; a line for each round."""
-    with socket.create_server(("127.0.0.1", 0), backlog=200) as api:
-        threading.Thread(target=_serve_nodes, args=(api,), daemon=True).start()
-        uri = f"http://127.0.0.1:{api.getsockname()[1]}/"
+    with contextlib.ExitStack() as stack:
+        uris = []
+        for _ in range(count):
+            # Each node has its own port.
+            api = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=200))
+            threading.Thread(target=_serve_nodes, args=(api,), daemon=True).start()
+            uris.append(f"http://127.0.0.1:{api.getsockname()[1]}/")
         while True:
             start = time.monotonic()
-            worst, answered = _run_round(port, uri, count)
+            worst, answered = _run_round(port, uris)
             print(f"{start} {worst} {int(answered)}", flush=True)
 
 
-def _run_round(port: int, uri: str, count: int) -> tuple[float, bool]:
+def _run_round(port: int, uris: list[str]) -> tuple[float, bool]:
     """Return the seconds of the slowest node, and whether all of their calls were answered."""
     from minirospy.errors import MinirospyError
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
     worst, answered = 0.0, True
-    proxies = [MasterProxy(f"http://127.0.0.1:{port}", f"/node{n}", 120.0) for n in range(count)]
+    proxies = [MasterProxy(f"http://127.0.0.1:{port}", f"/node{n}", 120.0) for n in range(len(uris))]
     registered = []
 
-    for proxy in proxies:
+    for proxy, uri in zip(proxies, uris, strict=True):
         begin = time.monotonic()
         try:
             for topic in ("/rosout", f"{proxy.caller_id}/out", "/status"):
@@ -106,7 +110,7 @@ def _run_round(port: int, uri: str, count: int) -> tuple[float, bool]:
             print(f"{proxy.caller_id} could not register: {error}", file=sys.stderr, flush=True)
         worst = max(worst, time.monotonic() - begin)
 
-    for proxy in proxies:
+    for proxy, uri in zip(proxies, uris, strict=True):
         try:
             removed = [
                 proxy.unregister_publisher(topic, uri)
