@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import chain
-from sys import getsizeof, intern
+from sys import intern
 from typing import NamedTuple
 
 from minirospy.graph import registry_limits
@@ -20,6 +20,7 @@ from minirospy.graph.registry_limits import (
     RegistryFullError,
     name_cost,
     node_cost,
+    text_cost,
 )
 from minirospy.graph.shares import Shares, holder_of
 from minirospy.graph.topic_types import TopicTypes
@@ -58,11 +59,12 @@ class Registered(NamedTuple):
 class _Node:
     """A node's name and URI, and what it has registered: name -> what it is there, as bits."""
 
-    __slots__ = ("entries", "name", "size", "uri")
+    __slots__ = ("entries", "holder", "name", "size", "uri")
 
     def __init__(self, name: str, uri: str) -> None:
         self.name = name
         self.uri = uri
+        self.holder = intern(holder_of(uri))
         self.size = 0
         """The bytes that are counted for it."""
         self.entries: dict[str, int] = {}
@@ -148,11 +150,11 @@ class Registry:
         actions = self._claim(node, uri, service, SERVES, service_uri)
         before = self._services.get(service)
         if before:
-            self._count(self._nodes[before.node], -getsizeof(before.uri))
+            self._count(self._nodes[before.node], -text_cost(before.uri))
             if before.node != node:
                 self._leave(before.node, service, SERVES)
         entry = self._enter(node, service, SERVES)
-        self._count(entry, getsizeof(service_uri))
+        self._count(entry, text_cost(service_uri))
         self._services[service] = _Service(entry.name, service_uri)
         return actions
 
@@ -161,7 +163,7 @@ class Registry:
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
-        self._count(self._nodes[node], -getsizeof(service_uri))
+        self._count(self._nodes[node], -text_cost(service_uri))
         self._leave(node, service, SERVES)
         return True
 
@@ -304,7 +306,8 @@ class Registry:
 
         cost = node_cost(node, uri) if is_new else 0
         cost += name_cost(name, kind, kinds) + self._cost_of_text(name, kind, text)
-        excess = self._shares.excess(holder_of(uri), cost) if cost > 0 else None
+        holder = entry.holder if entry and not is_new else holder_of(uri)
+        excess = self._shares.excess(holder, cost) if cost > 0 else None
         if excess:
             raise RegistryFullError(registry_limits.describe(excess, self._shares))
         if not is_new:
@@ -322,12 +325,12 @@ class Registry:
         """Return the bytes that a type or a service's URI takes beyond the one that it may replace."""
         if kind == SERVES:
             service = self._services.get(name)
-            return getsizeof(text) - (getsizeof(service.uri) if service else 0)
+            return text_cost(text) - (text_cost(service.uri) if service else 0)
         return 0 if kind == PARAMETER else self._types.cost(name, text)
 
     def _count(self, entry: _Node, size: int) -> None:
         entry.size += size
-        self._shares.add(holder_of(entry.uri), size)
+        self._shares.add(entry.holder, size)
 
     def _count_for(self, node: str, size: int) -> None:
         self._count(self._nodes[node], size)
@@ -373,8 +376,9 @@ class Registry:
         self._leave(node, topic, kind)
 
     def _leave_type(self, topic: str, entry: _Node) -> None:
-        others = chain(self._publishers.get(topic, ()), self._subscribers.get(topic, ()))
-        self._types.leave(topic, entry.name, others)
+        if self._types.is_counted_for(topic, entry.name):
+            others = chain(self._publishers.get(topic, ()), self._subscribers.get(topic, ()))
+            self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
         """Yield an update for each subscriber of the topics, as they are when it is their turn."""

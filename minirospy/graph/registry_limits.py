@@ -5,8 +5,6 @@ Pure. Sizes are those of CPython on 64 bits: a name that is registered is in up 
 
 from __future__ import annotations
 
-from sys import getsizeof
-
 from minirospy.errors import MinirospyError
 from minirospy.graph.shares import Excess, Shares
 
@@ -20,6 +18,7 @@ __all__ = [
     "name_cost",
     "new_shares",
     "node_cost",
+    "text_cost",
 ]
 
 _MIB = 1024 * 1024
@@ -75,16 +74,24 @@ def describe(excess: Excess, shares: Shares) -> str:
             return f"{shares.shared // _MIB} MiB for the registrations of all that have many"
 
 
+def text_cost(text: str) -> int:
+    """Return the bytes that a text takes.
+
+    Not by sys.getsizeof: Python adds a copy as UTF-8 to a text while it is in use, once a journal needed it.
+    """
+    return 50 + len(text) if text.isascii() else 80 + 8 * len(text)
+
+
 def node_cost(name: str, uri: str) -> int:
     """Return the bytes that a node takes."""
-    return _NODE_BYTES + getsizeof(name) + getsizeof(uri)
+    return _NODE_BYTES + text_cost(name) + text_cost(uri)
 
 
 def name_cost(name: str, kind: int, kinds: int) -> int:
     """Return the bytes that a node takes for being ``kind`` under a name where it is ``kinds`` already."""
     if kinds & kind:
         return 0
-    text = getsizeof(name)
+    text = text_cost(name)
     # The parameter server has its own copy.
     size = _KIND_BYTES[kind] + (text if kind == PARAMETER else 0)
     return size if kinds else size + _NAME_BYTES + text

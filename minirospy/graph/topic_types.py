@@ -6,8 +6,10 @@ Pure. A type that is in use is counted for one of the nodes that register its to
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from sys import getsizeof, intern
+from sys import intern
 from typing import NamedTuple
+
+from minirospy.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
@@ -44,6 +46,11 @@ class TopicTypes:
     def __getitem__(self, topic: str) -> str:
         return self._types[topic].text
 
+    def is_counted_for(self, topic: str, node: str) -> bool:
+        """Return whether a topic's type is counted for this node."""
+        type_ = self._types.get(topic)
+        return type_ is not None and type_.node == node
+
     def rows(self) -> Iterator[tuple[str, str]]:
         """Yield each topic and its type. The table may change meanwhile."""
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
@@ -52,7 +59,7 @@ class TopicTypes:
         """Return the bytes that a type takes beyond the one that it may replace, for a node that registers the topic."""
         before = self._types.get(topic)
         if before and before.node:
-            return max(0, getsizeof(type_) - getsizeof(before.text))
+            return max(0, text_cost(type_) - text_cost(before.text))
         return _size_of(max(type_, before.text if before else "", key=len))
 
     def set(self, topic: str, type_: str, node: str) -> None:
@@ -80,9 +87,12 @@ class TopicTypes:
             return
         if before:
             self._remove_old(topic, before.text)
-        self._types[topic] = _Type(intern(type_), "")
+        self._add_old(topic, intern(type_))
+
+    def _add_old(self, topic: str, type_: str) -> None:
+        self._types[topic] = _Type(type_, "")
         self._old[topic] = None
-        self._old_bytes += getsizeof(topic) + _size_of(type_)
+        self._old_bytes += text_cost(topic) + _size_of(type_)
 
         while len(self._old) > _MOST_OLD or self._old_bytes > _MOST_OLD_BYTES:
             oldest = next(iter(self._old))
@@ -90,25 +100,23 @@ class TopicTypes:
 
     def leave(self, topic: str, node: str, others: Iterable[str]) -> None:
         """Count a type for one of ``others``, which register the topic too, once ``node`` has left it."""
-        type_ = self._types.get(topic)
-        if type_ is None or type_.node != node:
-            return
         heir = next(iter(others), "")
-        if heir == node:
+        if heir == node or not self.is_counted_for(topic, node):
             return
 
-        self._count(node, -_size_of(type_.text))
-        self._types[topic] = type_._replace(node=heir)
+        text = self._types[topic].text
+        self._count(node, -_size_of(text))
         if heir:
-            self._count(heir, _size_of(type_.text))
+            self._types[topic] = _Type(text, heir)
+            self._count(heir, _size_of(text))
         else:
-            self.keep(topic, type_.text)
+            self._add_old(topic, text)
 
     def _remove_old(self, topic: str, type_: str) -> None:
         if topic in self._old:
             del self._old[topic]
-            self._old_bytes -= getsizeof(topic) + _size_of(type_)
+            self._old_bytes -= text_cost(topic) + _size_of(type_)
 
 
 def _size_of(type_: str) -> int:
-    return _TYPE_BYTES + getsizeof(type_)
+    return _TYPE_BYTES + text_cost(type_)

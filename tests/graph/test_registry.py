@@ -12,6 +12,7 @@ import pytest
 from minirospy.graph import registry_limits, topic_types
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry, RegistryFullError
 from minirospy.graph.shares import Shares
+from minirospy.wire.journal import serialize_record
 
 
 def test_publishers_and_subscribers_find_each_other() -> None:
@@ -280,6 +281,22 @@ def test_a_type_is_counted_for_a_node_that_remains() -> None:
     list(registry.forget("/s", "http://s:1/"))
     assert registry._shares.total == 0
     assert registry.topic_types() == {"/t": long_type}
+
+
+def test_size_of_a_text_does_not_change_while_it_is_counted() -> None:
+    registry = Registry()
+    list(registry.register_parameter("/n", "/p", "http://n:1/"))
+    before, text = registry._shares.total, "\u20ac" * 1000
+    for number in range(3):
+        uri = f"rosrpc://{text}:{number}"
+        registry.register_service("/n", f"/s{text}", uri, "http://n:1/")
+        registry.register_publisher("/n", f"/t{text}", f"a/{text}{number}", "http://n:1/")
+        # The journal has Python make a copy of each as UTF-8, which it keeps.
+        for row in (*registry.offers(), *registry.topic_types().items()):
+            serialize_record(list(row))
+    registry.unregister_service("/n", f"/s{text}", uri)
+    registry.unregister_publisher("/n", f"/t{text}", "http://n:1/")
+    assert registry._shares.total == before
 
 
 def test_a_service_that_another_node_takes_over_is_counted_for_it() -> None:
