@@ -1,0 +1,75 @@
+"""The interface that callbacks of states may declare, and the check for a shutdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+__all__ = ["CBInterface", "cb_interface", "has_smach_interface", "is_shutdown", "set_shutdown_check"]
+
+_checks: dict[str, Callable[[], bool]] = {"shutdown": lambda: False}
+
+
+def is_shutdown() -> bool:
+    """Return whether containers are to stop after the state that they execute."""
+    return _checks["shutdown"]()
+
+
+def set_shutdown_check(cb: Callable[[], bool]) -> None:
+    """Let ``cb`` decide whether containers are to stop."""
+    _checks["shutdown"] = cb
+
+
+def has_smach_interface(obj: object) -> bool:
+    """Return whether an object says which outcomes, input and output keys it has."""
+    return all(hasattr(obj, f"get_registered_{name}") for name in ("input_keys", "output_keys", "outcomes"))
+
+
+class CBInterface:
+    """A callback with outcomes and keys, which a state that it is given to gets, too."""
+
+    def __init__(
+        self,
+        cb: Callable[..., Any],
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+        io_keys: Iterable[str] | None = None,
+    ) -> None:
+        both = set(io_keys or ())
+        self._input_keys = set(input_keys or ()) | both
+        self._output_keys = set(output_keys or ()) | both
+        self._outcomes = tuple(outcomes or ())
+        self._cb = cb
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the callback."""
+        return self._cb(*args, **kwargs)
+
+    def get_registered_input_keys(self) -> tuple[str, ...]:
+        """Return the keys of the userdata that it may read."""
+        return tuple(self._input_keys)
+
+    def get_registered_output_keys(self) -> tuple[str, ...]:
+        """Return the keys of the userdata that it may write."""
+        return tuple(self._output_keys)
+
+    def get_registered_outcomes(self) -> tuple[str, ...]:
+        """Return the outcomes that it adds to its state's."""
+        return self._outcomes
+
+
+class cb_interface:  # noqa: N801 - ROS's name
+    """Decorate a callback with outcomes and keys."""
+
+    def __init__(
+        self,
+        outcomes: Iterable[str] | None = None,
+        input_keys: Iterable[str] | None = None,
+        output_keys: Iterable[str] | None = None,
+    ) -> None:
+        self._interface = outcomes, input_keys, output_keys
+
+    def __call__(self, cb: Callable[..., Any]) -> CBInterface:
+        """Return the callback with its interface."""
+        return CBInterface(cb, *self._interface)

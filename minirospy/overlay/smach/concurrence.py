@@ -1,0 +1,9 @@
+"""smach.concurrence, provided by minirospy. Source: http://wiki.ros.org/smach."""
+
+from minirospy.compat.smach.concurrence import (
+    Concurrence,
+)
+
+__all__ = [
+    "Concurrence",
+]

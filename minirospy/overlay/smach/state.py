@@ -1,0 +1,11 @@
+"""smach.state, provided by minirospy. Source: http://wiki.ros.org/smach."""
+
+from minirospy.compat.smach.state import (
+    CBState,
+    State,
+)
+
+__all__ = [
+    "CBState",
+    "State",
+]

@@ -1,0 +1,9 @@
+"""smach.state_machine, provided by minirospy. Source: http://wiki.ros.org/smach."""
+
+from minirospy.compat.smach.state_machine import (
+    StateMachine,
+)
+
+__all__ = [
+    "StateMachine",
+]
