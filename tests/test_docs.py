@@ -12,7 +12,7 @@ import pytest
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = {
     name: (DOCS / name).read_text(encoding="utf-8")
-    for name in ("asyncio.md", "actions.md", "python_packages.md", "diagnostics.md", "tf.md")
+    for name in ("asyncio.md", "actions.md", "python_packages.md", "diagnostics.md", "smach.md", "tf.md")
 }
 PROGRAMS = [
     pytest.param(code, printed, id=f"{name}-{number}")

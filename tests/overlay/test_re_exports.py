@@ -28,6 +28,8 @@ SHARED = {
     "rpi.py",
     "rospy/live.py",
     "rospy/passing.py",
+    "smach_ros/callbacks.py",
+    "smach_ros/pickled.py",
     "rostopic/echo.py",
     "rostopic/rates.py",
     "kdl_parser_py/tree.py",

@@ -1,0 +1,9 @@
+"""smach_ros.monitor_state, provided by minirospy. Source: http://wiki.ros.org/smach."""
+
+from minirospy.compat.smach_ros.monitor_state import (
+    MonitorState,
+)
+
+__all__ = [
+    "MonitorState",
+]

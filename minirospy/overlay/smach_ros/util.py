@@ -1,0 +1,9 @@
+"""smach_ros.util, provided by minirospy. Source: http://wiki.ros.org/smach."""
+
+from minirospy.compat.smach_ros.util import (
+    set_preempt_handler,
+)
+
+__all__ = [
+    "set_preempt_handler",
+]

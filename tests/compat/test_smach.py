@@ -1,0 +1,228 @@
+"""smach and smach_ros: as the real packages, and errors where those hang or stay locked.
+
+The programs in smach_programs/ ran under the real packages (2.5.2); the text files are what they printed there.
+"""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rospy
+import smach
+from geometry_msgs.msg import Point
+from smach.util import CBInterface
+
+from minirospy.compat.smach_ros.pickled import pickle_userdata, unpickle_userdata
+
+PROGRAMS = Path(__file__).parent / "smach_programs"
+
+
+@pytest.fixture(autouse=True)
+def logged() -> Iterator[list[str]]:
+    texts: list[str] = []
+    smach.set_loggers(texts.append, texts.append, lambda text: None, texts.append)
+    yield texts
+    smach.set_loggers(print, print, print, print)
+
+
+def run_program(name: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(PROGRAMS / f"{name}.py")],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.stdout == (PROGRAMS / f"{name}.txt").read_text(encoding="utf-8"), done.stderr
+    assert done.returncode == 0
+
+
+def test_containers_do_what_the_real_ones_do() -> None:
+    run_program("containers")
+
+
+def test_states_of_smach_ros_do_what_the_real_ones_do(master: str) -> None:
+    run_program("ros_states")
+
+
+@pytest.mark.parametrize("arguments", [[], ["another thread"]])
+def test_machine_ends_with_its_node(arguments: list[str], master: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(PROGRAMS / "preempted.py"), *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.stdout, done.returncode) == ("end\n", 0), done.stderr
+
+
+def state_of(function: Callable[[Any], Any], *outcomes: str) -> smach.State:
+    return smach.CBState(function, outcomes=outcomes)
+
+
+def concurrence_of(function: Callable[[Any], Any], **kwargs: Any) -> smach.Concurrence:
+    made = smach.Concurrence(["done"], "done", **kwargs)
+    with made:
+        smach.Concurrence.add("CHILD", state_of(function, "done"))
+    return made
+
+
+def raises(*_arguments: object) -> str:
+    raise ValueError("broken")
+
+
+@pytest.mark.parametrize(
+    ("container", "text"),
+    [
+        (lambda: concurrence_of(lambda ud: None), "Concurrent state 'CHILD' returned no outcome"),
+        (lambda: concurrence_of(raises), "Could not execute child state 'CHILD': Traceback"),
+        (
+            lambda: concurrence_of(lambda ud: "done", child_termination_cb=raises),
+            "Could not execute child termination callback",
+        ),
+    ],
+)
+def test_concurrence_whose_child_fails_ends(
+    container: Callable[[], smach.Concurrence], text: str, logged: list[str]
+) -> None:
+    with pytest.raises(smach.InvalidStateError, match="A concurrent state raised an exception"):
+        container().execute()
+    assert any(text in each for each in logged)
+
+
+def test_concurrence_that_is_to_end_before_it_starts_ends_its_states() -> None:
+    child = state_of(lambda ud: "done", "done")
+    ended = threading.Event()
+    child.execute = lambda ud: ended.wait(60) and "done"  # type: ignore[method-assign]
+    child.request_preempt = ended.set  # type: ignore[method-assign,assignment]
+    made = smach.Concurrence(["done"], "done")
+    with made:
+        smach.Concurrence.add("CHILD", child)
+    made.request_preempt()
+    assert made.execute() == "preempted"
+
+
+def test_outcome_map_of_a_state_that_is_not_there_is_logged(logged: list[str]) -> None:
+    with smach.Concurrence(["done"], "done", outcome_map={"done": {"NONE": "x"}}):
+        pass
+    assert any("references a state that does not exist: 'NONE'" in text for text in logged)
+
+
+def test_construction_that_raises_leaves_nothing_open(logged: list[str]) -> None:
+    with pytest.raises(ZeroDivisionError), smach.StateMachine(["done"]):
+        raise ZeroDivisionError
+    assert "Error raised during SMACH container construction" in logged[0]
+    with pytest.raises(smach.InvalidStateError, match="no container is opened"):
+        smach.StateMachine.add("A", state_of(lambda ud: "done", "done"))
+    # Another thread can open one, since no lock is held.
+    thread = threading.Thread(target=lambda: smach.StateMachine(["done"]).open())
+    thread.start()
+    thread.join(30)
+    assert not thread.is_alive()
+    smach.Container._construction_stack.clear()
+    smach.container.Container._construction_lock = threading.RLock()
+
+
+def test_iterator_whose_items_fail_raises() -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        raise OSError("no more")
+
+    made = smach.Iterator(["done"], [], [], items)
+    with made:
+        smach.Iterator.set_contained_state("S", state_of(lambda ud: "done", "done"), loop_outcomes=["done"])
+    with pytest.raises(OSError, match="no more"):
+        made.execute()
+    assert not made.is_running()
+
+
+def test_iterator_without_a_state_is_refused() -> None:
+    with pytest.raises(smach.InvalidStateError, match="No contained state"):
+        smach.Iterator(["done"], [], [], [1]).execute()
+
+
+def test_setting_a_member_of_an_input_is_logged(logged: list[str]) -> None:
+    class Thing:
+        value = 1
+
+    data = smach.UserData()
+    data.thing = Thing()
+    seen = smach.Remapper(data, ["thing"])
+    seen.thing.value = 2
+    assert data.thing.value == 1
+    assert "Attempting to set 'value' but this member is read-only." in logged
+    with pytest.raises(TypeError, match="read-only"):
+        del seen.thing.value
+
+
+def test_transitions_that_two_states_share_stay_apart() -> None:
+    shared = {"done": "finished"}
+    machine = smach.StateMachine(["finished", "odd"])
+    with machine:
+        smach.StateMachine.add("A", state_of(lambda ud: "done", "done", "odd"), shared)
+        smach.StateMachine.add("B", state_of(lambda ud: "done", "done"), shared)
+    assert shared == {"done": "finished"}
+    assert machine.execute() == "finished"
+
+
+def test_io_keys_of_a_callback_count() -> None:
+    callback = CBInterface(len, io_keys=["both"])
+    assert callback.get_registered_input_keys() == callback.get_registered_output_keys() == ("both",)
+
+
+def test_userdata_with_values_is_pickled() -> None:
+    data = {"a": [1, 2.5, {"x"}], "b": b"bytes", "time": rospy.Time(1, 2), "point": Point(1, 2, 3)}
+    text, left_out = pickle_userdata({**data, "lock": threading.Lock()})
+    assert left_out == ["lock"]
+    assert unpickle_userdata(text) == data
+
+
+def test_arrays_are_pickled() -> None:
+    numpy = pytest.importorskip("numpy")
+    text, _ = pickle_userdata({"array": numpy.arange(3), "number": numpy.float64(1.5)})
+    found = unpickle_userdata(text)
+    assert found["array"].tolist() == [0, 1, 2]
+    assert found["number"] == 1.5
+
+
+class Runs:
+    def __reduce__(self) -> tuple[Any, ...]:
+        return print, ("run",)
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [({"x": Runs()}, "print"), ({"x": Fraction(1, 2)}, "fractions.Fraction"), ({"x": eval}, "eval")],
+)
+def test_userdata_of_other_nodes_runs_no_code(
+    values: dict[str, Any], name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, _ = pickle_userdata(values)
+    with pytest.raises(ValueError, match=f"{name} is not a plain value or a message"):
+        unpickle_userdata(text)
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("text", ["", "?", "AAAA", "gAJLBS4="])
+def test_text_that_is_not_userdata_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="not userdata"):
+        unpickle_userdata(text)
+
+
+def test_machines_can_be_pickled() -> None:
+    machine = smach.StateMachine(["done"])
+    with machine:
+        smach.StateMachine.add("A", smach.State(["done"]))
+    copied = pickle.loads(pickle.dumps(machine))
+    assert copied.get_internal_edges() == [("done", "A", None)]
+    copied.request_preempt()
+    assert copied.preempt_requested()
