@@ -6,6 +6,7 @@ nanoseconds since the epoch.
 
 from __future__ import annotations
 
+import struct
 import sys
 import threading
 import time
@@ -13,8 +14,16 @@ from typing import Protocol
 
 from minirospy.errors import ROSTimeMovedBackwardsException
 
-__all__ = ["Clock", "SignalSafeEvent", "SimulatedClock", "WallClock", "wait_for_event"]
+__all__ = [
+    "Clock",
+    "SignalSafeEvent",
+    "SimulatedClock",
+    "WallClock",
+    "time_of_clock_message",
+    "wait_for_event",
+]
 
+_CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds. The main thread, where signals arrive, waits in slices: on Windows Ctrl-C does not interrupt a wait, and
 elsewhere one that arrives just before the wait starts is noticed only after it."""
@@ -43,6 +52,15 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
             return False
         event.wait(rest)
     return True
+
+
+def time_of_clock_message(body: bytes | memoryview) -> int | None:
+    """Return the nanoseconds in a message of /clock, as it came; None where it is of another type than rosgraph_msgs/Clock."""
+    # One time: seconds and nanoseconds. Any node may publish something else.
+    if len(body) != _CLOCK.size:
+        return None
+    seconds, nanoseconds = _CLOCK.unpack(body)
+    return int(seconds) * 10**9 + int(nanoseconds)
 
 
 class Clock(Protocol):

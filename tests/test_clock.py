@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.clock import SignalSafeEvent, SimulatedClock, WallClock, wait_for_event
+from minirospy.clock import SignalSafeEvent, SimulatedClock, WallClock, time_of_clock_message, wait_for_event
 from minirospy.errors import ROSTimeMovedBackwardsException
 
 SECOND = 10**9
@@ -150,3 +150,12 @@ def test_stop_ends_a_simulated_sleep() -> None:
 def test_sleep_of_zero_takes_no_time() -> None:
     assert SimulatedClock(SECOND).sleep(0, threading.Event())
     assert SimulatedClock(SECOND).sleep(-5, threading.Event())
+
+
+@pytest.mark.parametrize(
+    ("body", "nanoseconds"),
+    [(b"\x02\0\0\0\x05\0\0\0", 2_000_000_005), (b"\x02\0\0\0", None), (b"", None), (bytes(12), None)],
+)
+def test_time_of_a_clock_message_is_read_from_its_bytes(body: bytes, nanoseconds: int | None) -> None:
+    assert time_of_clock_message(body) == nanoseconds
+    assert time_of_clock_message(memoryview(body)) == nanoseconds

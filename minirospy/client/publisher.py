@@ -178,7 +178,7 @@ class PublishedTopic(SharedTopic):
                 return
             # Before the registration: a subscriber may connect immediately, and a publish() before the answer counts.
             self._registered = True
-            wait = self._session.begin(self._session.node.advertise(self.publication))
+            wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
 
     def leave(self, handle: Publisher[Message]) -> None:
@@ -191,7 +191,7 @@ class PublishedTopic(SharedTopic):
             if not self._session.node or self._session.is_shutdown():
                 return
             # Started before another thread can publish the topic again.
-            wait = self._session.begin(self._session.node.unadvertise(self.publication))
+            wait = self._session.start(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
     @property

@@ -112,7 +112,7 @@ class Service(Generic[_S_co]):
             if not server or not self._session.node or self._session.is_shutdown():
                 return
             # Started before another thread can offer the service again.
-            wait = self._session.begin(self._session.node.unserve(server))
+            wait = self._session.start(self._session.node.unserve(server))
         unregister_from_master(wait)
 
     def spin(self) -> None:
@@ -135,7 +135,7 @@ class Service(Generic[_S_co]):
                 request_type=self.request_class._type,
                 response_type=self.response_class._type,
             )
-            wait = self._session.begin(node.serve(self._server))
+            wait = self._session.start(node.serve(self._server))
         try:
             wait()
         except (MasterUnreachableError, RpcError) as error:

@@ -139,16 +139,16 @@ class Session:
 
     def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
         """Run ``coroutine`` on the node's loop and wait for it. Raises ROSInterruptException at a shutdown."""
-        return self.begin(coroutine)()
+        return self.start(coroutine)()
 
-    def begin(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
+    def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
         """Start ``coroutine`` on the node's loop, under a lock that orders the starts; what is returned waits for it.
 
         Raises as :meth:`run` does.
         """
         assert self._loop is not None
         loop = self._loop
-        wait = self._or_interrupted(lambda: loop.begin(coroutine))
+        wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
     def post(self, function: Callable[..., object], *args: object) -> None:

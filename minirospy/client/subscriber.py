@@ -187,7 +187,7 @@ class SubscribedTopic(SharedTopic):
             if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
             # Started before another thread can subscribe to the topic again.
-            wait = self._session.begin(self._session.node.unsubscribe(self.subscription))
+            wait = self._session.start(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
@@ -232,7 +232,7 @@ class SubscribedTopic(SharedTopic):
                 newest=self._newest(),
                 tcp_nodelay=self._tcp_nodelay,
             )
-            wait = self._session.begin(node.subscribe(self.subscription))
+            wait = self._session.start(node.subscribe(self.subscription))
 
         try:
             if self.resolved_name not in _WITHOUT_STATISTICS:

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import os
 import queue
-import struct
 import sys
 import threading
 import time
 from typing import TYPE_CHECKING, NamedTuple
 
-from minirospy.clock import Clock, SimulatedClock, WallClock
+from minirospy.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
 from minirospy.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.idl.protocols import is_stamped
 from minirospy.introspect.messages import MessageClasses, serialize
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
-_CLOCK = struct.Struct("<II")
 _POLL_SECONDS = 0.1
 _WAITING = 64
 """Messages that may wait for the reader."""
@@ -185,10 +183,8 @@ class ToolNode:
             clock = self.clock = SimulatedClock()
 
             def set_clock(body: Frame, _: Header) -> None:
-                # rosgraph_msgs/Clock is one time: seconds and nanoseconds. Any node may publish something else.
-                if len(body) == _CLOCK.size:
-                    secs, nsecs = _CLOCK.unpack(body)
-                    clock.set(secs * 10**9 + nsecs)
+                if (now := time_of_clock_message(body)) is not None:
+                    clock.set(now)
 
             self.listen("/clock", set_clock)
 

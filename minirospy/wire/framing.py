@@ -27,7 +27,7 @@ __all__ = [
     "LargeFrame",
     "Pieces",
     "SplitFrame",
-    "begins_split",
+    "may_split",
     "parse_length",
     "serialize_frame",
     "split_sizes",
@@ -69,7 +69,7 @@ class LargeFrame(NamedTuple):
     def buffers(self, *, split: bool) -> list[bytes]:
         """Return what goes into the socket, as a split frame where that is requested and this message allows it."""
         first, *others = self.pieces
-        if split and len(others) == 1 and begins_split(first, len(others[0])):
+        if split and len(others) == 1 and may_split(first, len(others[0])):
             return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
         return [_LENGTH.pack(self.size), *self.pieces]
 
@@ -148,7 +148,7 @@ Frame = memoryview | bytes
 """A message's bytes as they are delivered."""
 
 
-def begins_split(head: bytes, tail: int) -> bool:
+def may_split(head: bytes, tail: int) -> bool:
     """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes: there a message may be split."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
@@ -165,11 +165,11 @@ class FrameReader:
 
     A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
     than CHUNK comes in a separate buffer, which is not written again. With ``gathers`` false such a frame is
-    left to the caller instead: :attr:`begun` says what has come of it.
+    left to the caller instead: :attr:`unfinished` has what has come of it.
     """
 
     def __init__(self, limit: int = MAX_FRAME, *, gathers: bool = True) -> None:
-        self.begun: tuple[int, bytes] | None = None
+        self.unfinished: tuple[int, bytes] | None = None
         """The length in front of a large frame, and the bytes that came with it; to be set to None by the caller."""
         self._gathers = gathers
         self._limit = limit
@@ -222,7 +222,7 @@ class FrameReader:
                     if self._gathers:
                         self._begin_large(length, at + 4)
                     else:
-                        self.begun = length, bytes(small[at + 4 : end])
+                        self.unfinished = length, bytes(small[at + 4 : end])
                         self._start = self._end = 0
                     return
                 break

@@ -117,7 +117,7 @@ class HttpReader:
 
     @property
     def is_idle(self) -> bool:
-        """Whether no message has begun."""
+        """Return whether no message has started."""
         return self._head is None and not self._buffer and not self._in_body
 
     @property

@@ -18,7 +18,7 @@ from minirospy.wire.framing import (
     LargeFrame,
     Pieces,
     SplitFrame,
-    begins_split,
+    may_split,
     serialize_frame,
     split_sizes,
 )
@@ -156,10 +156,10 @@ def test_buffers_of_a_large_message() -> None:
         (b"", CHUNK, False),
     ],
 )
-def test_begins_split_where_the_head_ends_with_the_length_of_the_array(
+def test_may_split_where_the_head_ends_with_the_length_of_the_array(
     head: bytes, tail: int, begins: bool
 ) -> None:
-    assert begins_split(head, tail) == begins
+    assert may_split(head, tail) == begins
 
 
 def test_split_sizes_of_a_frame() -> None:
@@ -196,19 +196,19 @@ def test_large_frame_may_be_left_to_the_caller() -> None:
     reader = FrameReader(gathers=False)
     data = serialize_frame(b"small") + struct.pack("<I", 2 * CHUNK) + b"begin"
     assert feed(reader, data, 1 << 20) == [b"small"]
-    assert reader.begun == (2 * CHUNK, b"begin")
-    reader.begun = None
+    assert reader.unfinished == (2 * CHUNK, b"begin")
+    reader.unfinished = None
     assert feed(reader, serialize_frame(b"next"), 3) == [b"next"]
-    assert reader.begun is None
+    assert reader.unfinished is None
 
 
 def test_frame_that_just_fits_is_not_left_to_the_caller() -> None:
     reader = FrameReader(gathers=False)
     body = b"x" * (CHUNK - 4)
     assert feed(reader, serialize_frame(body), 1000) == [body]
-    assert reader.begun is None
+    assert reader.unfinished is None
     feed(reader, serialize_frame(body + b"y"), 1 << 20)
-    assert reader.begun == (CHUNK - 3, body)
+    assert reader.unfinished == (CHUNK - 3, body)
 
 
 def test_bytes_that_are_put_back_come_first() -> None:

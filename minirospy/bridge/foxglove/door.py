@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
@@ -16,6 +15,7 @@ from minirospy.bridge.foxglove.parameters import Parameters
 from minirospy.bridge.foxglove.protocol import Channel, GraphTables, PlaybackControl, PlaybackState
 from minirospy.bridge.foxglove.session import FoxgloveSession
 from minirospy.bridge.graph import Arrival, SharedGraph
+from minirospy.clock import time_of_clock_message
 from minirospy.environment import DISTRO
 from minirospy.introspect.snapshot import Changes
 from minirospy.wire.header import Header
@@ -32,7 +32,6 @@ CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services"
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
-_CLOCK = struct.Struct("<II")
 
 
 class Playback(Protocol):
@@ -214,9 +213,8 @@ class FoxgloveDoor:
             session.send(protocol.advertise_services(self.services.by_id.values()))
 
     def _clock(self, arrival: Arrival) -> None:
-        if len(arrival.body) == _CLOCK.size:
-            seconds, nanoseconds = _CLOCK.unpack(arrival.body)
-            frame = protocol.time_frame(seconds * 1_000_000_000 + nanoseconds)
+        if (now := time_of_clock_message(arrival.body)) is not None:
+            frame = protocol.time_frame(now)
             for session in list(self.sessions):
                 session.send_time(frame)
 

@@ -94,7 +94,7 @@ class Master(MasterApi):
         self._started = time.monotonic()
         self._journal_path = journal
         self._fresh = fresh
-        self._journal: Any = None
+        self._journal: Journal | None = None
         # Large values whose parts were found in the journal.
         self._parts: dict[int, list[bytes]] = {}
         self._same_host = same_host
@@ -412,6 +412,7 @@ class Master(MasterApi):
         self._collecting = asyncio.get_running_loop().call_later(_COLLECT_SECONDS, self._collect)
 
     def _touch(self) -> None:
+        assert self._journal
         self._journal.touch()
         # A graph where nothing changes writes nothing, and would not retry.
         self._journal.retry()

@@ -226,7 +226,7 @@ class Notifier:
             body = serialize_call("paramUpdate", [_MASTER, notice.key, value])
         else:
             body = serialize_call("shutdown", [_MASTER, f"[{notice.name}] Reason: {notice.reason}"])
-        self._rpc.begin(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
+        self._rpc.start(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
 
     def _call_later(
         self, node: _Node, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
@@ -274,7 +274,7 @@ class Notifier:
         size = sum(map(len, body))
         self._large_bytes += size
         done = partial(self._called, node, line, notice, count, size)
-        self._rpc.begin(node.uri, body, self._timeout, done)
+        self._rpc.start(node.uri, body, self._timeout, done)
         self._start_large()
 
     def _called(

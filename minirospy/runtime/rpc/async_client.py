@@ -62,13 +62,13 @@ class AsyncRpcClient:
         Raises RpcUnreachable, RpcFault, or RpcProtocolError.
         """
         answer: asyncio.Future[Body] = asyncio.get_running_loop().create_future()
-        call = self.begin(uri, serialize_call(method, args), timeout, partial(_settle, answer))
+        call = self.start(uri, serialize_call(method, args), timeout, partial(_settle, answer))
         try:
             return parse_response(await answer)
         finally:
             call.cancel()
 
-    def begin(
+    def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
         """Do the same without a coroutine, which costs a master as much as all the rest of a call.

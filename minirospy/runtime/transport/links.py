@@ -36,7 +36,7 @@ from minirospy.wire.framing import (
     FrameReader,
     LargeFrame,
     SplitFrame,
-    begins_split,
+    may_split,
     parse_length,
     split_sizes,
 )
@@ -446,8 +446,8 @@ class _Source:
     def _small(self, count: int) -> Iterator[Frame]:
         reader = self._reader
         yield from reader.received(count)
-        if reader.begun:
-            (length, self._rest), reader.begun = reader.begun, None
+        if reader.unfinished:
+            (length, self._rest), reader.unfinished = reader.unfinished, None
             self._was_large = True
             yield self._large(length)
 
@@ -462,7 +462,7 @@ class _Source:
             head, tail = self._take(head_size), self._take(tail_size)
         except MemoryError:
             raise WireError(f"no memory for a message of {size} bytes") from None
-        if not begins_split(head, tail_size):
+        if not may_split(head, tail_size):
             raise WireError("a split message was not split where its array begins")
         return SplitFrame(head, tail)
 

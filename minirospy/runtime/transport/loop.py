@@ -48,9 +48,9 @@ class LoopThread:
         Raises TimeoutError after ``timeout`` seconds, LoopClosedError where the loop ends before it is done,
         and RuntimeError on the loop's own thread, which would wait for itself.
         """
-        return self.begin(coroutine)(timeout)
+        return self.start(coroutine)(timeout)
 
-    def begin(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
+    def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
         """Start ``coroutine`` as the first half of :meth:`run`, in the order of these calls; return the function that waits."""
         if threading.current_thread() is self._thread:
             coroutine.close()

@@ -32,7 +32,7 @@ class Scene:
         self.publishers: list[str] = []
         self.values: dict[str, object] = {}
         self.notifier = Notifier(self, Turns(), timeout=3.0)  # type: ignore[arg-type]
-        monkeypatch.setattr(self.notifier._rpc, "begin", self.begin)
+        monkeypatch.setattr(self.notifier._rpc, "start", self.start)
 
     def publisher_uris(self, topic: str) -> list[str]:
         return list(self.publishers)
@@ -48,7 +48,7 @@ class Scene:
         """Method and arguments of each call."""
         return [(call.method, call.args) for call in (parse_call(body) for _, body in self.bodies)]
 
-    def begin(
+    def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[bytes | RpcError], None]
     ) -> None:
         assert uri not in self.under_way, "a node is called once at a time"

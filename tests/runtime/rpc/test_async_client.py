@@ -159,7 +159,7 @@ def test_bad_answers(answer: bytes, why: str) -> None:
 def test_a_bad_uri_is_reported_immediately() -> None:
     async def test() -> None:
         client, found = AsyncRpcClient(), list[bytes | RpcError]()
-        client.begin("nonsense", CALL, 1.0, found.append)
+        client.start("nonsense", CALL, 1.0, found.append)
         assert isinstance(found[0], RpcUnreachable)
         await client.close()
 

@@ -22,7 +22,7 @@ def test_a_call_while_the_loop_closes_gets_an_error() -> None:
 
     thread.post(stop)
     assert stopping.wait(30)
-    waits = [thread.begin(asyncio.sleep(0)), thread.begin(asyncio.sleep(60))]
+    waits = [thread.start(asyncio.sleep(0)), thread.start(asyncio.sleep(60))]
     started.set()
     # This one may just come to its end.
     with contextlib.suppress(LoopClosedError):
@@ -41,7 +41,7 @@ def test_calls_start_in_their_order() -> None:
     async def come(number: int) -> None:
         order.append(number)
 
-    waits = [thread.begin(come(number)) for number in range(100)]
+    waits = [thread.start(come(number)) for number in range(100)]
     for wait in reversed(waits):
         wait(10)
     assert order == list(range(100))

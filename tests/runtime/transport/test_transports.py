@@ -350,7 +350,7 @@ def test_large_request_is_not_copied_for_each_partial_send() -> None:
                 beside.listen()
                 client, body = AsyncRpcClient(), bytes(size)
                 tracemalloc.start()
-                call = client.begin(f"http://127.0.0.1:{port}/", body, 5.0, lambda _: None)
+                call = client.start(f"http://127.0.0.1:{port}/", body, 5.0, lambda _: None)
                 peak = tracemalloc.get_traced_memory()[1]
                 tracemalloc.stop()
                 call.cancel()
