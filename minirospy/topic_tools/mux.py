@@ -28,12 +28,11 @@ from topic_tools.srv import (
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.topic_tools.passing import Input, Output, base_name, flag, run_node
+from minirospy.topic_tools.passing import NONE, Input, Output, base_name, flag, run_node
 
 __all__ = ["Mux", "main"]
 
 _USAGE = "\nusage: mux OUT_TOPIC IN_TOPIC1 [IN_TOPIC2 [...]]\n"
-_NONE = "__none"
 
 
 def main() -> int:
@@ -61,9 +60,9 @@ class Mux:
         for source in sources:
             self._input(rospy.resolve_name(source))
         first = str(rospy.get_param("~initial_topic", "") or "") or next(iter(self._inputs))
-        name = rospy.resolve_name(first) if first != _NONE else ""
+        name = rospy.resolve_name(first) if first != NONE else ""
         self._selected = name if name in self._inputs else ""
-        self._selected_topic.publish(String(first if self._selected else _NONE))
+        self._selected_topic.publish(String(first if self._selected else NONE))
         for each in self._inputs.values():
             each.open()
 
@@ -108,7 +107,7 @@ class Mux:
             before = self._selected
             if before and self._is_lazy:
                 self._inputs[before].close()
-            if request.topic == _NONE:
+            if request.topic == NONE:
                 rospy.loginfo("mux selected to no input.")
                 self._selected = ""
             else:
@@ -129,7 +128,7 @@ class Mux:
 
     def _add(self, request: MuxAddRequest) -> MuxAddResponse | None:
         rospy.loginfo("trying to add %s to mux", request.topic)
-        if request.topic == _NONE:
+        if request.topic == NONE:
             rospy.logwarn(
                 "failed to add topic %s to mux, because it's reserved for special use", request.topic
             )

@@ -10,8 +10,10 @@ from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg, SubscribeListener
 from minirospy.errors import ROSInterruptException
 
-__all__ = ["Input", "Output", "base_name", "flag", "run_node"]
+__all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
 
+NONE = "__none"
+"""The name that selects no topic, of mux and demux."""
 _QUEUE_SIZE = 10
 
 
@@ -73,6 +75,12 @@ class Output:
                 self.topic, cls, _Connected(self._on_subscriber), latch=latch, queue_size=_QUEUE_SIZE
             )
         self._on_advertised()
+
+    def close(self) -> None:
+        """Unregister the topic, where it is advertised."""
+        with self._lock:
+            if self._publisher is not None:
+                self._publisher.unregister()
 
     def publish(self, message: AnyMsg) -> None:
         """Publish a message after ``advertise``; one of another type is left out, with a warning."""

@@ -6,12 +6,22 @@ import subprocess
 import sys
 import threading
 
+import rosgraph
 import roslib.message
 import rospy
 import rostopic
 from geometry_msgs.msg import PointStamped
 from std_msgs.msg import String
-from topic_tools.srv import MuxAdd, MuxDelete, MuxList, MuxSelect
+from topic_tools.srv import (
+    DemuxAdd,
+    DemuxDelete,
+    DemuxList,
+    DemuxSelect,
+    MuxAdd,
+    MuxDelete,
+    MuxList,
+    MuxSelect,
+)
 
 FOLDER, *STARTER = sys.argv[1:]
 rospy.init_node("drive", argv=[])
@@ -89,6 +99,43 @@ for latch in (True, False):
             say("relay", heard.next())
         publisher.publish("second")
         say("relay", heard.next("first"), rostopic.get_topic_type(f"/in_{latch}_relay")[0])
+
+master = rosgraph.Master("/drive")
+
+
+def readers(topic):
+    """Return how many nodes subscribe to a topic."""
+    return sum(len(names) for name, names in master.getSystemState()[1] if name == topic)
+
+
+for kind, parameters in (
+    ("lazy", ["_lazy:=true"]),
+    ("unreliable", ["_lazy:=true", "_unreliable:=true"]),
+    ("stealth", ["_stealth:=true", "_monitor_topic:=/watched", "_monitor_rate:=0.2"]),
+):
+    source, target = f"/{kind}", f"/{kind}_relay"
+    with Program("relay", source, target, *parameters):
+        publisher = connected(source, False)
+        publisher.publish("advertises the output")
+        say(kind, "leaves", wait_for(lambda source=source: not readers(source)))
+        heard = Heard(target) if kind != "stealth" else rospy.Subscriber("/watched", String, print)
+        say(kind, "comes back", wait_for(lambda source=source: readers(source)))
+        wait_for(publisher.get_num_connections)
+        publisher.publish("second")
+        if kind != "stealth":
+            say(kind, heard.next()[0])
+            heard.subscriber.unregister()
+        else:
+            heard.unregister()
+        for number in range(3):
+            publisher.publish(str(number))
+        say(
+            kind,
+            "leaves again",
+            wait_for(
+                lambda source=source, publisher=publisher: publisher.publish("x") or not readers(source)
+            ),
+        )
 
 with Program("relay", "points", "/points_out"):
     publisher = connected("points", True, PointStamped)
@@ -199,3 +246,59 @@ with Program("mux", "/chosen", "/left", "/right"):
     third = connected("/third", False)
     third.publish("from the third")
     say("mux", heard.texts(1))
+
+with Program("demux", "/apart", "/one", "/two"):
+    select, add, delete, names = (
+        rospy.ServiceProxy(f"/demux/{name}", cls)
+        for name, cls in (
+            ("select", DemuxSelect),
+            ("add", DemuxAdd),
+            ("delete", DemuxDelete),
+            ("list", DemuxList),
+        )
+    )
+    names.wait_for_service(20)
+    source = connected("/apart", False)
+    heard = {}
+    for topic in ("/one", "/two"):
+        heard[topic] = queue.Queue()
+        rospy.Subscriber(topic, String, heard[topic].put)
+    selected = Heard("/demux/selected")
+    say("demux", selected.texts(1), sorted(names().topics))
+    source.publish("a")
+    message = heard["/one"].get(timeout=20)
+    say("demux", message.data, message._connection_header.get("latching", "0"))
+    for choice in ("two", "/nothing", "__none", "/two"):
+        say("demux select", choice, attempt(select, choice))
+    say("demux", selected.texts(3))
+    source.publish("b")
+    say("demux", heard["/two"].get(timeout=20).data, heard["/one"].qsize())
+    for call in (
+        (add, "third"),
+        (add, "/third"),
+        (add, "__none"),
+        (delete, "/two"),
+        (delete, "/one"),
+        (delete, "/one"),
+    ):
+        say("demux", call[0].resolved_name, call[1], attempt(*call))
+    say("demux", sorted(names().topics))
+
+with Program("mux", "/out", "/a", "/b"):
+    for words in (
+        ("mux_list", "mux"),
+        ("mux_select", "mux", "/b"),
+        ("mux_add", "mux", "/c"),
+        ("mux_delete", "mux", "/a"),
+        ("mux_list", "mux"),
+        ("mux_select", "mux"),
+        ("mux_list",),
+    ):
+        done = subprocess.run(
+            [*STARTER, f"{FOLDER}/{words[0]}", *words[1:]],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        say(words, done.returncode, sorted(done.stdout.split("\n")))

@@ -36,6 +36,9 @@ def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
         (["throttle", "messages"], "throttle messages IN_TOPIC MSGS_PER_SEC"),
         (["drop", "a", "1"], "usage: drop IN_TOPIC X Y [OUT_TOPIC]"),
         (["mux", "a"], "usage: mux OUT_TOPIC IN_TOPIC1"),
+        (["demux", "a"], "usage: demux IN_TOPIC OUT_TOPIC1"),
+        (["mux_select", "mux"], "USAGE: mux_select MUX_NAME TOPIC"),
+        (["demux_list"], "USAGE: demux_list DEMUX_NAME"),
     ],
 )
 def test_wrong_words_are_refused_with_the_usage(words: list[str], text: str) -> None:
@@ -68,6 +71,39 @@ def test_wrong_words_are_refused_with_the_usage(words: list[str], text: str) -> 
 )
 def test_wrong_numbers_are_refused_in_one_line(words: list[str], text: str, master: str) -> None:
     test_wrong_words_are_refused_with_the_usage(words, text)
+
+
+def test_calls_of_a_demux(master: str) -> None:
+    with subprocess.Popen(
+        [sys.executable, str(PROGRAMS / "demux"), "/in", "/one", "/two"], stdout=subprocess.DEVNULL
+    ) as demux:
+        try:
+            printed = [
+                subprocess.run(
+                    [sys.executable, str(PROGRAMS / f"demux_{words[0]}"), "demux", *words[1:]],
+                    capture_output=True,
+                    text=True,
+                    timeout=60,
+                    check=False,
+                )
+                for words in (
+                    ("select", "two"),
+                    ("add", "/three"),
+                    ("delete", "/two"),
+                    ("delete", "/one"),
+                    ("list",),
+                )
+            ]
+        finally:
+            demux.terminate()
+    assert [done.returncode for done in printed] == [0, 0, 1, 0, 0]
+    assert "Service call failed" in printed[2].stdout
+    assert printed[4].stdout.splitlines() == [
+        'Waiting for service "demux/list"',
+        'Listing topics from demux "demux"',
+        "['/two', '/three']",
+    ]
+    assert all("Traceback" not in done.stderr for done in printed)
 
 
 def test_limit_of_messages() -> None:
