@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from minirospy.compat.cv_bridge.encodings import Pixels
 
-__all__ = ["decode", "encode", "opencv"]
+__all__ = ["Options", "decode", "encode", "opencv"]
 
 _FORMATS = {
     **dict.fromkeys(("jpg", "jpeg", "jpe"), "JPEG"),
@@ -21,6 +21,17 @@ _FORMATS = {
 }
 _QUALITY = 95
 """Of JPEG, as OpenCV has it."""
+
+
+class Options(NamedTuple):
+    """How an image is compressed."""
+
+    quality: int = _QUALITY
+    """Of JPEG, from 1 to 100."""
+    progressive: bool = False
+    optimize: bool = False
+    level: int | None = None
+    """Of PNG, from 0 to 9, the smallest file; None for the library's own."""
 
 
 def opencv() -> Any:
@@ -59,14 +70,19 @@ def decode(data: bytes) -> Pixels:
         raise ValueError(f"{len(data)} bytes are not an image that Pillow can read: {error}") from error
 
 
-def encode(image: Pixels, format: str) -> bytes:
+def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
     """Return an image, gray, BGR or BGRA, in a format such as jpg or png. Raises ValueError."""
+    options = options or Options()
     import numpy as np
 
     cv2 = opencv()
     if cv2:
         try:
-            data: bytes = np.asarray(cv2.imencode(f".{format}", image)[1]).tobytes()
+            choices = [cv2.IMWRITE_JPEG_QUALITY, options.quality]
+            choices += [cv2.IMWRITE_JPEG_PROGRESSIVE, int(options.progressive)]
+            choices += [cv2.IMWRITE_JPEG_OPTIMIZE, int(options.optimize)]
+            choices += [] if options.level is None else [cv2.IMWRITE_PNG_COMPRESSION, options.level]
+            data: bytes = np.asarray(cv2.imencode(f".{format}", image, choices)[1]).tobytes()
         except cv2.error as error:
             raise ValueError(str(error)) from error
         return data
@@ -83,8 +99,13 @@ def encode(image: Pixels, format: str) -> bytes:
         image = image[..., :3]
 
     buffer, pillow = BytesIO(), _pillow()
+    keywords: dict[str, int] = {"quality": options.quality}
+    if name == "JPEG":
+        keywords |= {"progressive": int(options.progressive), "optimize": int(options.optimize)}
+    if name == "PNG" and options.level is not None:
+        keywords["compress_level"] = options.level
     try:
-        pillow.fromarray(_swapped(image)).save(buffer, name, quality=_QUALITY)
+        pillow.fromarray(_swapped(image)).save(buffer, name, **keywords)
     except (OSError, ValueError, KeyError) as error:
         raise ValueError(f"the image cannot be {format}: {error}") from error
     return buffer.getvalue()
