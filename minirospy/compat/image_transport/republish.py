@@ -116,8 +116,12 @@ class Republisher:
     def _image(self, message: AnyMsg) -> Image:
         data = message._buff or b""
         if self._kind == "raw":
-            return Image().deserialize(data)
-        return _DECODERS[self._kind](CompressedImage().deserialize(data))
+            image = Image()
+            image.deserialize(data)
+            return image
+        received = CompressedImage()
+        received.deserialize(data)
+        return _DECODERS[self._kind](received)
 
     def _publish(self, kind: str, image: Image) -> None:
         made: Image | CompressedImage = image
