@@ -1,4 +1,4 @@
-"""Whether a shutdown hook runs in the middle of another call: a signal has interrupted that, and it ends after the hook."""
+"""The mark of a shutdown hook that runs in the middle of another call, which a signal has interrupted."""
 
 from __future__ import annotations
 

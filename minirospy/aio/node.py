@@ -195,17 +195,17 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Whether the node has found a master, and is in the graph."""
+        """Return whether the node has found a master, and is in the graph."""
         return self._is_started
 
     @property
     def simulated(self) -> bool:
-        """Whether the node follows /clock."""
+        """Return whether the node follows /clock."""
         return self._simulated is not None
 
     @property
     def is_shutdown(self) -> bool:
-        """Whether the node is about to end, or has ended."""
+        """Return whether the node is about to end, or has ended."""
         return self._stopping.is_set()
 
     async def spin(self) -> None:

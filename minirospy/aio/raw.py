@@ -100,6 +100,7 @@ async def _connect(node: Node, service: str, md5sum: str, *, probe: bool = False
         raise ServiceException(f"service [{service}] unavailable") from None
     except (MasterUnreachableError, RpcError) as error:
         raise ServiceException(f"unable to contact master: {error}") from error
+
     try:
         return await AsyncServiceClient.connect(
             uri,

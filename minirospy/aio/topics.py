@@ -87,7 +87,7 @@ class Subscription(Handle, Generic[_M_co]):
 
     @property
     def num_connections(self) -> int:
-        """How many publishers are connected."""
+        """Return the number of connected publishers."""
         return len(self._state.subscription.links)
 
     async def wait_for_publishers(self, count: int = 1, timeout: float | None = None) -> None:
@@ -187,7 +187,7 @@ class Publisher(Handle, Generic[_M_co]):
 
     @property
     def num_connections(self) -> int:
-        """How many subscribers are connected."""
+        """Return the number of connected subscribers."""
         return len(self._state.publication.links) if self._state else 0
 
     async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:

@@ -211,6 +211,7 @@ class ChunkStream:
         data = b"".join(bodies)
         if len(data) != end:
             raise BagFormatError(f"expecting {end} bytes, read {len(data)}", start)
+
         return data, found
 
     def _start(self) -> Executor:

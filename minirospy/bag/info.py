@@ -47,7 +47,7 @@ class Topic(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """How many of a bag's chunks have a compression; bytes before and after it."""
+    """The number of a bag's chunks of one compression; bytes before and after it."""
 
     compression: str
     chunks: int
@@ -56,7 +56,7 @@ class Stored(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What a bag holds. ``start`` and ``end`` in seconds are None where it has no messages."""
+    """The contents of a bag. ``start`` and ``end`` in seconds are None where it has no messages."""
 
     path: str | None
     version: str

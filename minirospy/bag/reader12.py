@@ -69,6 +69,7 @@ class Reader12(BagReader):
         self._indexes.clear()
         limit = size_of(self.stream)
         position = self.start
+
         while position < limit:
             yield position
             self.stream.seek(position)

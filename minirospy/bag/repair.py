@@ -20,7 +20,7 @@ __all__ = ["Repair"]
 
 
 class _Content(NamedTuple):
-    """What is in a chunk's data; ``end``: bytes of whole records."""
+    """The contents of a chunk's data; ``end``: bytes of whole records."""
 
     connections: dict[int, Connection]
     messages: list[Found]
@@ -80,6 +80,7 @@ class Repair:
             except BagFormatError as error:
                 self._problem(position, error)
                 break
+
         known = [chunk for chunk in self.chunks if chunk.counts.keys() <= self.connections.keys()]
         if len(known) < len(self.chunks):
             self.problems.append(

@@ -109,7 +109,7 @@ class _Complete(NamedTuple):
 
 
 class Continued(NamedTuple):
-    """What the index of a bag holds that is to be continued, and where the index is."""
+    """The index of a bag that is to be continued, and its position."""
 
     connections: Iterable[Connection]
     chunks: Iterable[ChunkInfo]
@@ -169,7 +169,7 @@ class BagWriter:
 
     @property
     def compression(self) -> str:
-        """How chunks are compressed; a change completes the current one. Raise BagCompressionError."""
+        """Return the compression of chunks; a change completes the current one. Raise BagCompressionError."""
         return self._compression
 
     @compression.setter

@@ -61,7 +61,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """What a request says about its sender: the headers Host, Origin, Authorization, the offered sub-protocols, the path."""
+    """A request's statements about its sender: the headers Host, Origin, Authorization, the offered sub-protocols, the path."""
 
     host: str
     origin: str | None
@@ -117,6 +117,7 @@ class Access:
         if grant:
             # A page that knows the token was given it: it needs no other right.
             return grant
+
         if request.token and (self.read_token or self.write_token):
             return Refusal(401, "this token is wrong: the bridge prints the right one when it starts")
         if self.requires_token:

@@ -116,6 +116,7 @@ class Bridge:
                             "held_back": connection.traffic.held_back,
                         }
                     )
+
         return {
             "node": self.node.name,
             "seconds": round(time.monotonic() - self._started, 1),

@@ -77,7 +77,7 @@ class SharedTopic:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether anybody listens."""
+        """Return whether anybody listens."""
         return bool(self._listeners)
 
     def add(self, listener: TopicListener) -> None:
@@ -218,6 +218,7 @@ class SharedGraph:
     async def _watch(self) -> None:
         pause = FASTEST_LOOK
         is_reported = False
+
         while True:
             self._look_soon.clear()
             before = self.snapshot

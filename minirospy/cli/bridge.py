@@ -62,6 +62,7 @@ def _parser() -> Parser:
         metavar="NAME",
         help="a name by which clients reach this machine",
     )
+
     for kind in ("topics", "services", "params"):
         parser.add_argument(
             f"--{kind}",

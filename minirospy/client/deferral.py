@@ -25,7 +25,7 @@ class Deferral:
 
     @property
     def is_active(self) -> bool:
-        """Whether the main thread is inside a critical section."""
+        """Return whether the main thread is inside a critical section."""
         return self._depth > 0
 
     def __enter__(self) -> None:

@@ -129,7 +129,7 @@ class Lifecycle:
 
     @property
     def is_shutdown_requested(self) -> bool:
-        """Whether a shutdown has started: its hooks may still be running."""
+        """Return whether a shutdown has started: its hooks may still be running."""
         return self._claim.locked()
 
     def is_shutdown(self) -> bool:
@@ -140,7 +140,7 @@ class Lifecycle:
 
     @property
     def is_notified(self) -> bool:
-        """Whether the calling thread was notified of the shutdown."""
+        """Return whether the calling thread was notified of the shutdown."""
         return self._this_thread.state.awareness is Awareness.NOTIFIED
 
     def poll_shutdown(self) -> bool:

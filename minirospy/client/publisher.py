@@ -196,7 +196,7 @@ class PublishedTopic(SharedTopic):
 
     @property
     def is_latch(self) -> bool:
-        """Whether a subscriber that connects later gets the last message; may be changed."""
+        """Return whether a subscriber that connects later gets the last message; may be changed."""
         return self.publication.latch
 
     @is_latch.setter

@@ -98,7 +98,7 @@ class Service(Generic[_S_co]):
 
     @property
     def done(self) -> bool:
-        """Whether the service has been shut down."""
+        """Return whether the service has been shut down."""
         return self._ended.is_set()
 
     def shutdown(self, reason: str = "") -> None:

@@ -32,7 +32,7 @@ __all__ = ["Session", "current_session", "replace_session", "replace_session_in_
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
-"""How long the master may take to answer: one of many nodes that start at once on a small computer waits for its turn."""
+"""How long the master may take to answer: one of many nodes that start together on a small computer waits for its turn."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
@@ -89,7 +89,7 @@ class Session:
 
     @property
     def initialized(self) -> bool:
-        """Whether init_node has been called."""
+        """Return whether init_node has been called."""
         return self.node is not None
 
     @property

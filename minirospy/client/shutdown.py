@@ -37,7 +37,7 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """How far a thread of the program has noticed the shutdown."""
+    """The knowledge that a thread of the program has of the shutdown."""
 
     NONE = 0  # it has never called is_shutdown()
     POLLS = 1
@@ -109,5 +109,5 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Whether the main thread needs no exception: it has ended, or does what it does in view of the shutdown."""
+        """Return whether the main thread needs no exception: it has ended, or does what it does in view of the shutdown."""
         return self.main_has_ended or self.main.awareness > Awareness.NONE

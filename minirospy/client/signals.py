@@ -63,7 +63,7 @@ class SignalWatchdog:
 
     @property
     def is_installed(self) -> bool:
-        """Whether the signals shut the node down."""
+        """Return whether the signals shut the node down."""
         return self._sending is not None
 
     def install(self) -> None:

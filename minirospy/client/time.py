@@ -197,7 +197,7 @@ class Timer(threading.Thread):
 
     @property
     def _shutdown(self) -> bool:
-        """Whether it was shut down; programs read it of rospy's, and set it."""
+        """Return whether it was shut down; programs read it of rospy's, and set it."""
         return self._ended.is_set()
 
     @_shutdown.setter

@@ -66,7 +66,7 @@ class Pin(NamedTuple):
 
     @property
     def level(self) -> int:
-        """What reading the pin gives: 0 or 1."""
+        """Return the level that is read at the pin: 0 or 1."""
         if self.function is Function.OUT:
             return self.latch
         if self.world is not None:

@@ -65,7 +65,7 @@ class Place:
 
     @property
     def uses_unix_socket(self) -> bool:
-        """Whether the server listens on ``socket_path``; else on loopback TCP, as ``address_path`` says."""
+        """Return whether the server listens on ``socket_path``; else on loopback TCP, as ``address_path`` says."""
         has_unix = sys.platform != "win32" and hasattr(socket, "AF_UNIX")
         return has_unix and len(os.fsencode(self.socket_path)) <= _SOCKET_PATH_LIMIT
 
@@ -91,7 +91,7 @@ class Place:
 
     @property
     def log_path(self) -> Path:
-        """What a failing server had to say."""
+        """Return the path of the log of a failing server."""
         return self.folder / f"{self.name}.log"
 
 

@@ -1,4 +1,4 @@
-"""What `import RPi.GPIO as GPIO` gives: the API of RPi.GPIO 0.7.1 on the virtual board.
+"""The module of `import RPi.GPIO as GPIO`: the API of RPi.GPIO 0.7.1 on the virtual board.
 
 Names, defaults, error texts and warnings are RPi.GPIO's
 (https://sourceforge.net/p/raspberry-gpio-python/wiki/). The board is reached at the first call that needs it,

@@ -113,7 +113,7 @@ class MasterApi(ABC):
     @property
     @abstractmethod
     def uri(self) -> str:
-        """What ROS_MASTER_URI has to say."""
+        """Return the value for ROS_MASTER_URI."""
 
     @abstractmethod
     def act(self, action: Notice) -> None:
@@ -136,7 +136,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
-        """Return how this master is: minirospy's own, for `minirospy master --status`."""
+        """Return the state of this master: minirospy's own, for `minirospy master --status`."""
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
         """Return the answer to one call, or the steps that lead to it. Raises RpcFault on an unknown method."""

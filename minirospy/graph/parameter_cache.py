@@ -33,7 +33,7 @@ class ParameterCache:
 
     @property
     def changes(self) -> int:
-        """How many changes there were: to be read before the master is asked, and given to :meth:`store`."""
+        """Return the number of changes: to be read before the master is queried, and given to :meth:`store`."""
         return self._changes
 
     def get(self, key: str) -> object:

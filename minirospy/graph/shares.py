@@ -20,7 +20,7 @@ class Excess(Enum):
 
 
 class Shares:
-    """What each holder has of something that is limited: bytes, or entries.
+    """The share of each holder in something that is limited: bytes, or entries.
 
     One holder gets ``largest`` of ``most``. The last ``reserve`` is kept for those that have no more than ``small``,
     so these find room whatever the others hold.

@@ -39,12 +39,12 @@ class _Leaf(NamedTuple):
 
     @property
     def has_length(self) -> bool:
-        """Whether its bytes begin with a length."""
+        """Return whether its bytes begin with a length."""
         return not self.letters and self.type.length is None
 
     @property
     def is_numbers(self) -> bool:
-        """Whether it is an array that ``struct`` packs in one go."""
+        """Return whether it is an array that ``struct`` packs in one go."""
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:

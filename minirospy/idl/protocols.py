@@ -118,7 +118,7 @@ class ActionGoal(Stamped, Protocol):
 
     @property
     def goal(self) -> Message:
-        """What the client wants."""
+        """Return the request of the client."""
 
 
 class ActionResult(Stamped, Protocol):
@@ -126,11 +126,11 @@ class ActionResult(Stamped, Protocol):
 
     @property
     def status(self) -> GoalStatus:
-        """How the goal ended."""
+        """Return the final status of the goal."""
 
     @property
     def result(self) -> Message:
-        """What came of it."""
+        """Return the outcome."""
 
 
 class ActionFeedback(Stamped, Protocol):
@@ -138,11 +138,11 @@ class ActionFeedback(Stamped, Protocol):
 
     @property
     def status(self) -> GoalStatus:
-        """How the goal is."""
+        """Return the status of the goal."""
 
     @property
     def feedback(self) -> Message:
-        """How far it is."""
+        """Return its progress."""
 
 
 class Action(Message, Protocol):

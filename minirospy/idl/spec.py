@@ -41,12 +41,12 @@ class FieldType(NamedTuple):
 
     @property
     def is_primitive(self) -> bool:
-        """Whether the base is one of PRIMITIVES."""
+        """Return whether the base is one of PRIMITIVES."""
         return self.base in PRIMITIVES
 
     @property
     def is_bytes(self) -> bool:
-        """Whether Python holds it as bytes."""
+        """Return whether Python holds it as bytes."""
         return self.is_array and self.base in ("uint8", "char")
 
 
@@ -82,7 +82,7 @@ class MessageSpec(NamedTuple):
 
     @property
     def has_header(self) -> bool:
-        """Whether it starts with a header that publishers fill in."""
+        """Return whether it starts with a header that publishers fill in."""
         return bool(self.fields) and self.fields[0] == Field("header", FieldType("std_msgs/Header"))
 
 

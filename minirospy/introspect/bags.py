@@ -125,6 +125,7 @@ def copy_bag(
         numbers: dict[int, int] = {}
         connections = list(reader.connections.values())
         done = 0
+
         for _, data, found in reader.blocks([each.id for each in connections]):
             for time, rank, _, body, after in found:
                 number = numbers.get(rank)
@@ -161,7 +162,7 @@ class Expression:
 
 
 class FilterResult(NamedTuple):
-    """How many messages were kept, and how many were read."""
+    """The numbers of messages that were kept and read."""
 
     kept: int
     read: int

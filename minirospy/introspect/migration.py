@@ -277,6 +277,7 @@ class MessageMigrator:
                 f"Update rules [{chain.rename.location}] and [{rule.location}] both attempting to rename type "
                 f"[{rule.old_type}]. Ignoring [{rule.location}]"
             )
+
         cycle: list[MessageUpdateRule] = []
         following: MessageUpdateRule | None = rule
         while following:

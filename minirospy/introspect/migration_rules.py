@@ -48,11 +48,11 @@ class _Node(Protocol):
 
     @property
     def rule(self) -> MessageUpdateRule:
-        """What leads from one class to another."""
+        """Return the rule that leads from one class to another."""
 
 
 class Migrator(Protocol):
-    """What a rule needs of :class:`minirospy.introspect.migration.MessageMigrator`."""
+    """The part that a rule needs of :class:`minirospy.introspect.migration.MessageMigrator`."""
 
     rename_map: dict[str, set[str]]
 
@@ -326,6 +326,7 @@ def _rule(
         f"\tmigrated_types = [{pairs}]\n\n\tvalid = {valid}\n\n\tdef update(self, old_msg, new_msg):\n"
         + "".join(f"\t\t{line}\n" for line in body)
     )
+
     members: dict[str, object] = {
         "old_type": old_type,
         "old_full_text": f"\n{old_text}\n",

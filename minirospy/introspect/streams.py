@@ -274,7 +274,7 @@ class TopicPublisher:
 
     @property
     def connections(self) -> int:
-        """How many subscribers are connected."""
+        """Return the number of connected subscribers."""
         return len(self._publication.links)
 
     def wait_for_subscriber(self, wait: Callable[[float], bool], seconds: float) -> None:

@@ -62,7 +62,7 @@ class Process:
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not exited."""
+        """Return whether it has not exited."""
         return self.popen.poll() is None
 
 

@@ -120,7 +120,7 @@ class RemoteMachines:
 
     @property
     def is_running(self) -> bool:
-        """Whether a node of another machine runs."""
+        """Return whether a node of another machine runs."""
         return any(child.running and child.ssh.is_running for child in self._children.values())
 
     def start(self, nodes: Sequence[tuple[NodeSpec, MachineSpec]]) -> None:

@@ -90,7 +90,7 @@ class Supervisor:
 
     @property
     def is_anything_left(self) -> bool:
-        """Whether a process runs, or waits to be started again."""
+        """Return whether a process runs, or waits to be started again."""
         return bool(self.processes) or self.master is not None or self._is_remote_running()
 
     def add(self, process: Process) -> None:

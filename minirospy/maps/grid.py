@@ -44,7 +44,7 @@ class MapError(MinirospyError):
 
 
 class Mode(Enum):
-    """How greys become occupancies."""
+    """The conversion of greys to occupancies."""
 
     TRINARY = "trinary"
     SCALE = "scale"

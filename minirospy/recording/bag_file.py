@@ -23,7 +23,7 @@ _DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
 
 
 class FileWriter(Protocol):
-    """What the writers of bags and of MCAP files have in common."""
+    """The common part of the writers of bags and of MCAP files."""
 
     @property
     def size(self) -> int:
@@ -71,6 +71,7 @@ class BagFile:
         self._active = Path(f"{name}.active")
         self._report = on_error
         self._is_closed = False
+
         self._disk = disk
         self._lock = lock
         self._stream = QueuedFile(disk, self._active, self._failed)

@@ -1,4 +1,4 @@
-"""What `rosbag record` is to do, and how its words are read: sizes, durations, topics.
+"""The options of `rosbag record`, and the parsing of its words: sizes, durations, topics.
 
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 class RecordOptions(NamedTuple):
-    """What to record, and into which files. Sizes are in bytes, times in nanoseconds; 0 means unlimited."""
+    """The topics to record, and the files to write. Sizes are in bytes, times in nanoseconds; 0 means unlimited."""
 
     topics: tuple[str, ...] = ()
     all_topics: bool = False

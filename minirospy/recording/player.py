@@ -43,7 +43,7 @@ _CLOCK = struct.Struct("<II")
 
 
 class _Outlet:
-    """What one publisher of the bag published on a topic: it goes out by the publisher of that topic."""
+    """The messages of one publisher of the bag on a topic: the publisher of that topic sends them."""
 
     def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
         self.publisher = publisher
@@ -162,6 +162,7 @@ class Player:
                 queue_size=self._options.queue_size,
             )
             known = self._publishers[topic] = publisher, late
+
         publisher, late = known
         if publisher.md5sum != connection.md5sum:
             client.logerr(
@@ -225,6 +226,7 @@ class Player:
             if self._ended:
                 self._say("")
                 return
+
             if not self._options.loop:
                 self._say("\nDone.")
                 return

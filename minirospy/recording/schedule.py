@@ -16,7 +16,7 @@ _SECOND = 10**9
 
 
 class PlayOptions(NamedTuple):
-    """How to play. Times in nanoseconds, of the bag where it matters."""
+    """The options of playing. Times in nanoseconds, of the bag where it matters."""
 
     prefix: str = ""
     immediate: bool = False
@@ -42,7 +42,7 @@ class PlayOptions(NamedTuple):
 
 
 class State(enum.Enum):
-    """What a player does."""
+    """The state of a player."""
 
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
@@ -51,7 +51,7 @@ class State(enum.Enum):
 
 
 class Status(NamedTuple):
-    """What the status line shows: the bag's clock, and how far that is of the whole length."""
+    """The contents of the status line: the bag's clock, and how far that is of the whole length."""
 
     state: State
     time: int

@@ -15,7 +15,7 @@ _MOST_EMPTY = 100
 
 
 class Next(enum.Enum):
-    """What to do before a message is recorded."""
+    """The step before a message is recorded."""
 
     CONTINUE = enum.auto()
     SPLIT = enum.auto()

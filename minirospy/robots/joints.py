@@ -107,6 +107,7 @@ class JointStates:
         if name not in dependent:
             # Its limits are missing, which was warned of.
             return Dependent("")
+
         rule = dependent[name]
         chain = [name]
         while rule.parent in dependent:
@@ -262,6 +263,7 @@ def _collada_joints(root: Element, warn: Callable[[str], object]) -> dict[str, F
     models = [each for each in _below(root) if each.tag == "kinematics_model"]
     techniques = [each for model in models[:1] for each in _below(model) if each.tag == "technique_common"]
     found = {}
+
     for element in (joint for technique in techniques[:1] for joint in technique.all("joint")):
         turning = [each for each in _below(element) if each.tag == "revolute"]
         if not turning:

@@ -43,6 +43,7 @@ class Sliders:
         if key in _MOVES:
             self._selected = (self._selected + _MOVES[key]) % len(self._names)
             return False
+
         joint = self._joints[self._names[self._selected]]
         if key in _STEPS:
             self._set(joint, _position(joint) + _STEPS[key] * (joint.upper - joint.lower))

@@ -85,7 +85,7 @@ class TestCaseResult:
 
     @property
     def passed(self) -> bool:
-        """Whether all cases passed."""
+        """Return whether all cases passed."""
         return not self.errors and not self.failures
 
     @property

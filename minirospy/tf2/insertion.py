@@ -1,4 +1,4 @@
-"""What is wrong with a transform, as texts of tf2's, and a log of them that does not flood.
+"""The faults of a transform, as texts of tf2's, and a log of them that does not flood.
 
 The texts are tf2's (noetic's: with the parent), since people search for them.
 """

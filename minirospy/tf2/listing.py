@@ -19,6 +19,7 @@ def frames_as_yaml(buffer: TransformBuffer) -> str:
     """Return parent, broadcaster, rate and times of each frame that has a parent; ``{}`` without any frame."""
     if not buffer.frame_names():
         return "{}"
+
     texts = []
     for frame in buffer.frames():
         cache = frame.cache

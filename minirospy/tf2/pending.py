@@ -208,6 +208,7 @@ def _places(data: bytes) -> list[_Place]:
         raise DeserializationError(error) from error
     if end > len(data):
         raise DeserializationError("the message ends too early")
+
     return places
 
 

@@ -1,4 +1,4 @@
-"""What the programs have in common: messages of any type come in and go out as the bytes that they are."""
+"""The common part of the programs: messages of any type come in and go out as the bytes that they are."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ class Output:
 
     @property
     def is_advertised(self) -> bool:
-        """Whether a message has come."""
+        """Return whether a message has come."""
         return self._publisher is not None
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether a node subscribes to it."""
+        """Return whether a node subscribes to it."""
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:
@@ -106,7 +106,7 @@ class Input:
 
     @property
     def is_open(self) -> bool:
-        """Whether it is subscribed."""
+        """Return whether it is subscribed."""
         return self._subscriber is not None
 
     def open(self) -> None:

@@ -155,6 +155,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
+
         self._output = Output(
             target,
             latch=latch,

@@ -52,6 +52,7 @@ def dot_graph(robot: Robot) -> str:
             edges.append(f'{_quoted(joint.parent)} -> {_quoted(joint.name)} [label="{label}"]')
             edges.append(f"{_quoted(joint.name)} -> {_quoted(link)}")
         waiting += [joint.child for joint in reversed(robot.child_joints(link))]
+
     head = ["digraph G {", "node [shape=box];"]
     return "\n".join([*head, *links, "node [shape=ellipse, color=blue, fontcolor=blue];", *edges, "}"]) + "\n"
 

@@ -190,7 +190,7 @@ class Link:
 
 
 class Problem(NamedTuple):
-    """What ROS's reader reports and reads on; ``trail``: its lines, the cause first."""
+    """A fault that ROS's reader reports before it reads on; ``trail``: its lines, the cause first."""
 
     line: int
     trail: tuple[str, ...]

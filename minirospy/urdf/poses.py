@@ -53,7 +53,7 @@ class Segment:
 
     @property
     def is_moving(self) -> bool:
-        """Whether the pose depends on the joint's position."""
+        """Return whether the pose depends on the joint's position."""
         return self._is_turning or self._is_sliding
 
     def pose(self, position: float = 0.0) -> Pose:

@@ -130,6 +130,7 @@ def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -
             raise UrdfError(
                 file, joint.line, f"{_TREE}: child link [{joint.child}] of joint [{name}] not found"
             )
+
         if joint.parent not in links:
             raise UrdfError(
                 file,

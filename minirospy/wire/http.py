@@ -70,7 +70,7 @@ class HttpMessage(NamedTuple):
 
     @property
     def keep_alive(self) -> bool:
-        """Whether the connection serves another request after this one."""
+        """Return whether the connection serves another request after this one."""
         return self.head.keep_alive
 
     @property
@@ -122,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Whether the present message has a body in chunks, of which many may be in few bytes."""
+        """Return whether the present message has a body in chunks, of which many may be in few bytes."""
         return self._chunked is not None
 
     @property

@@ -117,6 +117,7 @@ def _package_xml(package: NewPackage) -> str:
         "</package>",
         "",
     ]
+
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""What ROS 1 has and minirospy has not: packages and modules of C++ or Qt, and what to do instead. A table.
+"""The parts of ROS 1 that minirospy lacks: packages and modules of C++ or Qt, and what to do instead. A table.
 
 It is consulted where a package, a program or a module is not found: what a workspace or an installation has comes first.
 """

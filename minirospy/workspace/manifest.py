@@ -122,7 +122,7 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """What builds the package: catkin unless it says otherwise."""
+        """Return the build tool of the package: catkin unless it names another."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 

@@ -64,6 +64,7 @@ def _run(file: Path, plan: Plan, folders: list[Path], modules: Path) -> None:
         errors="replace",
         check=False,
     )
+
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if line.strip()]
         places = re.findall(rf'File "{re.escape(str(file))}", line (\d+)', done.stderr)

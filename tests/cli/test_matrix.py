@@ -156,7 +156,7 @@ def scripts() -> dict[str, tuple[str, str]]:
     }
 
 
-class Told(io.StringIO):
+class Recorded(io.StringIO):
     """What a command says; ``on_text`` is called with each text."""
 
     def __init__(self, on_text: Callable[[], object] = lambda: None) -> None:
@@ -173,7 +173,7 @@ def run(line: str, **streams: Any) -> Result:
     words = line.split()
     module, function = scripts()[words[0]]
     main = getattr(importlib.import_module(module), function)
-    put = {"stdin": io.StringIO("d: 1\n"), "stdout": Told(), "stderr": Told(), **streams}
+    put = {"stdin": io.StringIO("d: 1\n"), "stdout": Recorded(), "stderr": Recorded(), **streams}
     before = {name: getattr(sys, name) for name in put}
     for name, stream in put.items():
         setattr(sys, name, stream)
@@ -190,7 +190,7 @@ def run(line: str, **streams: Any) -> Result:
 
     return Result(
         status,
-        *(put[name].getvalue() if isinstance(put[name], Told) else "" for name in ("stdout", "stderr")),
+        *(put[name].getvalue() if isinstance(put[name], Recorded) else "" for name in ("stdout", "stderr")),
     )
 
 
@@ -532,7 +532,7 @@ def _until_ctrl_c(line: str) -> Result:
             timer = threading.Timer(0.05, signal.pthread_kill, (main, signal.SIGINT))
             timer.start()
 
-    return run(line, stdout=Told(interrupt), stderr=Told(interrupt))
+    return run(line, stdout=Recorded(interrupt), stderr=Recorded(interrupt))
 
 
 @posix

@@ -246,7 +246,7 @@ IN_C_CODE = """
 import ctypes, sys, threading
 import rospy
 
-# Stands for zlib.compress() of much data: C code that lets other threads run, and that no signal interrupts. It returns
+# Represents zlib.compress() of much data: C code that lets other threads run, and that no signal interrupts. It returns
 # when another thread has read a line.
 libc = ctypes.CDLL(None)
 mutex = ctypes.create_string_buffer(64)

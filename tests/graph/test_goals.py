@@ -19,7 +19,7 @@ from minirospy.graph.goals import (
     visible_state,
 )
 
-TOLD = [state for state in GoalState if state is not GoalState.LOST]
+REPORTED = [state for state in GoalState if state is not GoalState.LOST]
 
 
 def test_every_event_has_its_row() -> None:
@@ -40,13 +40,13 @@ def test_every_end_can_be_reached_and_from_everywhere_an_end() -> None:
         - reached
     ):
         reached |= more
-    assert reached == set(TOLD)
+    assert reached == set(REPORTED)
     for state in reached - TERMINAL:
         assert any(row.get(state) in TERMINAL for row in SERVER_STEPS.values())
 
 
 def test_a_client_that_heard_nothing_takes_every_status() -> None:
-    for status in TOLD:
+    for status in REPORTED:
         steps = client_steps(ClientState.WAITING_FOR_GOAL_ACK, status)
         assert steps
         if status in TERMINAL:
@@ -70,7 +70,7 @@ def test_a_client_follows_each_step_of_a_server(before: GoalState, event: GoalEv
 
 
 def test_client_waiting_for_a_cancel_accepts_every_status() -> None:
-    assert all(client_steps(ClientState.WAITING_FOR_CANCEL_ACK, status) is not None for status in TOLD)
+    assert all(client_steps(ClientState.WAITING_FOR_CANCEL_ACK, status) is not None for status in REPORTED)
 
 
 def test_what_no_server_tells_is_told_from_what_cannot_follow() -> None:

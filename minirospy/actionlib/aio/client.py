@@ -50,7 +50,7 @@ class ClientGoal(Generic[_R, _F]):
 
     @property
     def done(self) -> bool:
-        """Whether the goal has ended."""
+        """Return whether the goal has ended."""
         return self._ended.done()
 
     def cancel(self) -> None:

@@ -59,7 +59,7 @@ class ServerGoal(Generic[_G, _F]):
 
     @property
     def state(self) -> GoalState:
-        """How far the goal is."""
+        """Return the progress of the goal."""
         return GoalState(self._status.status)
 
     async def publish_feedback(self, *args: object, **kwds: object) -> None:

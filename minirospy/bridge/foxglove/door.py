@@ -72,6 +72,7 @@ class FoxgloveDoor:
         self.channels = Channels()
         self.services = Services()
         self.parameters = Parameters(graph)
+
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
         self._waiting: set[FoxgloveSession] = set()
@@ -104,6 +105,7 @@ class FoxgloveDoor:
         )
         if self.playback:
             client.send_binary(protocol.playback_state(self.playback.state()))
+
         is_first = not self.sessions
         self.sessions.add(session)
         if is_first:
@@ -187,7 +189,7 @@ class FoxgloveDoor:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Offer what is new and withdraw what is no more, until the graph is as it was when this began."""
+        """Offer what is new and withdraw what has disappeared, until the graph is as it was when this started."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, gone_services = self.services.update(self.graph)
@@ -203,6 +205,7 @@ class FoxgloveDoor:
                     session.send(protocol.unadvertise_services(gone_services))
                 if new_services:
                     session.send(protocol.advertise_services(new_services))
+
         self._is_known = True
         while self._waiting:
             self._offer_all(self._waiting.pop())

@@ -97,7 +97,7 @@ class PlaybackCommand(IntEnum):
 
 
 class PlaybackStatus(IntEnum):
-    """What a player does."""
+    """The status of a player."""
 
     PLAYING = 0
     PAUSED = 1
@@ -147,7 +147,7 @@ class GraphTables(NamedTuple):
 
 
 class PlaybackState(NamedTuple):
-    """What a player does, where (nanoseconds) and how fast; ``request_id`` of the request that it answers."""
+    """The status, position (nanoseconds) and speed of a player; ``request_id`` of the request that it answers."""
 
     status: PlaybackStatus
     now: int
@@ -513,6 +513,7 @@ def server_info(
         for key, time in zip(("dataStartTime", "dataEndTime"), data_range, strict=True):
             sec, nsec = divmod(time, 1_000_000_000)
             fields[key] = {"sec": sec, "nsec": nsec}
+
     return _dump(fields)
 
 

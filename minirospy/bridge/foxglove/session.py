@@ -51,6 +51,7 @@ class FoxgloveSession:
         self._calls: set[asyncio.Task[None]] = set()
         self._dropped = 0
         self._are_drops_shown = False
+
         self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
             protocol.Subscribe: self._subscribe,
             protocol.Unsubscribe: self._unsubscribe,

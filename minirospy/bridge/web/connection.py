@@ -55,7 +55,7 @@ _BATCH_PIECES = 128
 
 @dataclass(frozen=True)
 class Limits:
-    """What one client may cost: bytes of a message, messages and bytes a second, seconds without progress, connections."""
+    """The limits of one client: bytes of a message, messages and bytes a second, seconds without progress, connections."""
 
     message: int = 64_000_000
     messages_a_second: int = 20_000
@@ -100,7 +100,7 @@ HttpHandler = Callable[["Exchange"], None]
 
 
 class Site(Protocol):
-    """What a listener serves."""
+    """The contents that a listener serves."""
 
     @property
     def limits(self) -> Limits: ...
@@ -117,7 +117,7 @@ class Site(Protocol):
 
 @dataclass
 class Traffic:
-    """What came from a client, and how often its reading was held back."""
+    """The traffic of a client, and how often its reading was held back."""
 
     received: int = 0
     received_bytes: int = 0
@@ -143,12 +143,12 @@ class WebClient:
 
     @property
     def may_write(self) -> bool:
-        """Whether the client may publish, call services and set parameters."""
+        """Return whether the client may publish, call services and set parameters."""
         return self.grant is Grant.WRITE
 
     @property
     def queue(self) -> SendQueue:
-        """What waits for the client, and the counts."""
+        """Return the frames that wait for the client, and the counts."""
         return self._connection.queue
 
     def send_text(self, text: str) -> None:
@@ -190,7 +190,7 @@ class Exchange:
 
     @property
     def queue(self) -> SendQueue:
-        """What waits for the client, and the counts."""
+        """Return the frames that wait for the client, and the counts."""
         return self._connection.queue
 
     def respond(
@@ -243,6 +243,7 @@ class Connection:
             max_size=site.limits.message,
             logger=_QUIET,
         )
+
         self._door: Door | None = None
         self._fragments: list[bytes] = []
         self._opcode = Opcode.BINARY
@@ -478,6 +479,7 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
+
         while not self._pipe.is_full:
             batch: list[Piece] = []
             size = 0

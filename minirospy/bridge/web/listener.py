@@ -47,6 +47,7 @@ class Listener:
         self.connections: set[Connection] = set()
         self.refused = 0
         """Connections that were refused because there were too many."""
+
         self.host = ""
         self.port = 0
         self._access = access
@@ -58,7 +59,7 @@ class Listener:
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether clients use wss and https."""
+        """Return whether clients use wss and https."""
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
@@ -69,6 +70,7 @@ class Listener:
         except OSError as error:
             hint = " (another bridge may be running: give --port)" if error.errno == errno.EADDRINUSE else ""
             raise BridgeError(f"cannot listen at {host}:{port}: {error.strerror or error}{hint}") from error
+
         sock.setblocking(False)
         sock.listen(128)
         self.host, self.port = host, sock.getsockname()[1]
@@ -130,6 +132,7 @@ class Listener:
                     _log.error("no connection: %s", error)
                     self._rest(listening)
                 return
+
             sock.setblocking(False)
             if len(self.connections) >= self.limits.connections:
                 self.refused += 1

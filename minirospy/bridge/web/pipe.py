@@ -23,7 +23,7 @@ _MOST_PIECES = 128
 
 
 class PipeEvents(Protocol):
-    """What a pipe calls, on the loop."""
+    """The callbacks of a pipe, on the loop."""
 
     def received(self, data: bytes) -> None:
         """Take over bytes."""
@@ -67,7 +67,7 @@ class PlainPipe:
 
     @property
     def is_full(self) -> bool:
-        """Whether something that was written waits for the kernel."""
+        """Return whether something that was written waits for the kernel."""
         return bool(self._rest)
 
     @property
@@ -174,7 +174,7 @@ class TlsPipe(asyncio.Protocol):
 
     @property
     def is_full(self) -> bool:
-        """Whether more waits for the kernel than asyncio's bound."""
+        """Return whether more waits for the kernel than asyncio's bound."""
         return self._is_paused
 
     @property

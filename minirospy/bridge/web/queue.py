@@ -39,7 +39,7 @@ class _Waiting:
 
 
 class SendQueue:
-    """What waits for one client, in the order of arrival."""
+    """The queue of one client, in the order of arrival."""
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
         """``limit``: bytes of messages; a single message may be larger, and then waits alone."""
@@ -65,7 +65,7 @@ class SendQueue:
 
     @property
     def is_overrun(self) -> bool:
-        """Whether more answers wait than a client that reads would leave."""
+        """Return whether more answers wait than a client that reads would leave."""
         return self.answers > MOST_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:

@@ -75,7 +75,7 @@ def _topics_in_order(reader: BagReader) -> list[str]:
 
 
 class EchoOptions(NamedTuple):
-    """How messages of a bag are shown.
+    """The options of showing a bag's messages.
 
     ``make`` returns the Echo of a topic or field; ``keep`` selects messages; at most ``limit`` are printed, each behind
     ``prefix``.

@@ -39,6 +39,7 @@ def _check_parser() -> Parser:
         help="generate a rulefile named RULEFILE",
         completer="files",
     )
+
     parser.add_argument(
         "-a",
         "--append",

@@ -51,6 +51,7 @@ def _parser() -> Parser:
     add("-s", "--start", type=float, default=0.0, metavar="SEC", help="start SEC seconds into the bag files")
     add("-u", "--duration", type=float, default=0.0, metavar="SEC",
         help="play only SEC seconds from the bag files")  # fmt: skip
+
     add("--skip-empty", type=float, default=None, metavar="SEC",
         help="skip regions in the bag with no messages for more than SEC seconds")  # fmt: skip
     add("-l", "--loop", action="store_true", help="loop playback")

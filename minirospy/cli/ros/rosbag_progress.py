@@ -1,4 +1,4 @@
-"""How far a long command of rosbag is: a bar on a terminal, ROS's text on a pipe, nothing when it is to be quiet."""
+"""The progress of a long command of rosbag: a bar on a terminal, ROS's text on a pipe, nothing when it is to be quiet."""
 
 from __future__ import annotations
 

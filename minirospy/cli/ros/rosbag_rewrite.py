@@ -179,6 +179,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
         if source != path:
             os.replace(source, path)
         return False
+
     try:
         write(source, target)
     except BagError as error:

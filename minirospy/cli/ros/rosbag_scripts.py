@@ -88,6 +88,7 @@ def _fix_each(words: list[str], usage: str, verb: str, fix: Callable[[str, str],
     if not words:
         print(usage)
         return 0
+
     for path in words:
         print(f"Trying to {verb}: {path}")
         temporary = f"{path}.tmp"

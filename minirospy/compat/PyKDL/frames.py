@@ -221,6 +221,7 @@ class Rotation:
             return Vector(
                 m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z, m[6] * x + m[7] * y + m[8] * z
             )
+
         if isinstance(other, Rotation):
             n = other._m
             return Rotation(

@@ -150,7 +150,7 @@ class Vector:
 
 
 class Screw:
-    """What Twist and Wrench share: two vectors, of which six numbers are made."""
+    """The common part of Twist and Wrench: two vectors, of which six numbers are made."""
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]

@@ -49,7 +49,7 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
 class CameraInfoError(Exception):
-    """What this module raises."""
+    """An error of this module."""
 
 
 class CameraInfoMissingError(CameraInfoError):

@@ -173,6 +173,7 @@ def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
         raise ValueError(
             f"converting [{source}] to [{wanted}] needs OpenCV: pip install opencv-python-headless"
         )
+
     # OpenCV names a pattern by the pixels of the second row and column.
     patterns = {
         "bayer_rggb": "BayerBG",

@@ -23,7 +23,7 @@ __all__ = [
 
 
 class FrequencyStatusParam:
-    """What FrequencyStatus expects."""
+    """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
         """``freq_bound``: "min" and, where there is one, "max", in Hz; it is read at each run.
@@ -100,7 +100,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """How many seconds a stamp may be older than the time at which it is seen; negative: in the future."""
+    """The seconds that a stamp may be older than the time at which it is seen; negative: in the future."""
 
     def __init__(self, min_acceptable: float = -1, max_acceptable: float = 5) -> None:
         self.max_acceptable = max_acceptable

@@ -46,7 +46,7 @@ class Entry(TypedDict, total=False):
 
 
 class DynamicReconfigureException(Exception):
-    """What goes wrong with dynamic_reconfigure."""
+    """An error of dynamic_reconfigure."""
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):

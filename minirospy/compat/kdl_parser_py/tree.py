@@ -45,7 +45,7 @@ class Segment:
 
     @property
     def is_moving(self) -> bool:
-        """Whether its joint has a position."""
+        """Return whether its joint has a position."""
         return self._segment.is_moving
 
     @property

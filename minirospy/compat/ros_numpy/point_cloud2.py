@@ -47,6 +47,7 @@ def fields_to_dtype(
     for each in ordered:
         if each.datatype not in _DTYPES:
             raise ValueError(f"field {each.name!r} has the unknown datatype {each.datatype}")
+
     formats = [
         np.dtype(_DTYPES[each.datatype]).newbyteorder(">" if is_bigendian else "<") for each in ordered
     ]

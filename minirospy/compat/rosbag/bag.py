@@ -80,7 +80,7 @@ class _Pieces(list[bytes]):
 
 
 class Options(TypedDict, total=False):
-    """How the next chunks are written."""
+    """The options of the next chunks."""
 
     compression: str
     chunk_threshold: int
@@ -156,7 +156,7 @@ class Bag(OpenedBag):
 
     @property
     def mode(self) -> str:
-        """How the bag was opened: r, w or a."""
+        """Return the mode in which the bag was opened: r, w or a."""
         return self._mode
 
     @property
@@ -170,7 +170,7 @@ class Bag(OpenedBag):
 
     @property
     def compression(self) -> str:
-        """How the next chunks are compressed. Raise ValueError."""
+        """Return the compression of the next chunks. Raise ValueError."""
         return self._compression
 
     @compression.setter

@@ -130,7 +130,7 @@ class _IndexEntry:
 
     @property
     def position(self) -> int | tuple[int, int]:
-        """What Bag._read_message takes."""
+        """Return the argument of Bag._read_message."""
         return self.offset if self.chunk_pos is None else (self.chunk_pos, self.offset)
 
     def __eq__(self, other: object) -> bool:

@@ -128,6 +128,7 @@ class Machine:
         self.name = name
         self.address = address
         self.env_loader = env_loader
+
         self.ssh_port = ssh_port
         self.user = user
         self.password = password
@@ -276,6 +277,7 @@ class Test(Node):
             package, node_type, name, namespace, machine_name, args, remap_args=remap_args, env_args=env_args,
             output="log", cwd=cwd, launch_prefix=launch_prefix, filename=filename,
         )  # fmt: skip
+
         self.test_name = test_name
         self.time_limit = float(TEST_TIME_LIMIT_DEFAULT if time_limit is None else time_limit)
         self.retry = retry or 0

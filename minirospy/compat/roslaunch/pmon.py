@@ -43,7 +43,7 @@ __all__ = [
 
 
 class ProcessListener:
-    """Hears of the end of processes."""
+    """Is notified of the exit of processes."""
 
     def process_died(self, process_name: str, exit_code: int) -> None:
         """Handle the exit of a process; called in a thread of roslaunch."""
@@ -109,12 +109,12 @@ class Process:
 
     @property
     def started(self) -> bool:
-        """Whether it was ever started."""
+        """Return whether it was ever started."""
         return self.process is not None
 
     @property
     def stopped(self) -> bool:
-        """Whether its end was requested."""
+        """Return whether its end was requested."""
         return self.process is not None and self.process.is_ending
 
     @property
@@ -139,7 +139,7 @@ class Process:
 
     @property
     def spawn_count(self) -> int:
-        """How often it was started."""
+        """Return the number of its starts."""
         return self.process.starts if self.process else 0
 
     @property
@@ -218,12 +218,12 @@ class ProcessMonitor:
 
     @property
     def done(self) -> bool:
-        """Whether all has ended."""
+        """Return whether all has ended."""
         return self._ended.is_set()
 
     @property
     def is_shutdown(self) -> bool:
-        """Whether a shutdown was requested."""
+        """Return whether a shutdown was requested."""
         return bool(self._launcher.stopped_by)
 
     @property

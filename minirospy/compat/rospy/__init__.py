@@ -1,1 +1,1 @@
-"""What `import rospy` offers in addition to `minirospy.client`: rospy's submodules, which programs reach into."""
+"""The part of `import rospy` besides `minirospy.client`: rospy's submodules, which programs reach into."""

@@ -1,4 +1,4 @@
-"""What rospy's modules have of one another by accident: ROS's import each other's names with a star.
+"""Names that rospy's modules have of one another by accident: ROS's import each other's names with a star.
 
 Programs that say `rospy.core.resolve_name` find it; an editor sees only the names that a module defines.
 """

@@ -93,6 +93,7 @@ def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, 
         return [_to_ros(name, array[1], each, options) for each in value]
     if type_ in ("time", "duration"):
         return _time_of(name, type_, value)
+
     if type_ in _TYPES:
         allowed = _TYPES[type_]
         is_fitting = isinstance(value, allowed) and (bool in allowed or not isinstance(value, bool))

@@ -21,7 +21,7 @@ _SHUTDOWN_CHECK = 0.1
 
 
 class Concurrence(Container):
-    """Executes all of its states at once, and ends when all of them have ended.
+    """Executes all of its states in parallel, and ends when all of them have ended.
 
     Its outcome is what ``outcome_cb`` returns, else the outcome of ``outcome_map`` that most states agree with, else
     ``default_outcome``; "preempted" where the states ended because the container was requested to.

@@ -1,4 +1,4 @@
-"""What all containers have: construction in a ``with`` block, userdata that is copied in and out, callbacks."""
+"""The common part of all containers: construction in a ``with`` block, userdata that is copied in and out, callbacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What smach raises. Each error logs its text when it is made, as in ROS."""
+"""The errors of smach. Each error logs its text when it is made, as in ROS."""
 
 from __future__ import annotations
 

@@ -36,6 +36,7 @@ class Iterator(Container):
         self._items = it
         self._items_label = it_label
         self._exhausted_outcome = exhausted_outcome
+
         self._is_running = False
         self._state_label = ""
         self._state: Any = None
@@ -121,6 +122,7 @@ class Iterator(Container):
                 self._preempt_requested = False
                 return outcome
             self.call_transition_cbs()
+
         return outcome
 
     def _execute_state(self) -> str:

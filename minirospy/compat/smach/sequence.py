@@ -45,5 +45,6 @@ class Sequence(StateMachine):
                 sequence.check_state_spec(last, sequence._states[last], targets)
             except SmachError:
                 logerr("Attempting to construct smach state sequence failed.")
+
         sequence._last_added_seq_label = label
         return sequence._add(label, state, transitions, remapping, constants)

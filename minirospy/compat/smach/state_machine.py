@@ -92,6 +92,7 @@ class StateMachine(Container):
                 f"Attempting to auto-connect states with outcomes {connector_outcomes}, but state '{label}' only has "
                 f"registerd outcomes: {registered}"
             )
+
         machine._last_added_label = label
         machine._connector_outcomes = connector_outcomes
         return state
@@ -244,6 +245,7 @@ class StateMachine(Container):
 
     def _execute_state(self, label: str, state: State) -> str | None:
         self._state_transitioning_lock.release()
+
         try:
             for key, value in self._constants[label].items():
                 self.userdata[key] = value

@@ -98,7 +98,7 @@ class Const:
 
 
 class Remapper:
-    """What a state sees of a container's userdata: the keys that it declared, under its own names.
+    """A state's view of a container's userdata: the keys that it declared, under its own names.
 
     A value of an input key that is not an output key is read-only (``get_const``). Writing a key that is not an output key is
     logged and has no effect; reading one that is not an input key raises InvalidUserCodeError.

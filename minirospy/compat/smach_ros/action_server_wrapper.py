@@ -72,7 +72,7 @@ class ActionServerWrapper:
         )
 
     def run_server(self) -> None:
-        """Start the action server; return at once."""
+        """Start the action server; return immediately."""
         self._action_server.register_preempt_callback(self.preempt_cb)
         self._action_server.start()
         rospy.loginfo(f"Started SMACH action server wrapper, advertising as '{self._server_name}'")

@@ -36,6 +36,7 @@ class StateCallback:
             raise InvalidStateError(
                 f"{what} callback object given to {type(state).__name__} that IS NOT a function object"
             )
+
         self._what = what
         self._callback = callback
         self._args, self._kwargs = args, dict(kwargs or {})

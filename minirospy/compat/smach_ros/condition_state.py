@@ -53,4 +53,5 @@ class ConditionState(State):
                 ) from error
             checks += 1
             rospy.sleep(self._poll_rate)
+
         return "false"

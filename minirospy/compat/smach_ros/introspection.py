@@ -1,4 +1,4 @@
-"""What containers do, on topics: their structure, their status, and where they start the next time.
+"""The work of containers, on topics: their structure, their status, and where they start the next time.
 
 Topics: NAME/smach/container_structure, NAME/smach/container_status, NAME/smach/container_init.
 Source: http://wiki.ros.org/smach/Tutorials/Smach%20Viewer.
@@ -124,6 +124,7 @@ class ContainerProxy:
         self._init_cmd = rospy.Subscriber(
             server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._init_cmd_cb
         )
+
         self._structure_pub: rospy.Publisher[Any] = rospy.Publisher(
             server_name + STRUCTURE_TOPIC, SmachContainerStructure, queue_size=_QUEUE_SIZE
         )

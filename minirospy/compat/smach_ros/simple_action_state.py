@@ -174,6 +174,7 @@ class SimpleActionState(State):
     def _wait_for_result(self) -> bool:
         """Return whether the result has come; cancel the goal where it takes too long."""
         cancelled: rospy.Time | None = None
+
         while not self._done.wait(_LOOK):
             if rospy.is_shutdown():
                 return False

@@ -153,6 +153,7 @@ class Joint(Object):
         self.child = child
         self.type = joint_type
         self.axis = axis
+
         self.origin = origin
         self.limit = limit
         self.dynamics = dynamics

@@ -108,6 +108,7 @@ def _run_tf2(words: Sequence[str]) -> None:
             time = rospy.Time.from_sec(options.time)
         elif options.offset:
             time = rospy.Time.from_sec(max(now.to_sec() + options.offset, 0.0))
+
         try:
             found = buffer.lookup_transform(options.source_frame, options.target_frame, time)
         except LookupException as error:

@@ -39,7 +39,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 class Delays:
-    """What has come of each frame and of each node. Pure: the caller gives the times, in seconds."""
+    """The delays of each frame and of each node. Pure: the caller gives the times, in seconds."""
 
     def __init__(self) -> None:
         self._sender: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""What the programs have in common: their words, their errors, a buffer that listens."""
+"""The common part of the programs: their words, their errors, a buffer that listens."""
 
 from __future__ import annotations
 

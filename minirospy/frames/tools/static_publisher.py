@@ -149,6 +149,7 @@ def _transform_of_parameter(name: str) -> TransformStamped:
         raise ToolError(f"Could not read TF from parameter server: {name}: {error}", level="FATAL") from error
     if not isinstance(value, Mapping):
         raise ToolError(f"Could not read TF from parameter server: {name}", level="FATAL")
+
     try:
         translation, rotation = value["transform"]["translation"], value["transform"]["rotation"]
         place = Vector3(*(float(translation[key]) for key in "xyz"))

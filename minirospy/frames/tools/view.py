@@ -154,6 +154,7 @@ def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
     """Return the frames as text for graphviz, as tf2_tools' view_frames.py writes it."""
     if not records:
         return 'digraph G { "No tf data received" }'
+
     names = {record.name for record in records}
     # The legend hangs on the root that was seen last.
     root = next(

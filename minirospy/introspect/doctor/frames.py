@@ -33,7 +33,7 @@ _SHOWN = 5
 
 @dataclass
 class Observation:
-    """What was seen of one child frame: times in nanoseconds, ``offset`` the newest stamp's distance from its arrival."""
+    """The stamps seen of one child frame: times in nanoseconds, ``offset`` the newest stamp's distance from its arrival."""
 
     child: str
     senders: set[str] = field(default_factory=set)
@@ -211,6 +211,7 @@ def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
             key = sender, seconds < 0
             if abs(seconds) > abs(worst.get(key, (0.0, ""))[0]):
                 worst[key] = (seconds, each.child)
+
     for (sender, _), (seconds, child) in sorted(worst.items()):
         where = f"{sender} stamps its transforms ([{child}])"
         if seconds > 0:

@@ -89,7 +89,7 @@ class MasterPlace(NamedTuple):
 
     @property
     def is_local(self) -> bool:
-        """Whether it is this machine."""
+        """Return whether it is this machine."""
         return is_loopback(self.host) or any(map(is_own_address, self.addresses))
 
     @property

@@ -122,7 +122,7 @@ class Master(MasterApi):
 
     @property
     def uri(self) -> str:
-        """What ROS_MASTER_URI has to say."""
+        """Return the value for ROS_MASTER_URI."""
         return f"http://{self.host}:{self.port}/"
 
     @property
@@ -134,7 +134,7 @@ class Master(MasterApi):
 
     @property
     def omits_topics(self) -> bool:
-        """What /rosout/omit_topics says: whether rosout.log leaves out the topics of nodes."""
+        """Return whether rosout.log leaves out the topics of nodes: the parameter /rosout/omit_topics."""
         key = "/rosout/omit_topics"
         return self.parameters.has(key) and self.parameters.get(key) is True
 
@@ -229,7 +229,7 @@ class Master(MasterApi):
         self.stopped.set()
 
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
-        """How this master is: minirospy's own, for `minirospy master --status`."""
+        """Return the state of this master: minirospy's own, for `minirospy master --status`."""
 
         def collect() -> Steps[Answer]:
             return self._status((yield from self.parameters.names_in_steps()))
@@ -238,6 +238,7 @@ class Master(MasterApi):
 
     def _status(self, parameters: Sized) -> Answer:
         types = self.registry.topic_types()
+
         return [
             1,
             "status",
@@ -472,7 +473,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Whether the node still is where it was; any answer will do, unless it is another node's name."""
+    """Return whether the node still is where it was; any answer will do, unless it is another node's name."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)

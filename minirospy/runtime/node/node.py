@@ -110,7 +110,7 @@ class Node:
 
     @property
     def is_sending(self) -> bool:
-        """Whether a thread is publishing, and holds a lock. From any thread."""
+        """Return whether a thread is publishing, and holds a lock. From any thread."""
         return any(publication.is_sending for publication in list(self.publications.values()))
 
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:

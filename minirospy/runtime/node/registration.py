@@ -32,7 +32,7 @@ __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
 _CALL_SECONDS = 30.0
-"""How long a call of the master may take: one of many nodes that start at once on a small computer waits for its turn."""
+"""How long a call of the master may take: one of many nodes that start together on a small computer waits for its turn."""
 
 _LOOK_SECONDS = 5.0
 """How long the master may take to answer whether it knows this node: it is asked again soon."""
@@ -312,7 +312,7 @@ class Registrations:
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
         """Wait for the last calls of the master, for as long as it answers anything.
 
-        Of many nodes that shut down at once each waits for its turn: a short call, which a busy master answers in between,
+        Of many nodes that shut down together each waits for its turn: a short call, which a busy master answers in between,
         shows that it is alive.
         """
         loop = asyncio.get_running_loop()

@@ -77,6 +77,7 @@ class SlaveApi:
 
     def __init__(self, node: ServedNode) -> None:
         self._node = node
+
         self.dispatcher = Dispatcher(
             {
                 "getBusStats": Method(self.get_bus_stats, []),

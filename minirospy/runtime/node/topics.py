@@ -86,7 +86,7 @@ class Publication:
 
     @property
     def is_sending(self) -> bool:
-        """Whether a thread is publishing, and holds a lock."""
+        """Return whether a thread is publishing, and holds a lock."""
         return self._latch_lock.locked() or any(link.is_sending for link in self.links)
 
     def publish(self, frame: bytes | LargeFrame) -> None:

@@ -66,7 +66,7 @@ class State(Enum):
     """The state of a server's connection to one client."""
 
     OPEN = "it is served"
-    BUSY = "it requested much at once: nothing more is read from it before that is answered"
+    BUSY = "it requested much together: nothing more is read from it before that is answered"
     FULL = "it does not read its answers: nothing is read from it"
     CLOSING = "it ends once it has read its answers"
     REFUSED = "it is heard out, without an answer"

@@ -115,7 +115,7 @@ class RpcServer:
 
     @property
     def clients(self) -> int:
-        """How many clients are connected."""
+        """Return the number of connected clients."""
         return len(self.connections)
 
     def listen(self) -> None:
@@ -195,6 +195,7 @@ class RpcServer:
     def _accept(self, sock: socket.socket, most: int = _ACCEPTS_AT_ONCE) -> None:
         loop = asyncio.get_running_loop()
         start = now = time.perf_counter()
+
         for _ in range(most):
             if now - start >= _ACCEPT_SECONDS:
                 return
@@ -246,7 +247,7 @@ class RpcServer:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= _LARGE:
                 break
-            largest.refuse(503, "too much is being sent at once: try again later")
+            largest.refuse(503, "too much is being sent at the same time: try again later")
         return not connection.is_refused
 
     def limit_unread(self) -> None:
@@ -276,5 +277,5 @@ class RpcServer:
 
 
 def is_address_in_use(error: OSError) -> bool:
-    """Whether listening failed because somebody else listens there."""
+    """Return whether listening failed because somebody else listens there."""
     return error.errno == errno.EADDRINUSE or getattr(error, "winerror", None) == 10048

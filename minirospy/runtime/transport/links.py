@@ -117,12 +117,12 @@ class OutLink:
 
     @property
     def waiting(self) -> int:
-        """How many frames wait for the socket to take them."""
+        """Return the number of frames that wait for the socket to take them."""
         return len(self._outbox)
 
     @property
     def is_sending(self) -> bool:
-        """Whether a thread is inside :meth:`send`: a signal's handler in that very thread would wait for itself."""
+        """Return whether a thread is inside :meth:`send`: a signal's handler in that very thread would wait for itself."""
         return self._lock.locked()
 
     def open(self) -> None:

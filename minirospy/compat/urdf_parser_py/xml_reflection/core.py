@@ -313,6 +313,7 @@ class Object:
         """Write the object into an element. Raises an exception where a required part is None."""
         self.check_valid()
         self.pre_write_xml()
+
         for field in self.FIELDS:
             if isinstance(field, Many):
                 continue
