@@ -12,8 +12,8 @@ from minirospy.workspace.manifest import read_manifest
 
 ROOT = Path(__file__).parents[2] / "minirospy"
 FOLDERS = sorted(path.parent for path in (ROOT / "ros_packages").glob("*/package.xml"))
-# Packages of Python alone, not of ROS.
-NO_PACKAGES = {"PyKDL", "RPi", "ament_index_python", "rospkg"}
+# Packages of Python alone, not of ROS; camera_info_manager is a module of the package camera_info_manager_py.
+NO_PACKAGES = {"PyKDL", "RPi", "ament_index_python", "camera_info_manager", "rospkg"}
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
@@ -25,7 +25,12 @@ def test_each_is_in_order(folder: Path) -> None:
 
 def test_importable_packages_are_found() -> None:
     known = set(rospkg.RosPack().list())
-    overlay = {path.name for path in (ROOT / "overlay").iterdir() if (path / "__init__.py").is_file()}
+    overlay = {
+        path.parent.name
+        for path in (ROOT / "overlay").glob("*/__init__.py")
+        # The import of these raises an error that names what to do.
+        if "minirospy.compat.elsewhere" not in path.read_text(encoding="utf-8")
+    }
     assert overlay - NO_PACKAGES <= known
 
 
