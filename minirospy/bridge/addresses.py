@@ -8,7 +8,7 @@ import socket
 from typing import NamedTuple
 from urllib.parse import quote
 
-__all__ = ["Links", "links", "own_addresses", "qr_code"]
+__all__ = ["Links", "host_names", "links", "own_addresses", "qr_code"]
 
 FOXGLOVE_APP = "https://app.foxglove.dev/~/view"
 LICHTBLICK_APP = "https://lichtblick-suite.github.io/lichtblick/"
@@ -45,6 +45,12 @@ def own_addresses() -> list[str]:
                 found[each.address] = None
     found.pop("0.0.0.0", None)
     return list(found)
+
+
+def host_names() -> list[str]:
+    """Return the names by which other machines may reach this one: its own, and that of multicast DNS."""
+    name = socket.gethostname()
+    return [name, f"{name.partition('.')[0]}.local"]
 
 
 def qr_code(text: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from minirospy.aio.node import Node
 from minirospy.bridge.bridge import Bridge
@@ -25,7 +25,10 @@ def require_libraries() -> None:
 
 
 def run(
-    name: str, argv: Sequence[str], start: Callable[[Node], Bridge], on_started: Callable[[Bridge], None]
+    name: str,
+    argv: Sequence[str],
+    start: Callable[[Node], Awaitable[Bridge]],
+    on_started: Callable[[Bridge], None],
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
@@ -39,7 +42,10 @@ def run(
 
 
 async def _run(
-    name: str, argv: Sequence[str], start: Callable[[Node], Bridge], on_started: Callable[[Bridge], None]
+    name: str,
+    argv: Sequence[str],
+    start: Callable[[Node], Awaitable[Bridge]],
+    on_started: Callable[[Bridge], None],
 ) -> int:
     loop = asyncio.get_running_loop()
     node = Node(name, argv=argv)
@@ -62,7 +68,7 @@ async def _run(
     ticking = asyncio.ensure_future(_tick())
     try:
         async with node:
-            bridge = start(node)
+            bridge = await start(node)
             try:
                 await bridge.start()
                 on_started(bridge)

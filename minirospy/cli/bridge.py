@@ -10,6 +10,7 @@ from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 
 if TYPE_CHECKING:
+    from minirospy.aio.node import Node
     from minirospy.bridge.bridge import Bridge, BridgeOptions
     from minirospy.bridge.tokens import Tokens
 
@@ -44,6 +45,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--read-token", default="", help="the read-only token (default: one that is kept in ROS_HOME)"
     )
+    parser.add_argument("--show-tokens", action="store_true", help="print the tokens that are kept, and exit")
     parser.add_argument("--new-tokens", action="store_true", help="replace the tokens that are kept")
     parser.add_argument(
         "--read-only", action="store_true", help="let nobody publish, call services or set parameters"
@@ -107,6 +109,7 @@ def _bridge(
     address: str,
     token: str,
     read_token: str,
+    show_tokens: bool,
     new_tokens: bool,
     read_only: bool,
     origin: Sequence[str],
@@ -133,6 +136,10 @@ def _bridge(
         from minirospy.cli.bridge_status import show_status
 
         return show_status(port, token, as_json=json)
+    if show_tokens:
+        kept = _tokens("", "", beyond=True, renews=new_tokens)
+        print(f"read-write: {kept.write}\nread-only: {kept.read}")
+        return 0
     if json:
         raise Misuse("--json is for --status")
     _check_range("buffer", buffer, 1, 1 << 40)
@@ -140,6 +147,7 @@ def _bridge(
     require_libraries()
 
     from minirospy.bridge.access import Access, NameFilter, is_loopback
+    from minirospy.bridge.addresses import host_names
     from minirospy.bridge.bridge import Bridge, BridgeOptions
     from minirospy.bridge.foxglove.door import CAPABILITIES
     from minirospy.bridge.graph import Filters
@@ -155,7 +163,7 @@ def _bridge(
         address=address,
         foxglove_port=port,
         access=Access(
-            hosts=(*host_name, *_own_names()),
+            hosts=(*host_name, *host_names()),
             origins=tuple(origin),
             read_token=tokens.read,
             write_token="" if read_only else tokens.write,
@@ -173,9 +181,11 @@ def _bridge(
         certificate=cert,
         key=key,
     )
-    return run(
-        name, (), lambda node: Bridge(node, options), lambda bridge: _announce(bridge, options, tokens)
-    )
+
+    async def start(node: Node) -> Bridge:
+        return Bridge(node, options)
+
+    return run(name, (), start, lambda bridge: _announce(bridge, options, tokens))
 
 
 def _check_range(name: str, value: int, low: int, high: int) -> None:
@@ -192,13 +202,6 @@ def _tokens(write: str, read: str, *, beyond: bool, renews: bool) -> Tokens:
     if beyond or renews:
         return kept_tokens(Environment.read().home, renews=renews)
     return Tokens("", "")
-
-
-def _own_names() -> list[str]:
-    import socket
-
-    name = socket.gethostname()
-    return [name, f"{name.partition('.')[0]}.local"]
 
 
 def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:

@@ -1,0 +1,100 @@
+"""The queue of a slow client: bounded, oldest of a topic dropped first, the newest always there."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from minirospy.bridge.web.queue import MOST_ANSWERS, SendQueue
+
+
+def drained(queue: SendQueue) -> list[bytes]:
+    found = []
+    while (pieces := queue.pop()) is not None:
+        found.append(b"".join(pieces))
+    return found
+
+
+def test_messages_leave_in_the_order_of_arrival() -> None:
+    queue = SendQueue()
+    queue.put("a", (b"1", b"2"))
+    queue.put_answer((b"answer",))
+    queue.put("b", (b"3",))
+    assert drained(queue) == [b"12", b"answer", b"3"]
+    assert (queue.sent, queue.sent_bytes, queue.size, queue.answers) == (2, 3, 0, 0)
+
+
+def test_full_queue_drops_the_oldest_of_the_same_topic() -> None:
+    queue = SendQueue(limit=10)
+    queue.put("small", (b"s",))
+    for number in range(5):
+        queue.put("image", (b"%d..." % number,))
+    assert drained(queue) == [b"s", b"3...", b"4..."]
+    assert queue.dropped == 3
+    assert queue.dropped_of == {"image": 3}
+
+
+def test_new_topic_displaces_the_one_that_holds_most() -> None:
+    queue = SendQueue(limit=10)
+    queue.put("image", (b"11111",))
+    queue.put("small", (b"s",))
+    queue.put("image", (b"2222",))
+    queue.put("other", (b"o",))
+    assert drained(queue) == [b"s", b"2222", b"o"]
+
+
+def test_message_larger_than_the_bound_waits_alone() -> None:
+    queue = SendQueue(limit=10)
+    queue.put("small", (b"s",))
+    queue.put("cloud", (bytes(50),))
+    queue.put("cloud", (bytes(60),))
+    assert drained(queue) == [bytes(60)]
+
+
+def test_only_the_newest_of_a_topic_waits_where_that_is_wanted() -> None:
+    queue = SendQueue()
+    for number in range(4):
+        queue.put("time", (b"%d" % number,), newest_only=True)
+    assert drained(queue) == [b"3"]
+
+
+def test_discarded_topic_leaves_nothing_behind() -> None:
+    queue = SendQueue(limit=10)
+    for _ in range(4):
+        queue.put("a", (b"aaaa",))
+    queue.put("b", (b"b",))
+    queue.discard("a")
+    assert queue.size == 1
+    assert not queue.dropped_of
+    assert drained(queue) == [b"b"]
+
+
+def test_answers_are_kept_and_their_overrun_is_visible() -> None:
+    queue = SendQueue(limit=10)
+    piece = bytes(1_000_000)
+    while not queue.is_overrun:
+        queue.put_answer((piece,))
+    assert queue.answers == MOST_ANSWERS + len(piece)
+    assert queue.dropped == 0
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(1, 12)) | st.none()), st.integers(5, 30))
+def test_bound_holds_and_counts_add_up(steps: list[tuple[str, int] | None], limit: int) -> None:
+    queue = SendQueue(limit)
+    put = popped = 0
+    newest: dict[str, int] = {}
+    for number, step in enumerate(steps):
+        if step is None:
+            popped += queue.pop() is not None
+            continue
+        key, size = step
+        queue.put(key, (bytes([number % 256]) * size,))
+        newest[key] = number % 256
+        put += 1
+        assert queue.size <= max(limit, size)
+        waiting = [pieces for each, pieces, _ in queue._entries.values() if each == key]
+        assert waiting[-1][0][0] == newest[key], "the newest is not dropped"
+    assert put == popped + queue.dropped + len(queue)
+    drained(queue)
+    assert queue.size == 0
+    assert not queue._waiting
