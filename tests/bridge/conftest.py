@@ -30,7 +30,11 @@ class Running:
         self._parts = parts
         self._nodes: list[Node] = []
         self._clients: list[Client] = []
-        self.bridge: Bridge = self.run(self._start())
+        try:
+            self.bridge: Bridge = self.run(self._start())
+        except BaseException:
+            self._loop.close()
+            raise
 
     @property
     def port(self) -> int:
@@ -76,9 +80,14 @@ class Running:
     async def _start(self) -> Bridge:
         node = Node("bridge", rosout=False)
         await node.start()
-        self._nodes.append(node)
         bridge = Bridge(node, self._options, **self._parts)
-        await bridge.start()
+        try:
+            await bridge.start()
+        except BaseException:
+            await bridge.close()
+            await node.close()
+            raise
+        self._nodes.append(node)
         return bridge
 
     async def _close(self) -> None:
@@ -97,13 +106,14 @@ class Client:
         port: int,
         *,
         path: str = "/",
-        subprotocols: tuple[Subprotocol, ...] = (FOXGLOVE,),
+        scheme: str = "ws",
+        subprotocols: tuple[Subprotocol, ...] | None = (FOXGLOVE,),
         **options: Any,
     ) -> None:
         options.setdefault("max_size", None)
         self._stack = contextlib.ExitStack()
         opening = connect(
-            f"ws://127.0.0.1:{port}{path}", subprotocols=subprotocols, compression=None, **options
+            f"{scheme}://127.0.0.1:{port}{path}", subprotocols=subprotocols, compression=None, **options
         )
         self.socket: ClientConnection = self._stack.enter_context(opening)
         self.channels: dict[str, dict[str, Any]] = {}

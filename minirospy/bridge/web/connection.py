@@ -9,11 +9,11 @@ from __future__ import annotations
 import asyncio
 import http
 import logging
-import struct
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections import deque
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from websockets.exceptions import NegotiationError
@@ -23,7 +23,19 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from minirospy.bridge.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
-from minirospy.bridge.web.queue import DEFAULT_LIMIT, Piece, SendQueue
+from minirospy.bridge.web.client import (
+    PLAIN_HEADERS,
+    Door,
+    Exchange,
+    HttpHandler,
+    HttpRequest,
+    Limits,
+    Session,
+    Site,
+    WebClient,
+    response_head,
+)
+from minirospy.bridge.web.queue import Piece, SendQueue
 from minirospy.escape import escaped
 
 if TYPE_CHECKING:
@@ -45,74 +57,9 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-_HEAD_16 = struct.Struct("!BBH")
-_HEAD_64 = struct.Struct("!BBQ")
-_TEXT = 0x81
-_BINARY = 0x82
+_HEAD_END = b"\r\n\r\n"
 _BATCH_BYTES = 256 * 1024
 _BATCH_PIECES = 128
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The limits of one client: bytes of a message, messages and bytes a second, seconds without progress, connections."""
-
-    message: int = 64_000_000
-    messages_a_second: int = 20_000
-    queue: int = DEFAULT_LIMIT
-    connections: int = 256
-    handshake_seconds: float = 10.0
-    ping_seconds: float = 20.0
-    silent_seconds: float = 60.0
-    """A client that answers no ping, or takes no byte, for this long is disconnected."""
-
-
-class HttpRequest(NamedTuple):
-    """A request; names of headers are in lower case."""
-
-    path: str
-    query: Mapping[str, str]
-    headers: Mapping[str, str]
-    peer: str
-
-
-class Session(Protocol):
-    """A client of a protocol. Called on the loop; what it raises ends the connection."""
-
-    def received_text(self, text: str) -> None: ...
-
-    def received_binary(self, data: bytes) -> None: ...
-
-    def ended(self) -> None: ...
-
-
-class Door(Protocol):
-    """A protocol over WebSocket."""
-
-    def select(self, offered: Sequence[str]) -> str | None:
-        """Return the sub-protocol to use, None for none. Raise LookupError with the reason for a refusal."""
-
-    def open(self, client: WebClient) -> Session: ...
-
-
-HttpHandler = Callable[["Exchange"], None]
-"""Answers a request now, or later, by the methods of the exchange."""
-
-
-class Site(Protocol):
-    """The contents that a listener serves."""
-
-    @property
-    def limits(self) -> Limits: ...
-
-    @property
-    def doors(self) -> Sequence[Door]: ...
-
-    def check(self, credentials: Credentials) -> Grant | Refusal: ...
-
-    def page(self, path: str) -> HttpHandler | None: ...
-
-    def left(self, connection: Connection) -> None: ...
 
 
 @dataclass
@@ -123,106 +70,6 @@ class Traffic:
     received_bytes: int = 0
     held_back: int = 0
     since: float = field(default_factory=time.monotonic)
-
-
-class WebClient:
-    """One WebSocket client, for the session of its protocol."""
-
-    def __init__(
-        self, connection: Connection, request: HttpRequest, grant: Grant, subprotocol: str | None
-    ) -> None:
-        self.request = request
-        self.grant = grant
-        self.subprotocol = subprotocol
-        self._connection = connection
-
-    @property
-    def name(self) -> str:
-        """Return the client's address, for people."""
-        return self.request.peer
-
-    @property
-    def may_write(self) -> bool:
-        """Return whether the client may publish, call services and set parameters."""
-        return self.grant is Grant.WRITE
-
-    @property
-    def queue(self) -> SendQueue:
-        """Return the frames that wait for the client, and the counts."""
-        return self._connection.queue
-
-    def send_text(self, text: str) -> None:
-        """Send an answer as text; it is never dropped."""
-        data = text.encode()
-        self._connection.answer((frame_head(_TEXT, len(data)), data))
-
-    def send_binary(self, *pieces: Piece) -> None:
-        """Send an answer as one binary message; it is never dropped."""
-        self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
-
-    def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
-        """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
-        front = frame_head(_BINARY, len(head) + len(payload)) + head
-        self._connection.stream(key, (front, payload), newest_only=newest_only)
-
-    def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
-        """Do the same as a text message; ``text`` is UTF-8."""
-        self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
-
-    def discard(self, key: Hashable) -> None:
-        """Drop what waits under a key."""
-        self._connection.queue.discard(key)
-
-    def close(self, code: int = CloseCode.NORMAL_CLOSURE, reason: str = "") -> None:
-        """End the connection after what waits; ``reason`` is cut to 123 bytes."""
-        self._connection.close_websocket(code, reason)
-
-
-class Exchange:
-    """One HTTP request and its answer."""
-
-    def __init__(self, connection: Connection, request: HttpRequest, grant: Grant) -> None:
-        self.request = request
-        self.grant = grant
-        self.on_end: Callable[[], None] = lambda: None
-        """Called when the client has disconnected."""
-        self._connection = connection
-
-    @property
-    def queue(self) -> SendQueue:
-        """Return the frames that wait for the client, and the counts."""
-        return self._connection.queue
-
-    def respond(
-        self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
-    ) -> None:
-        """Answer, and close the connection."""
-        head = _response_head(status, {**_PLAIN_HEADERS, "Content-Type": content_type,
-                                       "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
-        self._connection.answer((head, body))
-        self._connection.close_when_sent()
-
-    def start(self, status: int, content_type: str, **headers: str) -> None:
-        """Start an answer whose parts follow, until :meth:`end`."""
-        self._connection.answer(
-            (_response_head(status, {**_PLAIN_HEADERS, "Content-Type": content_type, **_dashed(headers)}),)
-        )
-
-    def send(self, key: Hashable, *pieces: Piece, newest_only: bool = True) -> None:
-        """Send a part; older ones of ``key`` give way where the client is slow."""
-        self._connection.stream(key, pieces, newest_only=newest_only)
-
-    def end(self) -> None:
-        """End the answer after what waits."""
-        self._connection.close_when_sent()
-
-
-_PLAIN_HEADERS = {
-    "Connection": "close",
-    "Cache-Control": "no-store",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-}
 
 
 class Connection:
@@ -243,16 +90,18 @@ class Connection:
             max_size=site.limits.message,
             logger=_QUIET,
         )
-
         self._door: Door | None = None
         self._fragments: list[bytes] = []
+        self._frames: deque[Frame] = deque()
+        self._head_end = b""
+        self._is_head_read = False
+        self._is_waiting = False
         self._opcode = Opcode.BINARY
         self._is_scheduled = False
         self._is_closing = False
         self._is_over = False
         self._second = 0.0
         self._in_second = 0
-        self._sent_mark = (0, 0)
         self._heard = loop.time()
         self._progressed = loop.time()
         self._timer = loop.call_later(site.limits.handshake_seconds, self._handshake_late)
@@ -266,8 +115,23 @@ class Connection:
             return
         self._heard = self._loop.time()
         self.traffic.received_bytes += len(data)
-        self._protocol.receive_data(data)
-        self._handle_events()
+        if self.exchange:
+            return  # one request a connection
+        if self._is_head_read:
+            self._parse(data)
+            return
+        # What follows the request is parsed once the request is accepted.
+        joined = self._head_end + data
+        end = joined.find(_HEAD_END)
+        if end < 0:
+            self._head_end = joined[-3:]
+            self._parse(data)
+            return
+        self._is_head_read = True
+        cut = end + len(_HEAD_END) - len(self._head_end)
+        self._parse(data[:cut])
+        if data[cut:] and self.client and not self._is_closing:
+            self._parse(data[cut:])
 
     def writable(self) -> None:
         """Send more."""
@@ -329,17 +193,27 @@ class Connection:
 
     # --- within
 
-    def _handle_events(self) -> None:
+    def _parse(self, data: bytes) -> None:
+        self._protocol.receive_data(data)
         for event in self._protocol.events_received():
             if isinstance(event, Request):
                 self._requested(event)
+                if self._is_closing or self.exchange:
+                    return
             elif isinstance(event, Frame):
-                self._framed(event)
-            if self._is_closing:
-                return
+                self._frames.append(event)
         if self._protocol.handshake_exc and self.client is None:
-            self._refuse(Refusal(400, f"not a request for this server: {self._protocol.handshake_exc}"))
+            why = self._protocol.handshake_exc.__cause__ or self._protocol.handshake_exc
+            self._refuse(Refusal(400, f"not a request for this server: {escaped(str(why))[:200]}"))
             return
+        self._handle_frames()
+
+    def _handle_frames(self) -> None:
+        """Handle what was received, as much of it as the client may send in a second."""
+        while self._frames and not self._is_closing:
+            if self._is_held_back():
+                return
+            self._framed(self._frames.popleft())
         self._answer_protocol()
         if self._protocol.state in (State.CLOSING, State.CLOSED) and self.client:
             self.close_when_sent()
@@ -356,7 +230,7 @@ class Connection:
             headers.get("host", ""),
             headers.get("origin"),
             headers.get("authorization", ""),
-            _items(headers, "sec-websocket-protocol"),
+            header_items(headers, "sec-websocket-protocol"),
             request.path,
         )
         grant = self._site.check(credentials)
@@ -415,10 +289,10 @@ class Connection:
         extra = {"WWW-Authenticate": "Bearer"} if refusal.status == 401 else {}
         self.answer(
             (
-                _response_head(
+                response_head(
                     refusal.status,
                     {
-                        **_PLAIN_HEADERS,
+                        **PLAIN_HEADERS,
                         "Content-Type": "text/plain; charset=utf-8",
                         "Content-Length": str(len(body)),
                         **extra,
@@ -446,7 +320,7 @@ class Connection:
     def _delivered(self, data: bytes) -> None:
         assert self.session
         self.traffic.received += 1
-        self._count_in_second()
+        self._in_second += 1
         try:
             if self._opcode is Opcode.BINARY:
                 self.session.received_binary(data)
@@ -458,16 +332,25 @@ class Connection:
             _log.exception("a message of %s could not be handled", self.peer)
             self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on this message")
 
-    def _count_in_second(self) -> None:
-        """Hold a client back that sends more messages than it may."""
+    def _is_held_back(self) -> bool:
+        """Return whether a client has sent what it may in this second; then it is read again in the next one."""
         now = self._loop.time()
         if now - self._second >= 1.0:
             self._second, self._in_second = now, 0
-        self._in_second += 1
-        if self._in_second == self._limits.messages_a_second:
+        if self._in_second < self._limits.messages_a_second:
+            return False
+        if not self._is_waiting:
+            self._is_waiting = True
             self.traffic.held_back += 1
             self._pipe.pause()
-            self._loop.call_later(self._second + 1.0 - now, self._pipe.resume)
+            self._loop.call_later(self._second + 1.0 - now, self._go_on)
+        return True
+
+    def _go_on(self) -> None:
+        self._is_waiting = False
+        self._handle_frames()
+        if not self._is_waiting and not self._is_over:
+            self._pipe.resume()
 
     def _schedule(self) -> None:
         # What arrives in the same turn of the loop goes out with one call.
@@ -479,7 +362,6 @@ class Connection:
         self._is_scheduled = False
         if self._is_over:
             return
-
         while not self._pipe.is_full:
             batch: list[Piece] = []
             size = 0
@@ -525,29 +407,6 @@ class Connection:
     def _abort(self) -> None:
         self._is_closing = True
         self._pipe.close(flush=False)
-
-
-def frame_head(opcode: int, length: int) -> bytes:
-    """Return the head of a server's frame that is a whole message."""
-    if length < 126:
-        return bytes((opcode, length))
-    if length < 65536:
-        return _HEAD_16.pack(opcode, 126, length)
-    return _HEAD_64.pack(opcode, 127, length)
-
-
-def _response_head(status: int, headers: Mapping[str, str]) -> bytes:
-    lines = [f"HTTP/1.1 {status} {http.HTTPStatus(status).phrase}"]
-    lines += [f"{name}: {value}" for name, value in headers.items()]
-    return ("\r\n".join(lines) + "\r\n\r\n").encode("latin-1", errors="replace")
-
-
-def _dashed(headers: Mapping[str, str]) -> dict[str, str]:
-    return {name.replace("_", "-"): value for name, value in headers.items()}
-
-
-def _items(headers: Mapping[str, str], name: str) -> list[str]:
-    return header_items(headers, name)
 
 
 def _cut(reason: str) -> str:

@@ -1,0 +1,215 @@
+"""What the sessions of a protocol and the handlers of pages send through: one WebSocket client, one HTTP request."""
+
+from __future__ import annotations
+
+import http
+import struct
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from minirospy.bridge.access import Credentials, Grant, Refusal
+from minirospy.bridge.web.queue import DEFAULT_LIMIT, Piece, SendQueue
+
+if TYPE_CHECKING:
+    from minirospy.bridge.web.connection import Connection
+
+__all__ = [
+    "PLAIN_HEADERS",
+    "Door",
+    "Exchange",
+    "HttpHandler",
+    "HttpRequest",
+    "Limits",
+    "Session",
+    "Site",
+    "WebClient",
+    "frame_head",
+    "response_head",
+]
+
+_HEAD_16 = struct.Struct("!BBH")
+_HEAD_64 = struct.Struct("!BBQ")
+_TEXT = 0x81
+_BINARY = 0x82
+
+PLAIN_HEADERS = {
+    "Connection": "close",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
+"""The headers of every answer: what is served changes by the moment, and its path may carry a token."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of one client: bytes of a message, messages and bytes a second, seconds without progress, connections."""
+
+    message: int = 64_000_000
+    messages_a_second: int = 20_000
+    queue: int = DEFAULT_LIMIT
+    connections: int = 256
+    handshake_seconds: float = 10.0
+    ping_seconds: float = 20.0
+    silent_seconds: float = 60.0
+    """A client that answers no ping, or takes no byte, for this long is disconnected."""
+
+
+class HttpRequest(NamedTuple):
+    """A request; names of headers are in lower case."""
+
+    path: str
+    query: Mapping[str, str]
+    headers: Mapping[str, str]
+    peer: str
+
+
+class Session(Protocol):
+    """A client of a protocol. Called on the loop; what it raises ends the connection."""
+
+    def received_text(self, text: str) -> None: ...
+
+    def received_binary(self, data: bytes) -> None: ...
+
+    def ended(self) -> None: ...
+
+
+class Door(Protocol):
+    """A protocol over WebSocket."""
+
+    def select(self, offered: Sequence[str]) -> str | None:
+        """Return the sub-protocol to use, None for none. Raise LookupError with the reason for a refusal."""
+
+    def open(self, client: WebClient) -> Session: ...
+
+
+HttpHandler = Callable[["Exchange"], None]
+"""Answers a request now, or later, by the methods of the exchange."""
+
+
+class Site(Protocol):
+    """The contents that a listener serves."""
+
+    @property
+    def limits(self) -> Limits: ...
+
+    @property
+    def doors(self) -> Sequence[Door]: ...
+
+    def check(self, credentials: Credentials) -> Grant | Refusal: ...
+
+    def page(self, path: str) -> HttpHandler | None: ...
+
+    def left(self, connection: Connection) -> None: ...
+
+
+class WebClient:
+    """One WebSocket client, for the session of its protocol."""
+
+    def __init__(
+        self, connection: Connection, request: HttpRequest, grant: Grant, subprotocol: str | None
+    ) -> None:
+        self.request = request
+        self.grant = grant
+        self.subprotocol = subprotocol
+        self._connection = connection
+
+    @property
+    def name(self) -> str:
+        """Return the client's address, for people."""
+        return self.request.peer
+
+    @property
+    def may_write(self) -> bool:
+        """Return whether the client may publish, call services and set parameters."""
+        return self.grant is Grant.WRITE
+
+    @property
+    def queue(self) -> SendQueue:
+        """Return the frames that wait for the client, and the counts."""
+        return self._connection.queue
+
+    def send_text(self, text: str) -> None:
+        """Send an answer as text; it is never dropped."""
+        data = text.encode()
+        self._connection.answer((frame_head(_TEXT, len(data)), data))
+
+    def send_binary(self, *pieces: Piece) -> None:
+        """Send an answer as one binary message; it is never dropped."""
+        self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
+
+    def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
+        """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
+        front = frame_head(_BINARY, len(head) + len(payload)) + head
+        self._connection.stream(key, (front, payload), newest_only=newest_only)
+
+    def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
+        """Do the same as a text message; ``text`` is UTF-8."""
+        self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
+
+    def discard(self, key: Hashable) -> None:
+        """Drop what waits under a key."""
+        self._connection.queue.discard(key)
+
+    def close(self, code: int = 1000, reason: str = "") -> None:
+        """End the connection after what waits; ``reason`` is cut to 123 bytes."""
+        self._connection.close_websocket(code, reason)
+
+
+class Exchange:
+    """One HTTP request and its answer."""
+
+    def __init__(self, connection: Connection, request: HttpRequest, grant: Grant) -> None:
+        self.request = request
+        self.grant = grant
+        self.on_end: Callable[[], None] = lambda: None
+        """Called when the client has disconnected."""
+        self._connection = connection
+
+    @property
+    def queue(self) -> SendQueue:
+        """Return the frames that wait for the client, and the counts."""
+        return self._connection.queue
+
+    def respond(
+        self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
+    ) -> None:
+        """Answer, and close the connection."""
+        head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
+                                       "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
+        self._connection.answer((head, body))
+        self._connection.close_when_sent()
+
+    def start(self, status: int, content_type: str, **headers: str) -> None:
+        """Start an answer whose parts follow, until :meth:`end`."""
+        self._connection.answer(
+            (response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type, **_dashed(headers)}),)
+        )
+
+    def send(self, key: Hashable, *pieces: Piece, newest_only: bool = True) -> None:
+        """Send a part; older ones of ``key`` give way where the client is slow."""
+        self._connection.stream(key, pieces, newest_only=newest_only)
+
+    def end(self) -> None:
+        """End the answer after what waits."""
+        self._connection.close_when_sent()
+
+
+def frame_head(opcode: int, length: int) -> bytes:
+    """Return the head of a server's frame that is a whole message."""
+    if length < 126:
+        return bytes((opcode, length))
+    if length < 65536:
+        return _HEAD_16.pack(opcode, 126, length)
+    return _HEAD_64.pack(opcode, 127, length)
+
+
+def response_head(status: int, headers: Mapping[str, str]) -> bytes:
+    lines = [f"HTTP/1.1 {status} {http.HTTPStatus(status).phrase}"]
+    lines += [f"{name}: {value}" for name, value in headers.items()]
+    return ("\r\n".join(lines) + "\r\n\r\n").encode("latin-1", errors="replace")
+
+
+def _dashed(headers: Mapping[str, str]) -> dict[str, str]:
+    return {name.replace("_", "-"): value for name, value in headers.items()}

@@ -1,0 +1,330 @@
+"""Connections: refusals, limits, slow clients, HTTP pages, TLS; with real sockets."""
+
+from __future__ import annotations
+
+import json
+import socket
+import ssl
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from http.client import HTTPConnection, HTTPSConnection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from std_msgs.msg import String, UInt8MultiArray
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.frames import Opcode
+from websockets.typing import Subprotocol
+
+from minirospy.bridge.access import Access
+from minirospy.bridge.web.connection import Limits
+from minirospy.errors import BridgeError
+
+if TYPE_CHECKING:
+    from tests.bridge.conftest import Client, Running
+
+HANDSHAKE = (
+    "GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+)
+
+
+def raw_answer(port: int, request: bytes) -> bytes:
+    """Return all that a server answers to these bytes."""
+    with socket.create_connection(("127.0.0.1", port), 30) as sock:
+        sock.sendall(request)
+        answer = b""
+        while more := sock.recv(65536):
+            answer += more
+        return answer
+
+
+def page(port: int, path: str, **headers: str) -> tuple[int, str]:
+    connection = HTTPConnection("127.0.0.1", port, timeout=30)
+    connection.request(
+        "GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()}
+    )
+    answer = connection.getresponse()
+    body = answer.read().decode()
+    connection.close()
+    return answer.status, body
+
+
+def assert_alive(client: Client) -> None:
+    client.send(op="getParameters", parameterNames=["/none"], id="alive")
+    client.next("parameterValues", lambda each: each.get("id") == "alive")
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "text"),
+    [
+        ({"subprotocols": ("x.v1",)}, 400, "foxglove.sdk.v1 or foxglove.websocket.v1 is required"),
+        ({"subprotocols": None}, 400, "is required"),
+        ({"origin": "https://evil.example"}, 403, "pages of 'https://evil.example' may not connect"),
+        ({"additional_headers": {"Host": "evil.example"}}, 403, "Host"),
+    ],
+)
+def test_unwanted_clients_are_refused_with_one_line(
+    bridge: Running, options: dict[str, Any], status: int, text: str
+) -> None:
+    with pytest.raises(InvalidStatus) as caught:
+        bridge.client(**options)
+    response = caught.value.response
+    assert response.status_code == status
+    body = bytes(response.body or b"").decode()
+    assert text in body
+    assert body.count("\n") == 1
+
+
+def test_both_sub_protocols_are_served_and_the_newer_is_preferred(bridge: Running) -> None:
+    for offered, chosen in (
+        (("foxglove.websocket.v1",), "foxglove.websocket.v1"),
+        (("foxglove.sdk.v1",), "foxglove.sdk.v1"),
+        (("x", "foxglove.websocket.v1", "foxglove.sdk.v1"), "foxglove.sdk.v1"),
+    ):
+        client = bridge.client(subprotocols=tuple(map(Subprotocol, offered)))
+        assert client.socket.subprotocol == chosen
+        client.next("serverInfo")
+
+
+def test_wrong_token_is_refused_and_never_logged(
+    run_bridge: Callable[..., Running], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("DEBUG")
+    bridge = run_bridge(access=Access(write_token="right-token-000", requires_token=True))
+    for options in ({}, {"path": "/?token=wrong-token-000"}):
+        with pytest.raises(InvalidStatus) as caught:
+            bridge.client(**options)
+        assert caught.value.response.status_code == 401
+    for options in (
+        {"path": "/?token=right-token-000"},
+        {"additional_headers": {"Authorization": "Bearer right-token-000"}},
+        {"subprotocols": ("foxglove.sdk.v1", "minirospy.token.right-token-000")},
+    ):
+        client = bridge.client(**options)
+        assert client.socket.subprotocol in ("foxglove.sdk.v1", "foxglove.websocket.v1")
+        client.next("serverInfo")
+    ours = [record.getMessage() for record in caplog.records if record.name.startswith("minirospy")]
+    assert any("401" in text for text in ours)
+    assert not [text for text in ours if "token-000" in text]
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        b"nonsense\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\nhi",
+        b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 200 + b"\r\n",
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nBad Header\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\0" * 60 + b"\r\n",
+    ],
+)
+def test_what_is_not_http_gets_a_clear_status(bridge: Running, request_: bytes) -> None:
+    answer = raw_answer(bridge.port, request_)
+    assert answer.startswith((b"HTTP/1.1 4", b"HTTP/1.1 5")), answer[:80]
+    assert_alive(bridge.client())
+
+
+def test_pages_of_the_server(bridge: Running) -> None:
+    assert page(bridge.port, "/") == (404, "there is no such page; WebSocket clients are served here\n")
+    status, body = page(bridge.port, "/status")
+    assert status == 200
+    assert json.loads(body)["node"] == "/bridge"
+    assert page(bridge.port, "/status", Host="evil.example")[0] == 403
+    assert page(bridge.port, "/status", Origin="https://evil.example")[0] == 403
+
+
+def test_oversize_and_broken_frames_end_their_connection_alone(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(message=1000))
+    other = bridge.client()
+    client = bridge.client()
+    client.send_binary(bytes(2000))
+    with pytest.raises(ConnectionClosed) as caught:
+        client.next("never")
+    assert caught.value.rcvd is not None
+    assert caught.value.rcvd.code == 1009
+
+    for frame, code in ((b"\x81\x81\0\0\0\0\xff", 1007), (b"\x83\x80\0\0\0\0", 1002), (b"\x81\x01x", 1002)):
+        answer = raw_answer(bridge.port, HANDSHAKE.encode() + frame)
+        assert code.to_bytes(2, "big") in answer[-40:], (frame, answer[-40:])
+    assert_alive(other)
+
+
+def test_fragments_of_a_message_are_joined(bridge: Running) -> None:
+    client = bridge.client()
+    client.socket.send(
+        part for part in ('{"op": "getPara', 'meters", "parameterNames": [], "id"', ': "joined"}')
+    )
+    assert client.next("parameterValues")["id"] == "joined"
+
+
+def test_pings_are_answered_and_silent_clients_disconnected(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(ping_seconds=0.05, silent_seconds=0.2))
+    client = bridge.client()
+    client.next("serverInfo")
+    client.socket.ping().wait(30)
+
+    with socket.create_connection(("127.0.0.1", bridge.port), 30) as silent:
+        silent.sendall(HANDSHAKE.encode())
+        data = b""
+        while more := silent.recv(65536):  # reads, and answers no ping
+            data += more
+    assert bytes([0x80 | Opcode.PING, 9]) + b"minirospy" in data
+    assert_alive(client)
+
+
+def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(connections=20))
+    first = bridge.client()
+    held = [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(19)]
+    for _ in range(200):
+        answer = raw_answer(bridge.port, b"")
+        assert answer.startswith(b"HTTP/1.1 503 "), answer
+    listener = bridge.bridge.listeners["foxglove"]
+    assert len(listener.connections) == 20
+    assert listener.refused >= 200
+    assert_alive(first)
+    for sock in held:
+        sock.close()
+    while bridge.call(lambda: len(listener.connections)) > 1:
+        time.sleep(0.01)
+    assert_alive(bridge.client())
+
+
+def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(handshake_seconds=0.1))
+    assert raw_answer(bridge.port, b"GET / HTTP/1.1\r\n") == b""
+
+
+def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> None:
+    talker = bridge.node("talker")
+    bridge.publisher(talker, "/t", String)
+    steady = bridge.client()
+    steady.subscribe("/t")
+    for number in range(100):
+        with socket.create_connection(("127.0.0.1", bridge.port), 30) as sock:
+            if number % 2:
+                sock.sendall(HANDSHAKE.encode())
+                assert sock.recv(12) == b"HTTP/1.1 101"
+            if number % 3 == 0:
+                sock.setsockopt(
+                    socket.SOL_SOCKET,
+                    socket.SO_LINGER,
+                    b"\1\0\0\0\0\0\0\0" if sys.platform != "win32" else b"\1\0\0\0",
+                )
+    listener = bridge.bridge.listeners["foxglove"]
+    while bridge.call(lambda: len(listener.connections)) > 1:
+        time.sleep(0.01)
+    assert len(bridge.bridge.foxglove.sessions) == 1
+    assert_alive(steady)
+
+
+def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(messages_a_second=50))
+    client, other = bridge.client(), bridge.client()
+    for number in range(120):
+        client.send(op="getParameters", parameterNames=["/none"], id=str(number))
+    assert_alive(other)
+    answers = [client.next("parameterValues")["id"] for _ in range(120)]
+    assert sorted(answers, key=int) == [str(number) for number in range(120)]
+    (state,) = [each for each in bridge.bridge.status()["clients"] if each["received"] >= 120]  # type: ignore[attr-defined]
+    assert state["held_back"] >= 2
+
+
+def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callable[..., Running]) -> None:
+    limit = 3_000_000
+    bridge = run_bridge(limits=Limits(queue=limit))
+    publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
+    small = bridge.publisher(bridge.node("small"), "/small", String)
+    clients = [bridge.client() for _ in range(9)]
+    # This one subscribes and does not read.
+    stuck = bridge.client(max_queue=1)
+    for client in (*clients, stuck):
+        client.subscribe("/image", 1)
+        client.subscribe("/small", 2)
+    bridge.run(publisher.wait_for_subscribers())
+    bridge.run(small.wait_for_subscribers())
+
+    data = bytes(200_000)
+    for number in range(100):
+        bridge.run(small.publish(str(number)))
+        bridge.run(publisher.publish(data=data))
+        for client in clients:
+            client.next_binary(1)
+            client.next_binary(1)
+        assert all(
+            connection.queue.size <= limit for connection in bridge.bridge.listeners["foxglove"].connections
+        )
+    states = sorted(bridge.bridge.status()["clients"], key=lambda each: each["dropped"])  # type: ignore[call-overload]
+    assert [each["dropped"] for each in states[:9]] == [0] * 9
+    assert states[9]["dropped"] > 0
+
+    # It reads again, and gets the newest of both.
+    last = b""
+    while b"99" not in last[13:]:
+        last = stuck.next_binary(1)
+        if len(last) > 1000:
+            last = b""
+    stuck.next("status", lambda each: "messages dropped, most of /image" in each["message"])
+    stuck.next("removeStatus")
+
+
+def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tmp_path: Path) -> None:
+    certificate, key = make_certificate(tmp_path)
+    bridge = run_bridge(certificate=str(certificate), key=str(key))
+    context = ssl.create_default_context(cafile=str(certificate))
+    bridge.publisher(bridge.node("talker"), "/t", UInt8MultiArray, latch=True)
+    publisher = bridge.publisher(bridge._nodes[-1], "/big", UInt8MultiArray, latch=True)
+    data = bytes(range(256)) * 20_000
+    bridge.run(publisher.publish(data=data))
+    client = bridge.client(scheme="wss", ssl=context)
+    client.subscribe("/big")
+    assert client.next_binary(1).endswith(data)
+    connection = HTTPSConnection("127.0.0.1", bridge.port, timeout=30, context=context)
+    connection.request("GET", "/status")
+    assert connection.getresponse().status == 200
+    connection.close()
+    assert not raw_answer(bridge.port, b"GET / HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 2")
+
+
+def test_faults_at_the_start_are_one_clear_error(run_bridge: Callable[..., Running], tmp_path: Path) -> None:
+    (tmp_path / "bad.pem").write_text("nonsense")
+    with pytest.raises(BridgeError, match=r"the certificate cannot be used: .*bad\.pem"):
+        run_bridge(certificate=str(tmp_path / "bad.pem"))
+    with pytest.raises(BridgeError, match=r"none\.pem: No such file"):
+        run_bridge(certificate=str(tmp_path / "none.pem"))
+    with pytest.raises(BridgeError, match="key is given without its certificate"):
+        run_bridge(key="x")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(BridgeError, match=rf"cannot listen at 127\.0\.0\.1:{port}: .* give --port"):
+            run_bridge(foxglove_port=port)
+
+
+def make_certificate(folder: Path) -> tuple[Path, Path]:
+    """Return a certificate for 127.0.0.1 and its key, made by the program openssl."""
+    certificate, key = folder / "cert.pem", folder / "key.pem"
+    command = [
+        "openssl",
+        "req",
+        "-x509",
+        "-newkey",
+        "rsa:2048",
+        "-nodes",
+        "-days",
+        "2",
+        "-subj",
+        "/CN=localhost",
+    ]
+    command += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
+    try:
+        subprocess.run(command, check=True, capture_output=True)
+    except FileNotFoundError:
+        pytest.skip("openssl is not installed")
+    return certificate, key
