@@ -326,4 +326,6 @@ class SharedGraph:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        # A task that is cancelled before its first step has not started the work.
+        task.add_done_callback(lambda _: work.close())
         return task
