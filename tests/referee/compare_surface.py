@@ -14,9 +14,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import importlib.util
 import inspect
 import json
 import os
+import pkgutil
 import re
 import subprocess
 import sys
@@ -51,8 +53,18 @@ AROUND = [
     "rosservice",
     "rosparam",
     "rosmsg",
+    "rosmaster.exceptions",
+    "rosmaster.master_api",
+    "rosmaster.paramserver",
+    "rosmaster.util",
+    "rosmaster.validators",
+    "roswtf.environment",
+    "roswtf.model",
+    "roswtf.rules",
     "rosclean",
     "roslib",
+    "roslib.gentools",
+    "roslib.srvs",
     "roslib.message",
     "roslib.names",
     "roslib.packages",
@@ -73,7 +85,9 @@ AROUND = [
     "genmsg.msg_loader",
     "genmsg.gentools",
     "catkin.find_in_workspaces",
+    "catkin.terminal_color",
     "rospkg",
+    "rospkg.os_detect",
     "message_filters",
     "sensor_msgs.point_cloud2",
     "angles",
@@ -204,6 +218,22 @@ REASONS = {
         ),
         "the inside of the commands rosmsg and rosmsg-proto",
     ),
+    "compute_md5_v1": "the md5sum before ROS 1.0",
+    **dict.fromkeys(
+        (
+            "Arch",
+            "Conda",
+            "Cygwin",
+            "Funtoo",
+            "Gentoo",
+            "Manjaro",
+            "OpenEmbedded",
+            "OpenSuse",
+            "QNX",
+            "Slackware",
+        ),
+        "FdoDetect recognizes it by os-release",
+    ),
     "cvtColorForDisplay": "for the window of image_view",
     **dict.fromkeys(("LINEDEBUG", "id"), "the generator's inside"),
     "ForkingXMLRPCServer": "a server that forks: not on every system",
@@ -274,6 +304,43 @@ MEMBERS_INSIDE = {
 }
 
 Description = dict[str, dict[str, Any]]
+
+
+PACKAGES = (
+    "rosgraph", "rosnode", "rostopic", "rosservice", "rosparam", "rosmsg", "rosclean", "roslib", "genpy", "genmsg", "catkin",
+    "rospkg", "roslaunch", "rosmaster", "roswtf", "rostest", "rosunit", "rospy", "actionlib", "rosbag", "dynamic_reconfigure",
+    "topic_tools", "message_filters",
+)  # fmt: skip
+"""The packages whose submodules are listed, with the names that start with an underscore."""
+
+
+def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
+    """Return submodule -> its own functions and classes whose names start with an underscore, or all that it has."""
+    found = {}
+    for name in submodules():
+        try:
+            module = importlib.import_module(name)
+        except (AttributeError, ImportError):  # of real ROS: rospy.impl.udpros
+            continue
+        found[name] = sorted(
+            each
+            for each, value in vars(module).items()
+            if each.startswith("_") and not each.startswith("__")
+            and (inspect.isroutine(value) or inspect.isclass(value))
+            and (not_only_own or getattr(value, "__module__", "") == name)
+        )  # fmt: skip
+    return found
+
+
+def submodules() -> list[str]:
+    """Return the importable modules of :data:`PACKAGES`; generated messages left out."""
+    found = []
+    for package in PACKAGES:
+        path = getattr(importlib.import_module(package), "__path__", [])
+        names = [module.name for module in pkgutil.walk_packages(path, f"{package}.", lambda name: None)]
+        found += [package, *names]
+    kept = [name for name in found if not re.search(r"\.(msg|srv|cfg)(\.|$)|__main__", name)]
+    return [name for name in kept if importlib.util.find_spec(name) is not None]
 
 
 def describe() -> Description:
@@ -434,11 +501,66 @@ compared by the programs in `tests/referee/cases`.
 """ + "\n".join(tables)
 
 
-def described_by(python: str) -> Description:
-    done = subprocess.run([python, __file__, "--describe"], capture_output=True, text=True, check=False)
+def submodule_tables(real: dict[str, list[str]], ours: dict[str, list[str]]) -> str:
+    """Return the sections on submodules, and on names that start with an underscore."""
+    lacking = [name for name in real if name not in ours]
+    rows = [f"| `{name}` | {reason_of(name)} |" for name in sorted(lacking)]
+    lines = [
+        "## Submodules",
+        "",
+        f"{len(real) - len(lacking)} of real ROS's {len(real)} submodules can be imported here too. These cannot:",
+        "",
+        "| module | what it is |",
+        "|---|---|",
+        *rows,
+        "",
+        "## Names that start with an underscore",
+        "",
+        "Functions and classes of real ROS's modules that are private by their name; programs use some of them all the same.",
+        "",
+        "| module | here too | not here |",
+        "|---|---|---|",
+    ]
+    for name in sorted(real):
+        if name in ours and real[name]:
+            here = [each for each in real[name] if each in ours[name]]
+            gone = [each for each in real[name] if each not in ours[name]]
+            lines.append(f"| `{name}` | {_code(here)} | {_code(gone)} |")
+    return "\n".join([*lines, ""])
+
+
+def _code(names: list[str]) -> str:
+    return " ".join(f"`{name}`" for name in names)
+
+
+def reason_of(module: str) -> str:
+    """Return why a submodule is not offered."""
+    return next(reason for start, reason in NOT_OFFERED.items() if module.startswith(start))
+
+
+NOT_OFFERED = {
+    "genpy": "genpy's own compiler; ours is minirospy.idl",
+    "genmsg": "the inside of message generators, which CMake runs",
+    "catkin": "what catkin's CMake macros and its release tools run",
+    "roslib": "of rosbuild: use rospkg",
+    "rospkg.rosversion": "the command `rosversion`",
+    "rospkg.stack": "stacks are of rosbuild",
+    "roslaunch": "the inside of roslaunch's processes on other machines",
+    "rosmaster": "rosmaster's tables and threads; ours are minirospy.graph",
+    "roswtf": "roswtf's own checks; ours are `minirospy doctor`",
+    "rostest": "the inside of the command `rostest`",
+    "rosunit": "the inside of the command `rosunit`",
+    "rospy.impl": "rospy's threads and sockets; ours are minirospy.runtime",
+    "": "its command's inside",
+}
+"""Start of a module's name -> what it is."""
+
+
+def described_by(python: str, option: str = "--describe") -> dict[str, Any]:
+    done = subprocess.run([python, __file__, option], capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{python}: {done.stderr.strip()}")
-    description: Description = json.loads(done.stdout)
+    description: dict[str, Any] = json.loads(done.stdout)
     return description
 
 
@@ -452,16 +574,28 @@ def main() -> int:
     parser.add_argument(
         "--describe", action="store_true", help="print what this interpreter's rospy offers, as JSON"
     )
+    parser.add_argument(
+        "--private", action="store_true", help="print this interpreter's private names, as JSON"
+    )
+    parser.add_argument("--all-private", action="store_true", help="print those of other modules as well")
     options = parser.parse_args()
     if options.describe:
         print(json.dumps(describe()))
         return 0
+    if options.private or options.all_private:
+        print(json.dumps(private_names(options.all_private)))
+        return 0
     real, ours = described_by(REAL_PYTHON), described_by(sys.executable)
+    submodule_text = submodule_tables(
+        described_by(REAL_PYTHON, "--private"), described_by(sys.executable, "--all-private")
+    )
     pages = {
         DOCS / "rospy_compatibility.md": page("rospy beside minirospy, name by name", ROSPY, real, ours),
         DOCS / "modules_compatibility.md": page(
             "rosgraph, rosnode, rostopic and their kin beside minirospy, name by name", AROUND, real, ours
-        ),
+        )
+        + "\n"
+        + submodule_text,
         DOCS / "tf_compatibility.md": page(
             "tf2_ros, tf and PyKDL beside minirospy, name by name", FRAMES, real, ours
         ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from minirospy.compat.roslaunch.config import ROSLaunchConfig
@@ -22,7 +22,7 @@ from minirospy.launch.output import Output
 from minirospy.launch.process import Timeouts
 from minirospy.launch.runner import RunOptions
 
-__all__ = ["ROSLaunchRunner", "master_options", "replacement_of"]
+__all__ = ["ROSLaunchRunner", "master_options", "replacement_of", "unify_clear_params"]
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -173,3 +173,13 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
     """
     function: Function = getattr(sys.modules.get(module), name, ours)
     return function
+
+
+def unify_clear_params(params: Iterable[str]) -> list[str]:
+    """Return the namespaces to delete, each with a slash at its end, without those that lie in another."""
+    names = [name if name.endswith("/") else f"{name}/" for name in params]
+    return [
+        name
+        for name in dict.fromkeys(names)
+        if not any(name != other and name.startswith(other) for other in names)
+    ]

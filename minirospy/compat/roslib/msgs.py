@@ -3,10 +3,14 @@
 from minirospy.idl.load import Catalogue
 from minirospy.workspace.packages import Packages
 
-__all__ = ["EXT", "SEP", "list_msg_types"]
+__all__ = ["EXT", "SEP", "MsgSpecException", "list_msg_types"]
 
 EXT = ".msg"
 SEP = "/"
+
+
+class MsgSpecException(Exception):
+    """A definition that cannot be read."""
 
 
 def list_msg_types(package: str, include_depends: bool) -> list[str]:

@@ -2,6 +2,7 @@
 
 from minirospy.compat.roslaunch.core import Machine, Master, Node, Param, RLException, Test
 from minirospy.compat.roslaunch.launch import ROSLaunchRunner
+from minirospy.compat.roslaunch.launch import unify_clear_params as _unify_clear_params
 from minirospy.compat.roslaunch.pmon import ProcessListener, start_process_monitor
 from minirospy.compat.roslaunch.pmon import ProcessListener as ROSLaunchListener
 
@@ -15,5 +16,6 @@ __all__ = [
     "ROSLaunchListener",
     "ROSLaunchRunner",
     "Test",
+    "_unify_clear_params",
     "start_process_monitor",
 ]

@@ -15,9 +15,23 @@ from genmsg.msgs import (
 )
 from genmsg.msgs import bare_msg_type as base_msg_type
 
-from minirospy.compat.roslib.msgs import EXT, SEP, list_msg_types
+from minirospy.compat.roslib.msgs import EXT, SEP, MsgSpecException, list_msg_types
 
 __all__ = [
-    "BUILTIN_TYPES", "DURATION", "EXT", "HEADER", "PRIMITIVE_TYPES", "SEP", "TIME", "base_msg_type", "is_builtin",
-    "is_header_type", "is_valid_constant_type", "is_valid_msg_type", "list_msg_types", "parse_type", "resolve_type",
+    "BUILTIN_TYPES",
+    "DURATION",
+    "EXT",
+    "HEADER",
+    "PRIMITIVE_TYPES",
+    "SEP",
+    "TIME",
+    "MsgSpecException",
+    "base_msg_type",
+    "is_builtin",
+    "is_header_type",
+    "is_valid_constant_type",
+    "is_valid_msg_type",
+    "list_msg_types",
+    "parse_type",
+    "resolve_type",
 ]  # fmt: skip

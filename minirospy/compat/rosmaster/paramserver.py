@@ -1,0 +1,82 @@
+"""rosmaster.paramserver: the tree of parameters.
+
+Keys are global names. A task is called with a list of ([(node, API)], key, value), one for each change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from minirospy.graph.parameters import ParameterTree, ParameterUpdate
+
+__all__ = ["ParamDictionary"]
+
+GLOBALNS = SEP = "/"
+
+Notify = Callable[[list[tuple[list[tuple[str, str]], str, object]]], object]
+
+
+class ParamDictionary:
+    """Parameters and who subscribed to them. ``reg_manager`` is rosmaster's table of nodes, which this one does not need."""
+
+    def __init__(self, reg_manager: object = None) -> None:
+        self._tree = ParameterTree()
+        self._nodes: dict[str, str] = {}
+
+    def get_param_names(self) -> list[str]:
+        """Return the names of all parameters."""
+        return self._tree.names()
+
+    def search_param(self, ns: str, key: str) -> str | None:
+        """Return the nearest parameter upwards from a namespace. Raise ValueError where that is not global."""
+        if not ns or ns[0] != "/":
+            raise ValueError("namespace must be global")
+        return self._tree.search(ns, key)
+
+    def get_param(self, key: str) -> object:
+        """Return a value, or the dictionary of a namespace. Raise KeyError."""
+        return self._tree.get(key)
+
+    def has_param(self, key: str) -> bool:
+        """Return whether a parameter or a namespace is set."""
+        return self._tree.has(key)
+
+    def set_param(
+        self, key: str, value: object, notify_task: Notify | None = None, caller_id: str | None = None
+    ) -> None:
+        """Set a value; a dictionary replaces a namespace. Raise TypeError for a root that is none."""
+        if key == "/" and not isinstance(value, dict):
+            raise TypeError("cannot set root of parameter tree to non-dictionary")
+        self._notify(self._tree.set(key, value, caller_id or ""), notify_task)
+
+    def delete_param(self, key: str, notify_task: Notify | None = None) -> None:
+        """Delete a parameter or a namespace. Raise KeyError."""
+        if key == "/":
+            raise KeyError("cannot delete root of parameter tree")
+        self._notify(self._tree.delete(key), notify_task)
+
+    def subscribe_param(self, key: str, registration_args: tuple[str, str]) -> object:
+        """Subscribe (node, API) to a parameter; return its value, {} where it is not set."""
+        caller_id, uri = registration_args
+        self._nodes[uri] = caller_id
+        return self._tree.subscribe(key, caller_id, uri)
+
+    def unsubscribe_param(self, key: str, unregistration_args: tuple[str, str]) -> tuple[int, str, int]:
+        """Unsubscribe (node, API); return the answer of the Master API."""
+        caller_id, uri = unregistration_args
+        shown = key if key.endswith("/") else f"{key}/"
+        if self._tree.unsubscribe(key, caller_id, uri):
+            return 1, f"Unregistered [{caller_id}] as provider of [{shown}]", 1
+        return 1, f"[{caller_id}] is not a known provider of [{shown}]", 0
+
+    def _notify(self, changes: Iterable[ParameterUpdate], notify_task: Notify | None) -> None:
+        found = [
+            (
+                [(self._nodes.get(each.uri, ""), each.uri)],
+                each.key,
+                self._tree.get(each.key) if self._tree.has(each.key) else {},
+            )
+            for each in changes
+        ]
+        if found and notify_task:
+            notify_task(found)

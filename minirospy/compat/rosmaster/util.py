@@ -1,0 +1,31 @@
+"""rosmaster.util: proxies of XML-RPC servers, one for each thread and address."""
+
+from __future__ import annotations
+
+import threading
+from urllib.parse import urlparse
+from xmlrpc.client import ServerProxy
+
+__all__ = ["remove_server_proxy", "xmlrpcapi"]
+
+
+class _Proxies(threading.local):
+    def __init__(self) -> None:
+        self.by_uri: dict[str, ServerProxy] = {}
+
+
+_PROXIES = _Proxies()
+
+
+def xmlrpcapi(uri: str | None) -> ServerProxy | None:
+    """Return the proxy of an address; None where it names no host. Raise OSError where it is no http address."""
+    if uri is None or not urlparse(uri).netloc:
+        return None
+    if uri not in _PROXIES.by_uri:
+        _PROXIES.by_uri[uri] = ServerProxy(uri)
+    return _PROXIES.by_uri[uri]
+
+
+def remove_server_proxy(uri: str) -> None:
+    """Forget the proxy of an address, whose server has gone."""
+    _PROXIES.by_uri.pop(uri, None)

@@ -1,0 +1,258 @@
+"""rospkg.os_detect: which operating system this is, by name, version and codename.
+
+Linux says it in /etc/os-release, whatever the distribution; rospkg's detectors of single distributions are here one class.
+``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+
+__all__ = [
+    "OSX",
+    "Debian",
+    "FdoDetect",
+    "FreeBSD",
+    "LsbDetect",
+    "OsDetect",
+    "OsDetector",
+    "OsNotDetected",
+    "Windows",
+    "read_issue",
+    "read_os_release",
+    "uname_get_machine",
+]
+
+OS_ALMALINUX, OS_ALPINE, OS_AMAZON, OS_ARCH, OS_BUILDROOT = (
+    "almalinux",
+    "alpine",
+    "amazon",
+    "arch",
+    "buildroot",
+)
+OS_CENTOS, OS_CLEARLINUX, OS_CONDA, OS_CYGWIN, OS_DEBIAN = "centos", "clearlinux", "conda", "cygwin", "debian"
+OS_ELEMENTARY = OS_ELEMENTARY_OLD = "elementary"
+OS_EULEROS, OS_FEDORA, OS_FREEBSD, OS_FUNTOO, OS_GENTOO = "euleros", "fedora", "freebsd", "funtoo", "gentoo"
+OS_LINARO, OS_MANJARO, OS_MINT, OS_MX, OS_NEON, OS_NIXOS = "linaro", "manjaro", "mint", "mx", "neon", "nixos"
+OS_OPENEMBEDDED, OS_OPENSUSE, OS_OPENSUSE13, OS_ORACLE = "openembedded", "opensuse", "opensuse", "oracle"
+OS_OSX, OS_POP, OS_QNX, OS_RASPBIAN, OS_RHEL, OS_ROCKY = "osx", "pop", "qnx", "raspbian", "rhel", "rocky"
+OS_SAILFISHOS, OS_SLACKWARE, OS_TIZEN, OS_UBUNTU = "sailfishos", "slackware", "tizen", "ubuntu"
+OS_WINDOWS, OS_ZORIN = "windows", "zorin"
+
+_OF_FDO = {
+    "almalinux": OS_ALMALINUX, "alpine": OS_ALPINE, "amzn": OS_AMAZON, "arch": OS_ARCH, "buildroot": OS_BUILDROOT,
+    "centos": OS_CENTOS, "clear-linux-os": OS_CLEARLINUX, "debian": OS_DEBIAN, "elementary": OS_ELEMENTARY,
+    "euleros": OS_EULEROS, "fedora": OS_FEDORA, "funtoo": OS_FUNTOO, "gentoo": OS_GENTOO, "linaro": OS_LINARO,
+    "manjaro": OS_MANJARO, "linuxmint": OS_MINT, "mx": OS_MX, "neon": OS_NEON, "nixos": OS_NIXOS, "ol": OS_ORACLE,
+    "opensuse-leap": OS_OPENSUSE, "opensuse-tumbleweed": OS_OPENSUSE, "opensuse": OS_OPENSUSE, "pop": OS_POP,
+    "raspbian": OS_DEBIAN, "rhel": OS_RHEL, "rocky": OS_ROCKY, "sailfishos": OS_SAILFISHOS, "slackware": OS_SLACKWARE,
+    "tizen": OS_TIZEN, "ubuntu": OS_UBUNTU, "zorin": OS_ZORIN,
+}  # fmt: skip
+"""ID of /etc/os-release -> rospkg's name."""
+
+
+class OsNotDetected(Exception):
+    """This operating system is not the one that a detector knows."""
+
+
+def read_os_release(filename: str | None = None) -> dict[str, str] | None:
+    """Return the values of an os-release file; None where there is none."""
+    for path in (filename,) if filename else ("/etc/os-release", "/usr/lib/os-release"):
+        try:
+            with open(path, encoding="utf-8", errors="replace") as file:
+                pairs = (line.strip().partition("=") for line in file)
+                return {name: value.strip("\"'") for name, sign, value in pairs if sign and name[0] != "#"}
+        except OSError:
+            continue
+    return None
+
+
+def read_issue(filename: str = "/etc/issue") -> list[str] | None:
+    """Return the words of /etc/issue; None where there is none."""
+    try:
+        with open(filename, encoding="utf-8", errors="replace") as file:
+            return file.read().split()
+    except OSError:
+        return None
+
+
+def uname_get_machine() -> str:
+    """Return the architecture, such as ``x86_64``."""
+    return platform.machine()
+
+
+class OsDetector:
+    """Recognizes one operating system."""
+
+    def is_os(self) -> bool:
+        """Return whether this is it."""
+        raise NotImplementedError("is_os unimplemented")
+
+    def get_version(self) -> str:
+        """Return its version. Raise OsNotDetected."""
+        raise NotImplementedError("get_version unimplemented")
+
+    def get_codename(self) -> str:
+        """Return its codename. Raise OsNotDetected."""
+        raise NotImplementedError("get_codename unimplemented")
+
+
+class FdoDetect(OsDetector):
+    """A Linux by its ID in os-release."""
+
+    def __init__(self, fdo_id: str) -> None:
+        release = read_os_release()
+        self.release_info = release if release and release.get("ID") == fdo_id else None
+
+    def is_os(self) -> bool:
+        """Return whether this is it."""
+        return self.release_info is not None
+
+    def get_version(self) -> str:
+        """Return VERSION_ID. Raise OsNotDetected."""
+        return self._info().get("VERSION_ID", "")
+
+    def get_codename(self) -> str:
+        """Return VERSION_CODENAME. Raise OsNotDetected."""
+        release = self._info()
+        codename = release.get("VERSION_CODENAME", "")
+        if not codename and "(" in (version := release.get("VERSION", "")):
+            codename = version[version.index("(") + 1 : version.index(")")].lower()
+        return codename
+
+    def _info(self) -> Mapping[str, str]:
+        if self.release_info is None:
+            raise OsNotDetected("called in incorrect OS")
+        return self.release_info
+
+
+class LsbDetect(FdoDetect):
+    """A Linux by the name that `lsb_release` gives it, which os-release has in lower case."""
+
+    def __init__(self, lsb_name: str, get_version_fn: object = None) -> None:
+        self.lsb_name = lsb_name
+        super().__init__(lsb_name.lower())
+
+
+class Debian(LsbDetect):
+    """Debian."""
+
+    def __init__(self, get_version_fn: object = None) -> None:
+        super().__init__("debian", get_version_fn)
+
+
+class _Platform(OsDetector):
+    """A system that Python's own ``platform`` names."""
+
+    system = ""
+
+    def is_os(self) -> bool:
+        """Return whether this is it."""
+        return platform.system() == self.system
+
+    def get_version(self) -> str:
+        """Return its version. Raise OsNotDetected."""
+        if not self.is_os():
+            raise OsNotDetected("called in incorrect OS")
+        return self._version()
+
+    def get_codename(self) -> str:
+        """Return no codename. Raise OsNotDetected."""
+        if not self.is_os():
+            raise OsNotDetected("called in incorrect OS")
+        return ""
+
+    def _version(self) -> str:
+        return platform.release()
+
+
+class Windows(_Platform):
+    """Windows."""
+
+    system = "Windows"
+
+    def _version(self) -> str:
+        return platform.version()
+
+
+class OSX(_Platform):
+    """macOS."""
+
+    system = "Darwin"
+
+    def __init__(self, sw_vers_file: str = "/usr/bin/sw_vers") -> None:
+        self._sw_vers_file = sw_vers_file
+
+    def _version(self) -> str:
+        return platform.mac_ver()[0]
+
+
+class FreeBSD(_Platform):
+    """FreeBSD."""
+
+    system = "FreeBSD"
+
+    def __init__(self, uname_file: str = "/usr/bin/uname") -> None:
+        self._uname_file = uname_file
+
+
+class OsDetect:
+    """Finds the operating system among detectors; the first that recognizes its own wins."""
+
+    default_os_list: list[tuple[str, OsDetector]] = []
+
+    def __init__(self, os_list: list[tuple[str, OsDetector]] | None = None) -> None:
+        self._os_list = OsDetect.default_os_list if os_list is None else os_list
+        self._found: tuple[str, str, str, OsDetector | None] | None = None
+
+    @staticmethod
+    def register_default(os_name: str, os_detector: OsDetector) -> None:
+        """Add a detector for all that follow."""
+        OsDetect.default_os_list.append((os_name, os_detector))
+
+    def detect_os(self, env: Mapping[str, str] | None = None) -> tuple[str, str, str]:
+        """Return name, version and codename. Raise OsNotDetected."""
+        override = (os.environ if env is None else env).get("ROS_OS_OVERRIDE")
+        if override:
+            name, version, codename = (*override.split(":"), "", "")[:3]
+            self._found = (name, version, codename, None)
+        else:
+            for name, detector in self._os_list:
+                if detector.is_os():
+                    self._found = (name, detector.get_version(), detector.get_codename(), detector)
+                    break
+        if self._found is None:
+            raise OsNotDetected(f"Could not detect OS, tried {[name for name, _ in self._os_list]}")
+        return self._found[:3]
+
+    def get_detector(self, name: str | None = None) -> OsDetector | None:
+        """Return the detector of a name, or the one that recognized its own. Raise KeyError, OsNotDetected."""
+        if name is None:
+            self.detect_os()
+            return self._found[3] if self._found else None
+        for known, detector in self._os_list:
+            if known == name:
+                return detector
+        raise KeyError(name)
+
+    def add_detector(self, name: str, detector: OsDetector) -> None:
+        """Add a detector, of which the later ones are tried first where they have no list of their own."""
+        self._os_list.append((name, detector))
+
+    def get_name(self) -> str:
+        """Return the name. Raise OsNotDetected."""
+        return (self._found or self.detect_os())[0]
+
+    def get_version(self) -> str:
+        """Return the version. Raise OsNotDetected."""
+        return (self._found or self.detect_os())[1]
+
+    def get_codename(self) -> str:
+        """Return the codename. Raise OsNotDetected."""
+        return (self._found or self.detect_os())[2]
+
+
+OsDetect.default_os_list += [(name, FdoDetect(fdo_id)) for fdo_id, name in _OF_FDO.items()]
+OsDetect.default_os_list += [(OS_WINDOWS, Windows()), (OS_OSX, OSX()), (OS_FREEBSD, FreeBSD())]

@@ -1,0 +1,38 @@
+"""roswtf.environment: the checks of paths and addresses that plugins of roswtf use."""
+
+from __future__ import annotations
+
+import os
+import stat
+from urllib.parse import urlparse
+
+__all__ = ["invalid_url", "is_executable", "paths"]
+
+
+def paths(path: str | None) -> list[str]:
+    """Return the folders of a variable such as PATH."""
+    return path.split(os.pathsep) if path else []
+
+
+def is_executable(path: str) -> int:
+    """Return the permission bits of a file that allow to execute it; 0 where none does. Raise OSError."""
+    mode = os.stat(path)[stat.ST_MODE]
+    return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
+
+
+def invalid_url(url: str | None) -> str | None:
+    """Return what is wrong with the address of a master; None where nothing is."""
+    if not url:
+        return None
+    scheme, _, rest = url.partition("://")
+    if scheme != "http" or not rest:
+        return "protocol is not 'http'"
+    place = urlparse(url).netloc.rsplit("@", 1)[-1]
+    _, colon, port = place.rpartition(":")
+    if not colon:
+        return "port number is missing"
+    try:
+        int(port)
+    except ValueError:
+        return f"port number [{port}] is invalid"
+    return None

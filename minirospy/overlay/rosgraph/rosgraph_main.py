@@ -1,0 +1,9 @@
+"""rosgraph.rosgraph_main, provided by minirospy: the command."""
+
+from minirospy.compat.rosgraph.rosgraph_main import (
+    rosgraph_main,
+)
+
+__all__ = [
+    "rosgraph_main",
+]

@@ -1,0 +1,11 @@
+"""roswtf.model, provided by minirospy: what a check found."""
+
+from minirospy.compat.roswtf.model import (
+    WtfError,
+    WtfWarning,
+)
+
+__all__ = [
+    "WtfError",
+    "WtfWarning",
+]
