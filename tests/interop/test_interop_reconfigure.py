@@ -143,23 +143,46 @@ def test_server_and_client_behave_as_real_ones(
     assert played(serve, real_master, server, client, modules[client]) == expected
 
 
-@pytest.fixture
-def cpp_server(modules: dict[str, Path], real_master: str, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    """Start a server in C++, with the header of the real generator."""
+@pytest.fixture(scope="session")
+def cpp_peers(modules: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Compile the server in C++ with the header of each generator; return the programs."""
     compiler = shutil.which("g++")
     assert compiler
-    program = tmp_path / "server"
     flags = subprocess.run(
         ["pkg-config", "--cflags", "--libs", "roscpp", "dynamic_reconfigure"],
         check=True,
         capture_output=True,
         text=True,
     ).stdout.split()
-    include = f"-I{modules['rospy'].parent / 'include'}"
-    subprocess.run(
-        [compiler, include, "-o", str(program), str(HERE / "reconfigure_peer.cpp"), *flags], check=True
+    programs = {stack: tmp_path_factory.mktemp(f"cpp_{stack}") / "server" for stack in modules}
+    source = str(HERE / "reconfigure_peer.cpp")
+    compilers = [
+        subprocess.Popen(
+            [compiler, "-Wall", f"-I{modules[stack].parent / 'include'}", "-o", str(program), source, *flags]
+        )
+        for stack, program in programs.items()
+    ]
+    assert [each.wait() for each in compilers] == [0, 0]
+    return programs
+
+
+def test_header_has_and_does_what_the_real_one_does(cpp_peers: dict[str, Path]) -> None:
+    real, ours = (
+        subprocess.run(
+            [cpp_peers[stack], "show"], capture_output=True, text=True, timeout=60, check=True
+        ).stdout
+        for stack in ("rospy", "ours")
     )
-    server = start([str(program)], real_master, "roscpp")
+    assert real.count("\n") > 500
+    assert ours == real
+
+
+@pytest.fixture(params=["rospy", "ours"])
+def cpp_server(
+    request: pytest.FixtureRequest, cpp_peers: dict[str, Path], real_master: str
+) -> Iterator[subprocess.Popen[str]]:
+    """Start a server in C++, with the header of either generator."""
+    server = start([str(cpp_peers[request.param])], real_master, "roscpp")
     yield server
     stop(server)
 

@@ -20,6 +20,7 @@ SHARED = {
     "cv_bridge/encodings.py",
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",
+    "dynamic_reconfigure/header.py",
     "message_filters/stamps.py",
     "topic_tools/expressions.py",
     "ros_names.py",

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from minirospy.compat.dynamic_reconfigure import Entry, Value, generated
+from minirospy.compat.dynamic_reconfigure import Entry, Value, generated, header
 
 __all__ = [
     "ParameterGenerator",
@@ -269,6 +269,7 @@ class ParameterGenerator:
                 documents / f"{self.msgname}-usage.dox",
                 generated.usage_document(self.group, pkgname, nodename),
             ),
+            (Path(self.cpp_gen_dir) / f"{self.msgname}.h", self._header()),
             (Path(self.py_gen_dir) / "cfg" / f"{self.msgname}.py", self._module()),
         ):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -277,6 +278,9 @@ class ParameterGenerator:
 
     def _module(self) -> str:
         return generated.python_module(self.pkgname, self.name, self.group.to_dict(), self.constants)
+
+    def _header(self) -> str:
+        return header.cpp_header(self.pkgname, self.name, self.group, self.constants)
 
 
 def _source_line() -> tuple[str, int]:
