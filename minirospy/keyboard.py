@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import time
@@ -20,7 +21,10 @@ class Keys:
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
 
-    def __init__(self) -> None:
+    def __init__(self, *, end: str = "q") -> None:
+        """``end``: the key that the terminal's end counts as."""
+        self._end = end
+        self._is_closed = False
         self.is_terminal = sys.stdin is not None and sys.stdin.isatty()
 
     def __enter__(self) -> Keys:
@@ -28,23 +32,31 @@ class Keys:
             import termios
             import tty
 
-            self._before = termios.tcgetattr(sys.stdin)
-            tty.setcbreak(sys.stdin)
+            try:
+                self._before = termios.tcgetattr(sys.stdin)
+                tty.setcbreak(sys.stdin)
+            except termios.error:
+                # Its window was closed meanwhile.
+                self._is_closed = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if sys.platform != "win32" and self.is_terminal:
+        if sys.platform != "win32" and self.is_terminal and not self._is_closed:
             import termios
 
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
+            # A terminal whose window was closed cannot be restored.
+            with contextlib.suppress(termios.error):
+                termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
         """Return the key that was typed (an arrow by its name), or "" after a moment."""
         if not self.is_terminal:
             time.sleep(LOOK_SECONDS)
             return ""
+        if self._is_closed:
+            return self._end
         if sys.platform == "win32":
             import msvcrt
 
@@ -59,9 +71,12 @@ class Keys:
         if not ready:
             return ""
         # Past Python's buffer: what it holds, select does not see. No byte at all is the terminal's end.
-        key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+        try:
+            key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+        except OSError:
+            return self._end
         if key != "\x1b":
-            return key or "q"
+            return key or self._end
         # A key that sends several bytes sends them together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""

@@ -1,0 +1,115 @@
+"""Drive joy_node by a simulated device, and teleop_node by states: what they publish, line by line.
+
+`drive.py JOY_NODE TELEOP_NODE [PYTHON [NAME...]]`: programs of either stack; NAME: only these cases. drive.txt is what the real
+ones printed (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have, built from their sources).
+"""
+
+from __future__ import annotations
+
+import os
+import pty
+import queue
+import struct
+import subprocess
+import sys
+import time
+import tty
+
+import rospy
+from cases import OPTIONS, STATES, STEPS, TELEOPS
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import Joy
+
+SECONDS = 30
+
+
+def started(program: list[str], name: str, parameters: dict[str, object]) -> subprocess.Popen[bytes]:
+    if rospy.has_param(f"/{name}"):
+        rospy.delete_param(f"/{name}")
+    rospy.set_param(f"/{name}", parameters)
+    return subprocess.Popen(
+        [*program, f"__name:={name}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+def ended(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def numbers(values: object) -> str:
+    return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
+
+
+def joysticks(program: list[str], names: list[str]) -> None:
+    for name in names:
+        options = OPTIONS[name]
+        print("joy_node", name)
+        master, slave = pty.openpty()
+        tty.setraw(slave)
+        states: queue.Queue[Joy] = queue.Queue()
+        subscriber = rospy.Subscriber("joy", Joy, states.put)
+        parameters = {"dev": os.ttyname(slave), "dev_ff": "/dev/null", "coalesce_interval": 0.4, **options}
+        process = started(program, "joystick", parameters)
+        try:
+            follow_joystick(master, os.ttyname(slave), subscriber, states)
+        finally:
+            ended(process)
+            subscriber.unregister()
+            os.close(master)
+            os.close(slave)
+
+
+def follow_joystick(master: int, path: str, subscriber: rospy.Subscriber, states: queue.Queue[Joy]) -> None:
+    while not subscriber.get_num_connections():
+        time.sleep(0.02)
+    # It opens the device twice: what is sent before is lost.
+    time.sleep(1)
+    for events, count in STEPS:
+        os.write(master, b"".join(struct.pack("<IhBB", 0, value, kind, at) for kind, at, value in events))
+        for _ in range(count):
+            state = states.get(timeout=SECONDS)
+            print(" ", numbers(state.axes), list(state.buttons), state.header.frame_id == path)
+
+
+def teleops(program: list[str], names: list[str]) -> None:
+    publisher = rospy.Publisher("joy", Joy, queue_size=10)
+    for name in names:
+        options = TELEOPS[name]
+        print("teleop_node", name)
+        twists: queue.Queue[Twist] = queue.Queue()
+        subscriber = rospy.Subscriber("cmd_vel", Twist, twists.put)
+        process = started(program, "teleop", options)
+        try:
+            follow_teleop(publisher, subscriber, twists)
+        finally:
+            ended(process)
+            subscriber.unregister()
+
+
+def follow_teleop(
+    publisher: rospy.Publisher, subscriber: rospy.Subscriber, twists: queue.Queue[Twist]
+) -> None:
+    while not (subscriber.get_num_connections() and publisher.get_num_connections()):
+        time.sleep(0.02)
+    for axes, buttons in STATES:
+        publisher.publish(Joy(axes=axes, buttons=buttons))
+        try:
+            twist = twists.get(timeout=0.7)
+        except queue.Empty:
+            print("  nothing")
+            continue
+        linear, angular = twist.linear, twist.angular
+        print(" ", numbers((linear.x, linear.y, linear.z)), numbers((angular.x, angular.y, angular.z)))
+
+
+if __name__ == "__main__":
+    rospy.init_node("driver", disable_signals=True)
+    interpreter = sys.argv[3:4]
+    only = sys.argv[4:] or [*OPTIONS, *TELEOPS]
+    joysticks([*interpreter, sys.argv[1]], [name for name in OPTIONS if name in only])
+    teleops([*interpreter, sys.argv[2]], [name for name in TELEOPS if name in only])
