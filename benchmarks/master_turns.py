@@ -1,16 +1,18 @@
-"""A master that writes each long turn of its event loop to a file: the moment of its end, and its CPU seconds.
+"""A master that writes each long turn of its event loop to a file: the moment of its end, "turn", its CPU seconds.
 
     python benchmarks/master_turns.py FILE [options of minirospy master]
 
 For ``benchmarks/master_attack.py``: what a turn takes is what a client waits for the master itself, whatever else the
-machine does. A turn is one callback of the loop.
+machine does. A turn is one callback of the loop. Lines of "loop" are iterations of it, with all callbacks that were due.
 """
 
 from __future__ import annotations
 
+import selectors
 import sys
 import time
 from asyncio import events
+from typing import Any
 
 from minirospy.cli.ros.master import main
 
@@ -19,16 +21,27 @@ LONG = 0.002
 
 
 def record_turns(path: str) -> None:
-    """Write the long turns of every event loop of this process from here on."""
+    """Write the long turns and iterations of the event loop of this process from here on."""
     run, file = events.Handle._run, open(path, "w", buffering=1, encoding="ascii")  # noqa: SIM115 - until the end
+    select, since = selectors.DefaultSelector.select, time.thread_time()
 
     def measured(handle: events.Handle) -> None:
         before = time.thread_time()
         run(handle)
         taken = time.thread_time() - before
         if taken > LONG:
-            file.write(f"{time.monotonic()} {taken}\n")
+            file.write(f"{time.monotonic()} turn {taken}\n")
 
+    def selected(selector: selectors.DefaultSelector, timeout: float | None = None) -> list[Any]:
+        nonlocal since
+        taken = time.thread_time() - since
+        if taken > LONG:
+            file.write(f"{time.monotonic()} loop {taken}\n")
+        found = select(selector, timeout)
+        since = time.thread_time()
+        return found
+
+    selectors.DefaultSelector.select = selected  # type: ignore[method-assign,assignment]
     events.Handle._run = measured  # type: ignore[assignment]
 
 
