@@ -198,6 +198,11 @@ class Registry:
         """Return whether all registrations together are few."""
         return self._shares.total < _FEW_BYTES
 
+    @property
+    def is_crowded(self) -> bool:
+        """Return whether nearly so much is registered that room is left to those with few registrations only."""
+        return self._shares.total > self._shares.shared * 7 // 8
+
     def node_uri(self, node: str) -> str | None:
         """Return the URI of a node's Slave API."""
         entry = self._nodes.get(node)

@@ -23,6 +23,7 @@ from minirospy.graph.calls import Answer
 from minirospy.graph.master_api import MasterApi, Notice, key_of_node, nothing
 from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
+from minirospy.runtime.master.dead_nodes import find_dead
 from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
@@ -58,6 +59,10 @@ _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
 """The garbage collector's thresholds: 10,000 objects at most are looked at, for some 4 ms; the oldest generation is not
 collected by itself."""
+
+_SWEEP_SECONDS = 10.0
+_FORGOTTEN_AT_ONCE = 20
+"""How often a crowded master looks for dead nodes, and how many it forgets in a turn of the loop."""
 
 _OWN_NODE = "/rosout"
 
@@ -112,6 +117,7 @@ class Master(MasterApi):
         self._checking: asyncio.Task[None] | None = None
         self._touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
+        self._sweeping: asyncio.Task[None] | None = None
         self.stopped = asyncio.Event()
         """Set when somebody asked the master to stop."""
 
@@ -155,15 +161,17 @@ class Master(MasterApi):
             self._collect()
         if nodes:
             self._checking = asyncio.ensure_future(self._check(nodes))
+        self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
         """Stop, as a master should: the next one starts empty. Idempotent.
 
         With ``keep_journal`` the next one goes on where this one ended.
         """
-        if self._checking:
-            self._checking.cancel()
-            await asyncio.gather(self._checking, return_exceptions=True)
+        for task in (self._checking, self._sweeping):
+            if task:
+                task.cancel()
+                await asyncio.gather(task, return_exceptions=True)
         for timer in (self._touching, self._collecting):
             if timer:
                 timer.cancel()
@@ -450,6 +458,31 @@ class Master(MasterApi):
         finally:
             await rpc.close()
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))
+
+    async def _sweep(self) -> None:
+        """Forget the nodes whose port refuses connections, whenever the registrations are nearly full.
+
+        Else they would stay full: rosmaster keeps what a node that was killed has registered, and so does this master.
+        """
+        while True:
+            await asyncio.sleep(_SWEEP_SECONDS)
+            if not self.registry.is_crowded:
+                continue
+            rpc, count = AsyncRpcClient(same_host=self._same_host), 0
+            try:
+                async for name, uri in find_dead(rpc, self.registry.nodes()):
+                    self.parameters.unsubscribe_node(name, uri)
+                    actions = self.registry.forget(name, uri)
+                    self.note("gone", name, uri)
+                    self._server.turns.start(self.act_in_steps(actions))
+                    count += 1
+                    if count % _FORGOTTEN_AT_ONCE == 0:
+                        await asyncio.sleep(0)
+            finally:
+                await rpc.close()
+            _log.warning(
+                "the registrations are nearly full: %d nodes that refuse connections are forgotten", count
+            )
 
     def _forget(self, name: str, uri: str) -> list[Notice]:
         self.parameters.unsubscribe_node(name, uri)

@@ -1,0 +1,43 @@
+"""The nodes of a crowded master whose port nobody listens at."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping
+
+from minirospy.errors import RpcError, RpcUnreachable
+from minirospy.graph.shares import holder_of
+from minirospy.runtime.rpc.async_client import AsyncRpcClient
+
+__all__ = ["find_dead"]
+
+_AT_ONCE = 50
+_SECONDS = 3.0
+
+
+async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncIterator[tuple[str, str]]:
+    """Yield the nodes (name -> URI), and their URIs, that refuse connections. Each host and port is called once.
+
+    A node that does not answer is not one of them: it may be slow, or behind a network that is down.
+    """
+    names: dict[str, list[str]] = {}
+    for name, uri in nodes.items():
+        names.setdefault(holder_of(uri), []).append(name)
+
+    holders = list(names)
+    for at in range(0, len(holders), _AT_ONCE):
+        some = holders[at : at + _AT_ONCE]
+        found = await asyncio.gather(*(_is_dead(rpc, nodes[names[holder][0]]) for holder in some))
+        for holder, is_dead in zip(some, found, strict=True):
+            for name in names[holder] if is_dead else ():
+                yield name, nodes[name]
+
+
+async def _is_dead(rpc: AsyncRpcClient, uri: str) -> bool:
+    try:
+        await rpc.call(uri, "getPid", "/master", timeout=_SECONDS)
+    except RpcUnreachable as error:
+        return isinstance(error.__cause__, ConnectionRefusedError)
+    except RpcError:
+        pass
+    return False

@@ -1,0 +1,73 @@
+"""A master whose registrations are nearly full forgets nodes that refuse connections, and no others."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+
+import pytest
+
+from minirospy.graph.registry import Registry
+from minirospy.graph.shares import Shares
+from minirospy.runtime.master import dead_nodes
+from minirospy.runtime.master import master as masters
+from minirospy.runtime.master.master import Master
+from minirospy.runtime.rpc.server import RpcServer
+
+
+def closed_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+async def until(condition: Callable[[], object]) -> None:
+    async def wait() -> None:
+        while not condition():
+            await asyncio.sleep(0.01)
+
+    await asyncio.wait_for(wait(), 30)
+
+
+def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(masters, "_SWEEP_SECONDS", 0.01)
+    monkeypatch.setattr(dead_nodes, "_SECONDS", 0.1)
+    notified: list[str] = []
+
+    def answer(method: str, args: list[object]) -> object:
+        notified.append(method)
+        return [1, "", 0]
+
+    async def scene() -> None:
+        master = Master(same_host=False)
+        master.registry = Registry(Shares(100_000, 100_000, 50_000, 1000))
+        await master.start()
+        live = RpcServer(answer)
+        await live.start()
+        with socket.create_server(("127.0.0.1", 0)) as slow:
+            live_uri, slow_uri = (
+                f"http://127.0.0.1:{live.port}/",
+                f"http://127.0.0.1:{slow.getsockname()[1]}/",
+            )
+            dead_uri = f"http://127.0.0.1:{closed_port()}/"
+            master.dispatch("registerSubscriber", ["/live", "/t0", "a/B", live_uri])
+            master.dispatch("registerPublisher", ["/slow", "/t0", "a/B", slow_uri])
+            master.dispatch("registerPublisher", ["/dead", "/t0", "a/B", dead_uri])
+            for number in range(10):
+                master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
+            await asyncio.sleep(0.05)
+            # There is room: nobody is called.
+            assert len(master.registry.nodes()) == 13
+            assert "getPid" not in notified
+
+            for number in range(10, 100):
+                master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
+            assert master.registry.is_crowded
+            await until(lambda: len(master.registry.nodes()) == 2)
+            assert master.registry.nodes() == {"/live": live_uri, "/slow": slow_uri}
+            assert master.registry.publishers() == {"/t0": ["/slow"]}
+            await until(lambda: "publisherUpdate" in notified[notified.index("getPid") :])
+        await live.close()
+        await master.close()
+
+    asyncio.run(scene())
