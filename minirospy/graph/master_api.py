@@ -11,6 +11,7 @@ import logging
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import islice
 
 from minirospy.escape import escaped
@@ -177,6 +178,9 @@ class MasterApi(ABC):
 
     def collect_system_state(self) -> Steps[Answer]:
         """Return the same in steps."""
+        if self.registry.is_large:
+            # Clients that wait for theirs hold no list meanwhile.
+            yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
         services = yield from _collect(self.registry.service_rows())
@@ -184,15 +188,19 @@ class MasterApi(ABC):
 
     def get_topic_types(self, caller_id: str) -> Answer | Steps[Answer]:
         """Return [topic, type] of each topic."""
-        return self._answer_rows("current system state", self.registry.type_rows())
+        return self._answer_rows("current system state", self.registry.type_rows)
 
     def get_published_topics(self, caller_id: str, namespace: str) -> Answer | Steps[Answer]:
         """Return [topic, type] of each published topic below a namespace."""
-        return self._answer_rows("current topics", self.registry.published_rows(namespace))
+        return self._answer_rows("current topics", partial(self.registry.published_rows, namespace))
 
-    def _answer_rows(self, text: str, rows: Iterator[tuple[str, str]]) -> Answer | Steps[Answer]:
+    def _answer_rows(
+        self, text: str, rows: Callable[[], Iterator[tuple[str, str]]]
+    ) -> Answer | Steps[Answer]:
         def answer() -> Steps[Answer]:
-            return [SUCCESS, text, (yield from _collect(rows))]
+            if self.registry.is_large:
+                yield ALONE
+            return [SUCCESS, text, (yield from _collect(rows()))]
 
         return finish(answer()) if self.registry.is_small else answer()
 
@@ -259,8 +267,19 @@ class MasterApi(ABC):
 
     # --- parameters
 
-    def get_param(self, caller_id: str, name: str) -> Answer:
+    def get_param(self, caller_id: str, name: str) -> Answer | Steps[Answer]:
         """Return a parameter's value."""
+        if self.parameters.is_small_at(name):
+            return self._get(name)
+
+        def get() -> Steps[Answer]:
+            # A value that clients wait for is copied whenever another one changes it.
+            yield ALONE
+            return self._get(name)
+
+        return get()
+
+    def _get(self, name: str) -> Answer:
         try:
             return [SUCCESS, f"Parameter [{name}]", self.parameters.get(name)]
         except KeyError:
@@ -333,6 +352,8 @@ class MasterApi(ABC):
         """Return the names of all parameters."""
 
         def collect() -> Steps[Answer]:
+            if self.parameters.is_large:
+                yield ALONE
             return [SUCCESS, "Parameter names", (yield from self.parameters.names_in_steps())]
 
         return finish(collect()) if self.parameters.is_small else collect()

@@ -28,7 +28,7 @@ from minirospy.graph.topic_types import TopicTypes
 __all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry", "RegistryFullError"]
 
 _ANY = "*"
-_FEW_BYTES = 200_000
+_FEW_BYTES, _MANY_BYTES = 200_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
@@ -197,6 +197,11 @@ class Registry:
     def is_small(self) -> bool:
         """Return whether all registrations together are few."""
         return self._shares.total < _FEW_BYTES
+
+    @property
+    def is_large(self) -> bool:
+        """Return whether a list of them takes so much memory that only one is made at a time."""
+        return self._shares.total > _MANY_BYTES
 
     @property
     def is_crowded(self) -> bool:

@@ -406,3 +406,25 @@ def test_subscription_that_is_refused_leaves_nothing_behind(monkeypatch: pytest.
     assert master.call("subscribeParam", "/n", URI, "/p")[0] == -1
     assert master.registry.nodes() == {}
     assert master.done == []
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        ("getParamNames", "/n"),
+        ("getParam", "/n", "/"),
+        ("getTopicTypes", "/n"),
+        ("getPublishedTopics", "/n", ""),
+        ("getSystemState", "/n"),
+    ],
+)
+def test_long_lists_are_made_one_at_a_time(call: tuple[str, ...]) -> None:
+    master = Recorded()
+    for number in range(5000):
+        master.parameters.set(f"/p{number}", number, "", 200)
+        master.registry.register_publisher("/n", f"/t{number}", "a/B", URI)
+    steps = master.dispatch(call[0], call[1:])
+    # Before anything is collected for a client that has to wait.
+    assert isinstance(steps, Generator)
+    assert next(steps) is ALONE
+    assert finish(steps)[0] == 1

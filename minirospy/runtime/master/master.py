@@ -30,7 +30,7 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.steps import Steps, finish
+from minirospy.steps import ALONE, Steps, finish
 from minirospy.wire.http import MAX_BODY
 from minirospy.wire.journal import unpack
 from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
@@ -201,6 +201,12 @@ class Master(MasterApi):
 
     def _write_state(self) -> Steps[Serialized]:
         """Return the system state as it is sent: it takes long to write, and tools request it all the time."""
+        if self.registry.is_large:
+            yield ALONE
+        if self._state[0] == self.registry.changes:
+            # It was written while this client waited.
+            return self._state[1]
+
         changes = self.registry.changes
         answer = yield from self.collect_system_state()
         pieces = yield from serialize_response_in_steps(answer, MAX_BODY)
@@ -240,6 +246,8 @@ class Master(MasterApi):
         """Return the state of this master: minirospy's own, for `minirospy master --status`."""
 
         def collect() -> Steps[Answer]:
+            if self.parameters.is_large:
+                yield ALONE
             return self._status((yield from self.parameters.names_in_steps()))
 
         return finish(collect()) if self.parameters.is_small else collect()
