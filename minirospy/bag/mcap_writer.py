@@ -40,8 +40,7 @@ _NEEDED = (*SCHEMA_FIELDS, "md5sum")
 def check_mcap() -> None:
     """Raise BagError, which names the extra to install, unless MCAP files can be read and written."""
     try:
-        import mcap.reader
-        import mcap.writer  # noqa: F401
+        import mcap.records  # noqa: F401 - the rest is imported where it is needed
         import zstandard  # noqa: F401
     except ImportError as error:
         raise BagError(f"MCAP files need the library {error.name}: pip install 'minirospy[mcap]'") from error
@@ -75,7 +74,6 @@ class McapWriter:
         )
         self._writer.start(profile="ros1", library="minirospy")
         self._schemas: dict[tuple[str, bytes], int] = {}
-        self._sequences: dict[int, int] = {}
         self._closed = False
 
     @property
@@ -106,10 +104,10 @@ class McapWriter:
         """Write a message that came at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
         if time < 0:
             raise BagFormatError(f"the time {time} ns is before 1970")
-        sequence = self._sequences.get(connection, 0)
-        self._sequences[connection] = (sequence + 1) % 2**32
         whole = b"".join((body, tail)) if tail else body
 
+        # Of all connections together, as the MCAP tools' converter counts them.
+        sequence = self._count % 2**32
         self._gathered += len(whole)
         self._count += 1
         # A view is copied into the chunk by the library.

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import io
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -67,7 +69,25 @@ def test_the_library_reads_the_layout_of_ros1(compression: str) -> None:
     assert channel.metadata == {
         name: HEADER[name] for name in ("topic", "md5sum", "callerid", "latching", "tcp_nodelay")
     }
-    assert [message.log_time - 10**18 for _, _, message in reader.iter_messages()] == [3, 4, 5, 6, 9]
+    messages = [message for _, _, message in reader.iter_messages()]
+    assert [one.log_time - 10**18 for one in messages] == [3, 4, 5, 6, 9]
+    assert sorted(one.sequence for one in messages) == [0, 1, 2, 3, 4]
+
+
+def test_reading_imports_nothing_that_only_writing_needs() -> None:
+    program = (
+        "import sys\n"
+        "from minirospy.bag.mcap_reader import open_bag_or_mcap\n"
+        "open_bag_or_mcap(sys.stdin.buffer)\n"
+        "print('mcap.reader' in sys.modules, 'mcap.writer' in sys.modules)"
+    )
+    with tempfile.TemporaryFile() as file:
+        file.write(made().getvalue())
+        file.seek(0)
+        done = subprocess.run(
+            [sys.executable, "-c", program], stdin=file, capture_output=True, text=True, check=True
+        )
+    assert done.stdout == "True False\n"
 
 
 def test_messages_are_read_in_the_order_of_time() -> None:
