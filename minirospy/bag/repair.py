@@ -1,7 +1,8 @@
-"""Repair of a bag that was not closed, or whose end is missing: its index is made again from its chunks.
+"""Repair of a bag that was not closed, whose end is missing, or that is damaged: its index is made again from its chunks.
 
 Every whole chunk is recovered, and of a last chunk that is not compressed every whole message. A chunk whose
-data is damaged is left out of the index. Source: http://wiki.ros.org/rosbag/Commandline#reindex.
+data is damaged is left out of the index; where the records do not follow each other any more, the next chunk is searched.
+Source: http://wiki.ros.org/rosbag/Commandline#reindex.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from minirospy.bag import compression, encoding, records
 from minirospy.bag.chunks import Found, StoredChunk, scan_into, size_of
 from minirospy.bag.index import read_entries
 from minirospy.bag.records import BagHeader, Chunk, ChunkInfo, Connection, Record
+from minirospy.bag.resync import is_record, next_chunk
 from minirospy.errors import BagCompressionError, BagFormatError
 
 __all__ = ["Repair"]
@@ -26,45 +28,98 @@ class _Content(NamedTuple):
     messages: list[Found]
     end: int
 
+    @property
+    def times(self) -> list[int]:
+        """The times of the messages, sorted."""
+        return sorted(each[0] for each in self.messages)
+
     def info(self, position: int) -> ChunkInfo:
         """Return the chunk's summary."""
-        times = [each[0] for each in self.messages]
-        return ChunkInfo(position, min(times), max(times), dict(Counter(each[1] for each in self.messages)))
+        times = self.times
+        return ChunkInfo(position, times[0], times[-1], dict(Counter(each[1] for each in self.messages)))
 
+    @property
     def index_records(self) -> bytes:
-        """Return the chunk's index records."""
+        """The chunk's index records."""
         entries: dict[int, list[tuple[int, int]]] = {}
         for time, number, at, _, _ in self.messages:
             entries.setdefault(number, []).append((time, at))
         return b"".join(encoding.encode_index_data(number, sorted(each)) for number, each in entries.items())
 
 
+class _Edit(NamedTuple):
+    """Bytes of the file that are replaced by others."""
+
+    start: int
+    end: int
+    data: bytes
+
+
+class _Rewriting:
+    """Edits of a file, in order and in place: what does not fit where it goes waits until that has been read."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._read = self._written = 0
+        self._waiting = bytearray()
+
+    @property
+    def shift(self) -> int:
+        """By how many bytes what is read next moves."""
+        return self._written + len(self._waiting) - self._read
+
+    def copy_until(self, position: int) -> None:
+        """Leave the file as it is up to a position."""
+        if not self.shift and not self._waiting:
+            self._read = self._written = position
+        while self._read < position:
+            self._stream.seek(self._read)
+            block = self._stream.read(min(_BLOCK, position - self._read))
+            self._read += len(block)
+            self._put(block)
+
+    def replace(self, edit: _Edit) -> None:
+        """Write other bytes in place of those at the position."""
+        self._read = edit.end
+        self._put(edit.data)
+
+    def finish(self) -> int:
+        """End the file here; return by how many bytes its end has moved."""
+        shift, self._read = self.shift, self._read + len(self._waiting)
+        self._put(b"")
+        self._stream.seek(self._written)
+        self._stream.truncate()
+        return shift
+
+    def _put(self, data: bytes) -> None:
+        self._waiting += data
+        ready = self._waiting[: max(self._read - self._written, 0)]
+        self._stream.seek(self._written)
+        self._stream.write(ready)
+        self._written += len(ready)
+        del self._waiting[: len(ready)]
+
+
 class Repair:
     """Makes the index of a bag of version 2.0 again, in place where the stream can be written.
 
-    After :meth:`run`: ``connections``, ``chunks``, ``end`` is where the index goes, and ``problems`` are lines about what
-    could not be recovered.
+    After :meth:`run`: ``connections``, ``chunks``, ``end`` is where the index goes, ``headers`` are those of chunks whose
+    header in the file is not complete, and ``problems`` are lines about what could not be recovered. :meth:`apply` moves
+    the chunks together, and changes their positions.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
         self.connections: dict[int, Connection] = {}
         self.chunks: list[ChunkInfo] = []
+        self.headers: dict[int, StoredChunk] = {}
         self.end = 0
         self.problems: list[str] = []
         self._stream = stream
-        self._tail: tuple[Record, _Content] | None = None
-        """The last chunk, if its header or its index records have to be written again."""
-
-    @property
-    def tail(self) -> tuple[int, StoredChunk] | None:
-        """The position of a last chunk whose header is not complete, and the header as it should be."""
-        if self._tail is None:
-            return None
-        record, content = self._tail
-        chunk = records.parse_chunk_header(record)
-        if chunk.compression == compression.NONE:
-            chunk = Chunk(compression.NONE, content.end, content.end)
-        return record.position, StoredChunk(chunk, record.data_position)
+        self._edits: list[_Edit] = []
+        self._infos_left = 0
+        """Chunk infos that the bag header counts, and that have not been read."""
+        self._total = 0
+        """Messages of the chunk infos that have been read."""
 
     def run(self) -> Iterator[int]:
         """Read the chunks; yield the position of each. Raise BagFormatError if it is not a bag, BagEncryptedError."""
@@ -78,8 +133,7 @@ class Repair:
             try:
                 position = self._read(position, limit)
             except BagFormatError as error:
-                self._problem(position, error)
-                break
+                position = self._go_on(position, error, limit)
 
         known = [chunk for chunk in self.chunks if chunk.counts.keys() <= self.connections.keys()]
         if len(known) < len(self.chunks):
@@ -87,54 +141,56 @@ class Repair:
                 f"{len(self.chunks) - len(known)} chunks have messages of unknown connections"
             )
             self.chunks = known
+        self._report_lost()
 
     def apply(self) -> None:
-        """Make the file end after the last chunk that was recovered, with its header and index records. Raise OSError."""
-        stream = self._stream
-        if self._tail and self.tail:
-            record, content = self._tail
-            position, (chunk, data_position) = self.tail
-            stream.seek(position)
-            stream.write(encoding.encode_fields(record.fields | {"size": chunk.size.to_bytes(4, "little")}))
-            stream.write(chunk.compressed_size.to_bytes(4, "little"))
-            stream.seek(data_position + chunk.compressed_size)
-            stream.truncate()
-            stream.write(content.index_records())
-            self.end = stream.tell()
-            self._tail = None
-        stream.seek(self.end)
-        stream.truncate()
+        """Make the file end after the last chunk that was recovered, without the damage before it. Raise OSError."""
+        chunks = iter(self.chunks)
+        moved: list[ChunkInfo] = []
+        chunk = next(chunks, None)
+        file, shift = _Rewriting(self._stream), 0
+        edits = [edit for edit in self._edits if edit.end <= self.end]
+        for edit in [*edits, _Edit(self.end, self.end, b"")]:
+            file.copy_until(edit.start)
+            while chunk and chunk.position <= edit.start:
+                moved.append(chunk._replace(position=chunk.position + shift))
+                chunk = next(chunks, None)
+            file.replace(edit)
+            shift = file.shift
+        self.end += file.finish()
+        self.chunks = moved
+        self._edits, self.headers = [], {}
 
     def _read_header(self, limit: int) -> int:
         """Return where the first chunk is; a bag header that is damaged has the size of all others."""
         start = len(records.MAGIC)
         self._stream.seek(start)
         try:
-            header = records.read_record(self._stream, limit)
-            records.parse_bag_header(header)
+            record = records.read_record(self._stream, limit)
+            header = records.parse_bag_header(record)
         except BagFormatError as error:
             self.problems.append(f"bag header: {error}")
             return start + len(encoding.encode_bag_header(BagHeader(0, 0, 0)))
-        return header.end
+        self._infos_left = header.chunk_count
+        return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position, and what belongs to it; return the position after it."""
+        """Read the record at a position, and what belongs to it; return the position after it. Raise BagFormatError."""
         self._stream.seek(position)
-        try:
-            record = records.read_record(self._stream, limit)
-        except BagFormatError:
-            self._read_partial(position, limit)
-            raise
+        record = records.read_record(self._stream, limit)
         if record.op == records.OP_CONNECTION:
             data = self._stream.read(record.data_size)
             connection = records.parse_connection(record, data)
             self.connections.setdefault(connection.id, connection)
+        if record.op == records.OP_CHUNK_INFO:
+            info = records.parse_chunk_info(record, self._stream.read(record.data_size))
+            self._total += sum(info.counts.values())
+            self._infos_left -= 1
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
             # The header of a chunk is completed when the chunk is: its writer was killed.
-            self._read_partial(position, limit)
-            raise BagFormatError("unterminated chunk", position)
+            raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
         try:
@@ -144,53 +200,144 @@ class Repair:
             content = _content(data)
             if content.end < len(data):
                 raise BagFormatError("a record of the chunk is damaged")
+            self._check_connections(content)
         except (BagFormatError, BagCompressionError) as error:
+            if not is_record(self._stream, record.end, limit):
+                raise BagFormatError(getattr(error, "why", str(error))) from error
             self._problem(position, error)
             return record.end
         return self._add(record, content, limit)
 
-    def _add(self, record: Record, content: _Content, limit: int) -> int:
-        """Add a whole chunk; return the position after its index records."""
+    def _check_connections(self, content: _Content) -> None:
+        """Raise BagFormatError where a connection is another one than in the chunks before: not what it was written for."""
+        for number, connection in content.connections.items():
+            known = self.connections.get(number, connection)
+            if (known.topic, known.type, known.md5sum) != (
+                connection.topic,
+                connection.type,
+                connection.md5sum,
+            ):
+                raise BagFormatError(
+                    f"connection {number} is on {connection.topic} here, on {known.topic} before"
+                )
+
+    def _add_connections(self, content: _Content) -> None:
+        # In the order of the file, as ROS writes them into the index.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
+
+    def _add(self, record: Record, content: _Content, limit: int) -> int:
+        """Add a whole chunk; return the position after its index records."""
+        self._add_connections(content)
         if not content.messages:
             return record.end
-        info = content.info(record.position)
-
-        position, indexed = record.end, 0
-        try:
-            while position < limit and indexed < len(content.messages):
-                self._stream.seek(position)
-                index = records.read_record(self._stream, limit)
-                if index.op != records.OP_INDEX_DATA:
-                    break
-                times, _ = read_entries(self._stream, index)
-                indexed += len(times)
-                position = self._stream.tell()
-        except BagFormatError:
-            position = limit
-        if indexed != len(content.messages):
-            if position < limit:
-                raise BagFormatError(f"index shorter than expected ({indexed} vs {len(content.messages)})")
-            self._tail = record, content
-        self.chunks.append(info)
+        position, times = _read_index(self._stream, record.end, limit)
+        # Third-party writers may have more in their index records than is needed.
+        is_usual = position == record.end + len(content.index_records)
+        if times != content.times or not (is_usual or is_record(self._stream, position, limit)):
+            position = self._make_index(record, content, limit)
+        self.chunks.append(content.info(record.position))
         self.end = position
         return position
 
-    def _read_partial(self, position: int, limit: int) -> None:
-        """Recover the whole messages of a chunk that is cut off, unless it is compressed."""
+    def _make_index(self, record: Record, content: _Content, limit: int) -> int:
+        """Have a chunk's index records written again; return where the next record is."""
+        following = expected = record.end + len(content.index_records)
+        if not is_record(self._stream, expected, limit):
+            found = next_chunk(self._stream, record.end, limit)
+            following = limit if found is None else found
+        if following > expected:
+            self.problems.append(
+                f"index of the chunk at byte {record.position}: {following - expected} bytes are left out"
+            )
+        self._edits.append(_Edit(record.end, following, content.index_records))
+        return following
+
+    def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
+        """Return the position of the next chunk behind damage; ``limit`` if there is none."""
+        following = next_chunk(self._stream, position + 1, limit)
+        end = limit if following is None else following
+        is_saved = self._read_partial(position, end, limit)
+        if following is None:
+            self._problem(position, error)
+        elif not is_saved:
+            self.problems.append(
+                f"chunk at byte {position}: {error.why}: {end - position} bytes are left out"
+            )
+            self._edits.append(_Edit(position, end, b""))
+        return end
+
+    def _read_partial(self, position: int, end: int, limit: int) -> bool:
+        """Recover the messages of a chunk that is not compressed and whose size is wrong; return whether there are any.
+
+        At the end of the file every whole message; before it only all of them: then its index records tell how many.
+        """
         record = _partial_chunk(self._stream, position, limit)
         if record is None:
-            return
+            return False
         self._stream.seek(record.data_position)
-        content = _content(self._stream.read(min(limit - record.data_position, records.MAX_UINT32)))
-        if content.messages:
-            self.connections = content.connections | self.connections
-            self.chunks.append(content.info(position))
-            self._tail = record, content
+        data = self._stream.read(min(end - record.data_position, records.MAX_UINT32))
+        content = _content(data[: _whole_records(data)])
+        if not content.messages:
+            return False
+
+        data_end = record.data_position + content.end
+        if end < limit and _read_index(self._stream, data_end, limit)[1] != content.times:
+            return False
+        self._add_connections(content)
+        self.chunks.append(content.info(position))
+        self.end = end
+        size = content.end.to_bytes(4, "little")
+        header = encoding.encode_fields(record.fields | {"size": size}) + size
+        self.headers[position] = StoredChunk(
+            Chunk(compression.NONE, content.end, content.end), record.data_position
+        )
+        self._edits += [
+            _Edit(position, record.data_position, header),
+            _Edit(data_end, end, content.index_records),
+        ]
+        return True
+
+    def _report_lost(self) -> None:
+        """Add a line about how many messages are missing, where the bag's own index still has their number."""
+        lost = self._total - sum(sum(chunk.counts.values()) for chunk in self.chunks)
+        if self._infos_left == 0 and lost > 0:
+            self.problems.append(f"{lost} of {self._total} messages are lost")
 
     def _problem(self, position: int, error: Exception) -> None:
         self.problems.append(f"chunk at byte {position}: {error}")
+
+
+_BLOCK = 4 * 1024 * 1024
+
+
+def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[int]]:
+    """Read the index records at a position; return where they end, and the times that they have, sorted."""
+    found: list[int] = []
+    try:
+        while position < limit:
+            stream.seek(position)
+            record = records.read_record(stream, limit)
+            if record.op != records.OP_INDEX_DATA:
+                break
+            found += read_entries(stream, record)[0]
+            position = stream.tell()
+    except BagFormatError:
+        pass  # the caller sees by the times whether some are missing
+    return position, sorted(found)
+
+
+def _whole_records(data: bytes) -> int:
+    """Return how many bytes of data are whole records of a chunk, and not what comes after it."""
+    at = 0
+    try:
+        for record in records.parse_records(data):
+            if record.op not in (records.OP_MESSAGE_DATA, records.OP_CONNECTION):
+                break
+            at = record.end
+    except BagFormatError:
+        pass
+    return at
 
 
 def _content(data: bytes) -> _Content:

@@ -177,6 +177,83 @@ def test_damaged_chunk_costs_its_own_messages_alone() -> None:
     assert set(found) == EVERY - {tuple(each) for each in GIVEN[3]}
 
 
+def chunk_places(data: bytes) -> list[tuple[int, int, int]]:
+    """Return where each chunk of a bag is, where its data starts, and where it ends with its index records."""
+    reader = open_bag(io.BytesIO(data))
+    assert isinstance(reader, ChunkedReader)
+    headers = reader.chunk_headers()
+    starts = [chunk.position for chunk in reader.chunks]
+    return [
+        (start, headers[start].data_position, end)
+        for start, end in zip(starts, [*starts[1:], reader.index_position], strict=True)
+    ]
+
+
+def spoilt(data: bytes, kind: str) -> bytes:
+    """Return a bag whose fourth chunk is damaged so that its records do not follow each other any more."""
+    start, body, end = chunk_places(data)[3]
+    lengths = {
+        "header length": (start, start + 4, b"\xff" * 4),
+        "data length": (body - 4, body, b"\xff\xff\xff\x7f"),
+        "zeros": (start, end, bytes(end - start)),
+        "missing bytes": (body + 20, body + 120, b""),
+        "more bytes": (body + 20, body + 20, bytes(70)),
+        "index": (end - 30, end, bytes(30)),
+        "index length": (end - 40, end, b""),
+    }
+    first, last, replaced = lengths[kind]
+    return data[:first] + replaced + data[last:]
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+@pytest.mark.parametrize(
+    ("kind", "lost"),
+    [
+        ("header length", 20),
+        ("data length", 20),
+        ("zeros", 20),
+        ("missing bytes", 20),
+        ("more bytes", 20),
+        ("index", 0),
+        ("index length", 0),
+    ],
+)
+def test_repair_goes_on_at_the_next_chunk(compression: str, kind: str, lost: int) -> None:
+    data = spoilt(make_bag(GIVEN, compression=compression), kind)
+    repair = Repair(stream := io.BytesIO(data))
+    list(repair.run())
+    repair.apply()
+    BagWriter(stream, continued=Continued(repair.connections.values(), repair.chunks, repair.end)).close()
+    found = read(stream.getvalue())
+
+    if compression == "none" and kind == "data length":
+        lost = 0  # its index records show where its data ends
+    assert set(found) <= EVERY
+    assert len(found) == len(EVERY) - lost
+    assert [line.startswith("chunk at byte") for line in repair.problems] == ([True, False] if lost else [])
+    if lost:
+        assert repair.problems[-1] == "20 of 240 messages are lost"
+    stream.seek(0)
+    assert sum(map(len, open_bag(stream).index([0, 1, 2]))) == len(found)
+    assert repaired(stream.getvalue()) == found
+
+
+@given(st.data(), st.sampled_from(COMPRESSIONS[1:]))
+@settings(deadline=None, max_examples=60)
+def test_damage_costs_only_the_chunks_that_it_touches(data: st.DataObject, compression: str) -> None:
+    bag = make_bag(GIVEN, compression=compression)
+    places = chunk_places(bag)
+    start = data.draw(st.integers(places[0][0], places[-1][2] - 1))
+    end = min(start + data.draw(st.integers(1, 3000)), places[-1][2])
+    damaged = bag[:start] + data.draw(st.binary(max_size=100)) + bag[end:]
+
+    found = set(repaired(damaged))
+    assert found <= EVERY
+    for chunk, (first, _, last) in zip(GIVEN, places, strict=True):
+        if last <= start or first >= end:
+            assert {tuple(each) for each in chunk} <= found
+
+
 @given(st.binary(max_size=300), st.sampled_from([b"", b"#ROSBAG V2.0\n", b"#ROSBAG V1.2\n"]))
 def test_any_bytes_are_refused_or_empty(noise: bytes, magic: bytes) -> None:
     assert not attempt(read, magic + noise)
@@ -225,9 +302,7 @@ def test_repair_without_writing_reads_the_last_chunk() -> None:
     stream = io.BytesIO(data)
     repair = Repair(stream)
     list(repair.run())
-    reader = ChunkedReader(
-        stream, repair.connections, repair.chunks, headers=dict([repair.tail] if repair.tail else [])
-    )
+    reader = ChunkedReader(stream, repair.connections, repair.chunks, headers=repair.headers)
 
     assert len(list(reader.messages())) == len(repaired(data)) > 40
     assert stream.getvalue() == data

@@ -289,8 +289,9 @@ class Bag(OpenedBag):
         repair = Repair(stream)
         with as_ros_errors():
             yield from repair.run()
-            headers = dict([repair.tail] if repair.tail else [])
-            self._reader = ChunkedReader(stream, repair.connections, repair.chunks, headers=headers)
+            self._reader = ChunkedReader(
+                stream, repair.connections, repair.chunks, headers=dict(repair.headers)
+            )
             if self._mode != "r":
                 repair.apply()
                 self._start_appending(repair.connections, repair.chunks, repair.end)
