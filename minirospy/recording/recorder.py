@@ -8,6 +8,7 @@ Source: http://wiki.ros.org/rosbag/Commandline#record.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shutil
 import threading
@@ -36,6 +37,7 @@ _POLL_SECONDS = 1.0
 _REPORT_SECONDS = 5.0
 _SPACE_SECONDS = 20.0
 _TIME_SECONDS = 2.0
+_PATIENCE_SECONDS = 2.0
 
 
 class _Topic:
@@ -64,6 +66,7 @@ class Recorder:
         self._topics: dict[str, _Topic] = {}
         self._lock = threading.Lock()
         self._stop = SignalSafeEvent()
+        self._finished = SignalSafeEvent()
         self._file: BagFile | None = None
         self._is_complete = False
         self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
@@ -93,16 +96,18 @@ class Recorder:
         # In a thread, which no Ctrl-C interrupts, and which the process waits for in any case.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
+        is_interrupted = False
         try:
             with self._lock:
                 self._open(self._clock())
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            pass  # a second Ctrl-C, or a registration was ended by the shutdown
+            # A second Ctrl-C, or a registration was ended by the shutdown.
+            is_interrupted = True
         finally:
             self._stop.set()
-            self._wait_for(finisher)
+            self._wait_until_complete(is_interrupted)
         return self.status
 
     # --- the main thread
@@ -219,17 +224,21 @@ class Recorder:
         if self._topics and not any(topic.left for topic in self._topics.values()):
             self._stop.set()
 
-    def _wait_for(self, finisher: threading.Thread) -> None:
-        """Wait until the file is complete; further Ctrl-C do not end that, until the third ends the process."""
-        is_interrupted = False
-        while finisher.is_alive():
+    def _wait_until_complete(self, is_interrupted: bool) -> None:
+        """Wait until the file is complete; further Ctrl-C do not end that, until the third ends the process.
+
+        Report at each of them, and once where it takes long, how much is still to be written.
+        """
+        patience = time.monotonic() + _PATIENCE_SECONDS
+        # Not for the thread: to Python 3.10 and 3.11 it has ended when join() is interrupted.
+        while not self._finished.is_set():
             try:
                 # What this thread does is its clean-up: a shutdown need not interrupt it.
                 client.is_shutdown()
-                if is_interrupted:
-                    is_interrupted = False
+                if is_interrupted or time.monotonic() > patience:
+                    is_interrupted, patience = False, math.inf
                     client.logwarn("%d MB are still to be written", self._disk.pending // 10**6)
-                finisher.join(_TICK_SECONDS)
+                wait_for_event(self._finished, _TICK_SECONDS)
             except KeyboardInterrupt:
                 is_interrupted = True
 
@@ -237,7 +246,13 @@ class Recorder:
 
     def _finish(self) -> None:
         """Complete the file when the recording ends."""
-        self._stop.wait()
+        try:
+            self._stop.wait()
+            self._complete()
+        finally:
+            self._finished.set()
+
+    def _complete(self) -> None:
         with self._lock:
             self._close()
             self._is_complete = True
