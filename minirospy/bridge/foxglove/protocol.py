@@ -68,6 +68,9 @@ SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 MESSAGE_ENCODING = "ros1"
 SCHEMA_ENCODING = "ros1msg"
 
+_Fields = Mapping[str, Any]
+"""An operation as JSON gives it."""
+
 _MOST_ITEMS = 100_000
 """Entries of one array of a client."""
 
@@ -324,16 +327,16 @@ def parse_binary(data: bytes | bytearray | memoryview) -> Event:
         raise BridgeProtocolError(f"a text of opcode {view[0]} is not UTF-8") from None
 
 
-def _subscribe(fields: Mapping[str, Any]) -> Subscribe:
+def _subscribe(fields: _Fields) -> Subscribe:
     entries = _objects(fields, "subscriptions")
     return Subscribe(tuple((_id(entry, "id"), _id(entry, "channelId")) for entry in entries))
 
 
-def _unsubscribe(fields: Mapping[str, Any]) -> Unsubscribe:
+def _unsubscribe(fields: _Fields) -> Unsubscribe:
     return Unsubscribe(_ids(fields, "subscriptionIds"))
 
 
-def _advertise(fields: Mapping[str, Any]) -> ClientAdvertise:
+def _advertise(fields: _Fields) -> ClientAdvertise:
     return ClientAdvertise(
         tuple(
             ClientChannel(
@@ -347,20 +350,20 @@ def _advertise(fields: Mapping[str, Any]) -> ClientAdvertise:
     )
 
 
-def _unadvertise(fields: Mapping[str, Any]) -> ClientUnadvertise:
+def _unadvertise(fields: _Fields) -> ClientUnadvertise:
     return ClientUnadvertise(_ids(fields, "channelIds"))
 
 
-def _get_parameters(fields: Mapping[str, Any]) -> GetParameters:
+def _get_parameters(fields: _Fields) -> GetParameters:
     return GetParameters(_names(fields), _request_id(fields))
 
 
-def _set_parameters(fields: Mapping[str, Any]) -> SetParameters:
+def _set_parameters(fields: _Fields) -> SetParameters:
     parameters = tuple(_parameter(entry) for entry in _objects(fields, "parameters"))
     return SetParameters(parameters, _request_id(fields))
 
 
-def _parameter(entry: Mapping[str, Any]) -> Parameter:
+def _parameter(entry: _Fields) -> Parameter:
     name, value, type_ = _text(entry, "name"), entry.get("value"), entry.get("type")
     if value is None:
         return Parameter(name, is_set=False)
@@ -378,19 +381,19 @@ def _parameter(entry: Mapping[str, Any]) -> Parameter:
     return Parameter(name, value)
 
 
-def _subscribe_parameters(fields: Mapping[str, Any]) -> SubscribeParameterUpdates:
+def _subscribe_parameters(fields: _Fields) -> SubscribeParameterUpdates:
     return SubscribeParameterUpdates(_names(fields))
 
 
-def _unsubscribe_parameters(fields: Mapping[str, Any]) -> UnsubscribeParameterUpdates:
+def _unsubscribe_parameters(fields: _Fields) -> UnsubscribeParameterUpdates:
     return UnsubscribeParameterUpdates(_names(fields))
 
 
-def _fetch_asset(fields: Mapping[str, Any]) -> FetchAsset:
+def _fetch_asset(fields: _Fields) -> FetchAsset:
     return FetchAsset(_text(fields, "uri"), _id(fields, "requestId"))
 
 
-_OPS: Mapping[str, Callable[[Mapping[str, Any]], Event]] = {
+_OPS: Mapping[str, Callable[[_Fields], Event]] = {
     "subscribe": _subscribe,
     "unsubscribe": _unsubscribe,
     "advertise": _advertise,
@@ -439,7 +442,7 @@ def _sized_text(view: memoryview, length: int) -> tuple[str, memoryview]:
     return bytes(view[:length]).decode(), view[length:]
 
 
-def _entries(fields: Mapping[str, Any], key: str) -> list[Any]:
+def _entries(fields: _Fields, key: str) -> list[Any]:
     found = fields.get(key)
     if not isinstance(found, list):
         raise BridgeProtocolError(f"'{key}' is not an array")
@@ -448,18 +451,18 @@ def _entries(fields: Mapping[str, Any], key: str) -> list[Any]:
     return found
 
 
-def _objects(fields: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+def _objects(fields: _Fields, key: str) -> list[_Fields]:
     found = _entries(fields, key)
     if not all(isinstance(entry, dict) for entry in found):
         raise BridgeProtocolError(f"'{key}' is not an array of objects")
     return found
 
 
-def _ids(fields: Mapping[str, Any], key: str) -> tuple[int, ...]:
+def _ids(fields: _Fields, key: str) -> tuple[int, ...]:
     return tuple(_checked_id(entry, key) for entry in _entries(fields, key))
 
 
-def _id(fields: Mapping[str, Any], key: str) -> int:
+def _id(fields: _Fields, key: str) -> int:
     return _checked_id(fields.get(key), key)
 
 
@@ -469,7 +472,7 @@ def _checked_id(value: object, key: str) -> int:
     return value
 
 
-def _text(fields: Mapping[str, Any], key: str, default: str | None = None) -> str:
+def _text(fields: _Fields, key: str, default: str | None = None) -> str:
     value = fields.get(key)
     if value is None and default is not None:
         return default
@@ -478,14 +481,14 @@ def _text(fields: Mapping[str, Any], key: str, default: str | None = None) -> st
     return value
 
 
-def _names(fields: Mapping[str, Any]) -> tuple[str, ...]:
+def _names(fields: _Fields) -> tuple[str, ...]:
     found = _entries(fields, "parameterNames")
     if not all(isinstance(entry, str) for entry in found):
         raise BridgeProtocolError("'parameterNames' is not an array of strings")
     return tuple(found)
 
 
-def _request_id(fields: Mapping[str, Any]) -> str | None:
+def _request_id(fields: _Fields) -> str | None:
     value = fields.get("id")
     return None if value is None else str(value)
 

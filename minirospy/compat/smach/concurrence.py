@@ -11,7 +11,7 @@ from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
 from minirospy.compat.smach.log import logdebug, logerr, loginfo, logwarn
 from minirospy.compat.smach.state import State
-from minirospy.compat.smach.user_data import Remapper, UserData
+from minirospy.compat.smach.user_data import Remapper, UserData, Values
 from minirospy.compat.smach.util import is_shutdown
 
 __all__ = ["Concurrence"]
@@ -82,7 +82,7 @@ class Concurrence(Container):
     # Construction.
 
     @staticmethod
-    def add(label: str, state: Any, remapping: Mapping[str, str] | None = None) -> Any:
+    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> Any:
         """Add a state to the open container, and return it; ``remapping``: the state's key -> the container's."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state
@@ -106,7 +106,7 @@ class Concurrence(Container):
 
     # Execution.
 
-    def execute(self, parent_ud: Any = None) -> str | None:
+    def execute(self, parent_ud: Values | None = None) -> str | None:
         """Execute all states; return the outcome. Raises InvalidStateError where one of them fails."""
         if not self._states:
             raise InvalidStateError("No states was added to concurrence")

@@ -16,7 +16,7 @@ from minirospy.compat.smach.exceptions import (
 )
 from minirospy.compat.smach.log import logerr, logwarn
 from minirospy.compat.smach.state import State
-from minirospy.compat.smach.user_data import UserData
+from minirospy.compat.smach.user_data import UserData, Values
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -47,9 +47,9 @@ class Container(State):
         self.userdata = UserData()
         """What its states share."""
         self._executing_thread: int | None = None
-        self._start_cbs: list[tuple[Callback, Sequence[Any]]] = []
-        self._transition_cbs: list[tuple[Callback, Sequence[Any]]] = []
-        self._termination_cbs: list[tuple[Callback, Sequence[Any]]] = []
+        self._start_cbs: list[tuple[Callback, Sequence[object]]] = []
+        self._transition_cbs: list[tuple[Callback, Sequence[object]]] = []
+        self._termination_cbs: list[tuple[Callback, Sequence[object]]] = []
 
     def __getitem__(self, key: str) -> State:
         """Return the state of a label."""
@@ -81,25 +81,25 @@ class Container(State):
 
     # Userdata.
 
-    def _copy_input_keys(self, parent_ud: Any, ud: UserData) -> None:
+    def _copy_input_keys(self, parent_ud: Values | None, ud: UserData) -> None:
         if parent_ud is not None:
             _copy(self.get_registered_input_keys(), parent_ud, ud, "input")
 
-    def _copy_output_keys(self, ud: UserData, parent_ud: Any) -> None:
+    def _copy_output_keys(self, ud: UserData, parent_ud: Values | None) -> None:
         if parent_ud is not None:
             _copy(self.get_registered_output_keys(), ud, parent_ud, "output")
 
     # Callbacks.
 
-    def register_start_cb(self, start_cb: Callback, cb_args: Sequence[Any] = ()) -> None:
+    def register_start_cb(self, start_cb: Callback, cb_args: Sequence[object] = ()) -> None:
         """Call a function with userdata, initial states and ``cb_args`` when the container starts."""
         self._start_cbs.append((start_cb, cb_args))
 
-    def register_transition_cb(self, transition_cb: Callback, cb_args: Sequence[Any] = ()) -> None:
+    def register_transition_cb(self, transition_cb: Callback, cb_args: Sequence[object] = ()) -> None:
         """Call a function with userdata, active states and ``cb_args`` at each transition."""
         self._transition_cbs.append((transition_cb, cb_args))
 
-    def register_termination_cb(self, termination_cb: Callback, cb_args: Sequence[Any] = ()) -> None:
+    def register_termination_cb(self, termination_cb: Callback, cb_args: Sequence[object] = ()) -> None:
         """Call a function with userdata, last states, outcome and ``cb_args`` when the container ends."""
         self._termination_cbs.append((termination_cb, cb_args))
 
@@ -111,15 +111,15 @@ class Container(State):
         """Call the functions of ``register_transition_cb``; what they raise is logged."""
         self._call("transition", self._transition_cbs, lambda: (self.get_active_states(),))
 
-    def call_termination_cbs(self, terminal_states: Any, outcome: str | None) -> None:
+    def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
         """Call the functions of ``register_termination_cb``; what they raise is logged."""
         self._call("termination", self._termination_cbs, lambda: (terminal_states, outcome))
 
     def _call(
         self,
         kind: str,
-        callbacks: Iterable[tuple[Callback, Sequence[Any]]],
-        arguments: Callable[[], tuple[Any, ...]],
+        callbacks: Iterable[tuple[Callback, Sequence[object]]],
+        arguments: Callable[[], tuple[object, ...]],
     ) -> None:
         try:
             for callback, more in callbacks:
@@ -148,7 +148,7 @@ class Container(State):
             logerr("Error raised during SMACH container construction: \n" + "\n".join(lines))
 
     @contextmanager
-    def opened(self, **kwargs: Any) -> Iterator[Self]:
+    def opened(self, **kwargs: object) -> Iterator[Self]:
         """Open the container in a ``with`` block; ``kwargs`` have no effect, as in ROS."""
         self.open()
         try:

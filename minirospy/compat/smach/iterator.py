@@ -11,12 +11,12 @@ from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidStateError, InvalidUserCodeError
 from minirospy.compat.smach.log import logerr, loginfo, logwarn
 from minirospy.compat.smach.state import State
-from minirospy.compat.smach.user_data import UserData
+from minirospy.compat.smach.user_data import UserData, Values
 from minirospy.compat.smach.util import is_shutdown
 
 __all__ = ["Iterator"]
 
-Items = Iterable[Any] | Callable[[], Iterable[Any]]
+Items = Iterable[object] | Callable[[], Iterable[object]]
 
 
 class Iterator(Container):
@@ -56,7 +56,7 @@ class Iterator(Container):
     @staticmethod
     def set_contained_state(
         label: str,
-        state: Any,
+        state: State,
         loop_outcomes: Sequence[str] = (),
         break_outcomes: Sequence[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
@@ -86,7 +86,7 @@ class Iterator(Container):
 
     # Execution.
 
-    def execute(self, parent_ud: Any = None) -> str | None:
+    def execute(self, parent_ud: Values | None = None) -> str | None:
         """Execute the state for each item; return its last outcome, mapped, or the one of exhausted items."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
@@ -96,15 +96,15 @@ class Iterator(Container):
             self._copy_input_keys(parent_ud, self.userdata)
             self.call_start_cbs()
             last = self._iterate()
-            outcome = self._final_outcome_map.get(last, last)
+            outcome = self._final_outcome_map.get(last or "", last)
             self._copy_output_keys(self.userdata, parent_ud)
         finally:
             self._is_running = False
         self.call_termination_cbs(self._state_label, outcome)
         return outcome
 
-    def _iterate(self) -> str:
-        outcome = self._exhausted_outcome
+    def _iterate(self) -> str | None:
+        outcome: str | None = self._exhausted_outcome
         items = iter(self._items() if callable(self._items) else self._items)
         while not is_shutdown():
             try:
@@ -125,9 +125,9 @@ class Iterator(Container):
 
         return outcome
 
-    def _execute_state(self) -> str:
+    def _execute_state(self) -> str | None:
         try:
-            outcome: str = self._state.execute(self.userdata)
+            outcome: str | None = self._state.execute(self.userdata)
         except InvalidUserCodeError:
             logerr(f"Could not execute Iterator state '{self._state_label}'")
             raise

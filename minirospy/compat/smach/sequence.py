@@ -7,6 +7,7 @@ from typing import Any
 
 from minirospy.compat.smach.exceptions import SmachError
 from minirospy.compat.smach.log import logerr
+from minirospy.compat.smach.state import State
 from minirospy.compat.smach.state_machine import StateMachine, Transitions
 
 __all__ = ["Sequence"]
@@ -29,10 +30,10 @@ class Sequence(StateMachine):
     @staticmethod
     def add(
         label: str,
-        state: Any,
+        state: State,
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
-        constants: Mapping[str, Any] | None = None,
+        constants: Mapping[str, object] | None = None,
     ) -> Any:
         """Add a state, to which the connector outcome of the one before leads unless its transitions say otherwise."""
         sequence = Sequence._currently_opened_container()

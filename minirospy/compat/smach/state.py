@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach.util import has_smach_interface
 
 __all__ = ["CBState", "State"]
@@ -26,7 +27,7 @@ class State:
         self._output_keys = set(output_keys) | both
         self._preempt_requested = False
 
-    def execute(self, ud: Any) -> str | None:
+    def execute(self, ud: Values) -> str | None:
         """Do what the state is for, and return an outcome; derived classes define it."""
         raise NotImplementedError
 
@@ -82,9 +83,9 @@ class CBState(State):
 
     def __init__(
         self,
-        cb: Callable[..., Any],
-        cb_args: Sequence[Any] = (),
-        cb_kwargs: Mapping[str, Any] | None = None,
+        cb: Callable[..., str | None],
+        cb_args: Sequence[object] = (),
+        cb_kwargs: Mapping[str, object] | None = None,
         outcomes: Iterable[str] = (),
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
@@ -96,10 +97,9 @@ class CBState(State):
         self._cb_kwargs = dict(cb_kwargs or {})
         adopt_interface(self, cb)
 
-    def execute(self, ud: Any) -> str | None:
+    def execute(self, ud: Values) -> str | None:
         """Call the function."""
-        outcome: str | None = self._cb(ud, *self._cb_args, **self._cb_kwargs)
-        return outcome
+        return self._cb(ud, *self._cb_args, **self._cb_kwargs)
 
 
 def adopt_interface(state: State, cb: Any) -> None:

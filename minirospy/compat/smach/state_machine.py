@@ -11,7 +11,7 @@ from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
 from minirospy.compat.smach.log import logdebug, logerr, loginfo, logwarn
 from minirospy.compat.smach.state import State
-from minirospy.compat.smach.user_data import Remapper, UserData
+from minirospy.compat.smach.user_data import Remapper, UserData, Values
 from minirospy.compat.smach.util import is_shutdown
 
 __all__ = ["StateMachine"]
@@ -32,7 +32,7 @@ class StateMachine(Container):
         self._states: dict[str, State] = {}
         self._transitions: dict[str, dict[str, str | None]] = {}
         self._remappings: dict[str, Mapping[str, str]] = {}
-        self._constants: dict[str, Mapping[str, Any]] = {}
+        self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
         # Of `add_auto`: the state that was added last, and which of its outcomes lead to the next one.
@@ -47,10 +47,10 @@ class StateMachine(Container):
         # Held except while a state executes: a request to end never comes between two states.
         self._state_transitioning_lock = threading.RLock()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {name: value for name, value in vars(self).items() if name != "_state_transitioning_lock"}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         vars(self).update(state)
         self._state_transitioning_lock = threading.RLock()
 
@@ -59,10 +59,10 @@ class StateMachine(Container):
     @staticmethod
     def add(
         label: str,
-        state: Any,
+        state: State,
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
-        constants: Mapping[str, Any] | None = None,
+        constants: Mapping[str, object] | None = None,
     ) -> Any:
         """Add a state to the open machine, and return it.
 
@@ -77,11 +77,11 @@ class StateMachine(Container):
     @staticmethod
     def add_auto(
         label: str,
-        state: Any,
+        state: State,
         connector_outcomes: Sequence[str],
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
-        constants: Mapping[str, Any] | None = None,
+        constants: Mapping[str, object] | None = None,
     ) -> Any:
         """Add a state whose ``connector_outcomes`` lead to the state that is added next; else as ``add``."""
         machine = StateMachine._currently_opened_container()
@@ -100,10 +100,10 @@ class StateMachine(Container):
     def _add(
         self,
         label: str,
-        state: Any,
+        state: State,
         transitions: Transitions | None,
         remapping: Mapping[str, str] | None,
-        constants: Mapping[str, Any] | None,
+        constants: Mapping[str, object] | None,
     ) -> Any:
         targets = dict(transitions or {})
         logdebug(f"Adding state ({label}, {state}, {targets})")
@@ -128,7 +128,7 @@ class StateMachine(Container):
             self._last_added_label, self._connector_outcomes = None, ()
         return state
 
-    def check_state_spec(self, label: str, state: Any, transitions: Transitions) -> None:
+    def check_state_spec(self, label: str, state: State, transitions: Transitions) -> None:
         """Raise InvalidTransitionError for a transition of an outcome that the state does not have."""
         registered = state.get_registered_outcomes()
         for outcome in transitions:
@@ -166,7 +166,7 @@ class StateMachine(Container):
 
     # Execution.
 
-    def execute(self, parent_ud: Any = None) -> str | None:
+    def execute(self, parent_ud: Values | None = None) -> str | None:
         """Execute states until one leads to an outcome of the machine, and return that; None at a shutdown."""
         with self._state_transitioning_lock:
             try:

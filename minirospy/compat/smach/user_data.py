@@ -9,14 +9,14 @@ from typing import Any
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
 from minirospy.compat.smach.log import logdebug, logerr
 
-__all__ = ["Const", "Remapper", "UserData", "get_const"]
+__all__ = ["Const", "Remapper", "UserData", "Values", "get_const"]
 
 
 class UserData:
     """Values by key, as attributes or items. A missing key is logged, and raises KeyError."""
 
     def __init__(self) -> None:
-        self._data: dict[str, Any] = {}
+        self._data: dict[str, object] = {}
 
     def update(self, other_userdata: UserData) -> None:
         """Take all values of another one."""
@@ -50,7 +50,7 @@ class UserData:
         logerr(f"Userdata key '{key}' not available. Available keys are: {list(self._data)}")
         raise KeyError(key)
 
-    def __setitem__(self, key: str, item: Any) -> None:
+    def __setitem__(self, key: str, item: object) -> None:
         self._data[key] = item
 
     def __getattr__(self, name: str) -> Any:
@@ -58,7 +58,7 @@ class UserData:
             raise AttributeError(name)
         return self[name]
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         if name.startswith("_"):
             object.__setattr__(self, name, value)
         else:
@@ -87,7 +87,7 @@ class Const:
     def __getitem__(self, name: Any) -> Any:
         return get_const(self._obj[name])
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         logerr(f"Attempting to set '{name}' but this member is read-only.")
         object.__setattr__(self, name, value)
 
@@ -106,7 +106,7 @@ class Remapper:
 
     def __init__(
         self,
-        ud: Any,
+        ud: Values,
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
         remapping: Mapping[str, str] | None = None,
@@ -140,7 +140,7 @@ class Remapper:
         value = self._ud[self._remap(key)]
         return value if key in self._output else get_const(value)
 
-    def __setitem__(self, key: str, item: Any) -> None:
+    def __setitem__(self, key: str, item: object) -> None:
         if key in self._output:
             self._ud[self._remap(key)] = item
         else:
@@ -154,8 +154,12 @@ class Remapper:
             raise AttributeError(name)
         return self[name]
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         if name.startswith("_"):
             object.__setattr__(self, name, value)
         else:
             self[name] = value
+
+
+Values = UserData | Remapper
+"""Userdata as a state gets it: of the container itself, or the keys that the state declared."""

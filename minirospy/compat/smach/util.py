@@ -30,7 +30,7 @@ class CBInterface:
 
     def __init__(
         self,
-        cb: Callable[..., Any],
+        cb: Callable[..., object],
         outcomes: Iterable[str] | None = None,
         input_keys: Iterable[str] | None = None,
         output_keys: Iterable[str] | None = None,
@@ -42,7 +42,7 @@ class CBInterface:
         self._outcomes = tuple(outcomes or ())
         self._cb = cb
 
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+    def __call__(self, *args: object, **kwargs: object) -> Any:
         """Call the callback."""
         return self._cb(*args, **kwargs)
 
@@ -70,6 +70,6 @@ class cb_interface:  # noqa: N801 - ROS's name
     ) -> None:
         self._interface = outcomes, input_keys, output_keys
 
-    def __call__(self, cb: Callable[..., Any]) -> CBInterface:
+    def __call__(self, cb: Callable[..., object]) -> CBInterface:
         """Return the callback with its interface."""
         return CBInterface(cb, *self._interface)

@@ -12,6 +12,7 @@ from minirospy.actionlib.simple_server import SimpleActionServer
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
 from minirospy.compat.smach.user_data import Remapper, UserData
+from minirospy.idl.protocols import Message
 
 __all__ = ["ActionServerWrapper"]
 
@@ -93,7 +94,7 @@ class ActionServerWrapper:
         if self._feedback_key in userdata:
             self._action_server.publish_feedback(userdata[self._feedback_key])
 
-    def execute_cb(self, goal: Any) -> None:
+    def execute_cb(self, goal: Message) -> None:
         """Execute the container with a goal, and end the goal by its outcome."""
         self._store_goal(goal)
         container = self.wrapped_container
@@ -125,7 +126,7 @@ class ActionServerWrapper:
             rospy.loginfo("ABORTED")
             self._action_server.set_aborted(result)
 
-    def _store_goal(self, goal: Any) -> None:
+    def _store_goal(self, goal: Message) -> None:
         if self._expand_goal_slots:
             for slot in goal.__slots__:
                 self.userdata[slot] = getattr(goal, slot)

@@ -9,7 +9,7 @@ from typing import Any
 from minirospy import client as rospy
 from minirospy.compat.smach.exceptions import InvalidStateError
 from minirospy.compat.smach.state import State, adopt_interface
-from minirospy.compat.smach.user_data import Remapper
+from minirospy.compat.smach.user_data import Remapper, Values
 from minirospy.compat.smach.util import has_smach_interface
 
 __all__ = ["StateCallback"]
@@ -25,11 +25,11 @@ class StateCallback:
         self,
         state: State,
         what: str,
-        callback: Callable[..., Any] | None,
+        callback: Callable[..., object] | None,
         input_keys: Iterable[str],
         output_keys: Iterable[str],
-        args: Sequence[Any] = (),
-        kwargs: Mapping[str, Any] | None = None,
+        args: Sequence[object] = (),
+        kwargs: Mapping[str, object] | None = None,
     ) -> None:
         """Raise InvalidStateError for what cannot be called; ``what``: such as "Goal", for texts."""
         if callback is not None and not callable(callback):
@@ -57,7 +57,7 @@ class StateCallback:
     def __str__(self) -> str:
         return str(self._callback)
 
-    def __call__(self, ud: Any, *values: Any) -> tuple[bool, Any]:
+    def __call__(self, ud: Values, *values: object) -> tuple[bool, object]:
         """Return whether it went well, and what it returns; an error of it is logged."""
         if self._callback is None:
             return True, None

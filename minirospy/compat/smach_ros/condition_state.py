@@ -9,6 +9,7 @@ from typing import Any
 from minirospy import client as rospy
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
 from minirospy.compat.smach.state import State
+from minirospy.compat.smach.user_data import Values
 
 __all__ = ["ConditionState"]
 
@@ -34,7 +35,7 @@ class ConditionState(State):
         self._timeout = timeout
         self._max_checks = max_checks
 
-    def execute(self, ud: Any) -> str:
+    def execute(self, ud: Values) -> str:
         """Check the condition until an outcome is certain."""
         start = rospy.Time.now()
         checks = 0

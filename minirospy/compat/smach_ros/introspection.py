@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus, SmachContainerStructure
 from std_msgs.msg import Header
@@ -18,6 +17,7 @@ from minirospy.compat import rostopic
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.user_data import UserData
 from minirospy.compat.smach_ros.pickled import pickle_userdata, unpickle_userdata
+from minirospy.idl.protocols import Message
 
 __all__ = [
     "INIT_TOPIC",
@@ -70,7 +70,7 @@ class IntrospectionClient:
                 has_answered.set()
 
         subscriber = rospy.Subscriber(server + STATUS_TOPIC, SmachContainerStatus, check)
-        publisher: rospy.Publisher[Any] = rospy.Publisher(
+        publisher: rospy.Publisher[Message] = rospy.Publisher(
             server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1
         )
         try:
@@ -86,7 +86,7 @@ class IntrospectionClient:
             subscriber.unregister()
 
 
-def _wait_for_connection(publisher: rospy.Publisher[Any]) -> None:
+def _wait_for_connection(publisher: rospy.Publisher[Message]) -> None:
     pause = threading.Event()
     for _ in range(int(_CONNECT_SECONDS / 0.02)):
         if publisher.get_num_connections() or rospy.is_shutdown():
@@ -94,7 +94,7 @@ def _wait_for_connection(publisher: rospy.Publisher[Any]) -> None:
         pause.wait(0.02)
 
 
-def _is_set(status: SmachContainerStatus, initial_states: Sequence[str], data: dict[str, Any]) -> bool:
+def _is_set(status: SmachContainerStatus, initial_states: Sequence[str], data: dict[str, object]) -> bool:
     if not set(initial_states) <= set(status.initial_states):
         return False
     try:
@@ -125,10 +125,10 @@ class ContainerProxy:
             server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._init_cmd_cb
         )
 
-        self._structure_pub: rospy.Publisher[Any] = rospy.Publisher(
+        self._structure_pub: rospy.Publisher[Message] = rospy.Publisher(
             server_name + STRUCTURE_TOPIC, SmachContainerStructure, queue_size=_QUEUE_SIZE
         )
-        self._status_pub: rospy.Publisher[Any] = rospy.Publisher(
+        self._status_pub: rospy.Publisher[Message] = rospy.Publisher(
             server_name + STATUS_TOPIC, SmachContainerStatus, queue_size=_QUEUE_SIZE
         )
         container.register_transition_cb(self._transition_cb)
@@ -181,14 +181,14 @@ class ContainerProxy:
             )
             self._publish(self._status_pub, message)
 
-    def _publish(self, publisher: rospy.Publisher[Any], message: Any) -> None:
+    def _publish(self, publisher: rospy.Publisher[Message], message: Message) -> None:
         try:
             publisher.publish(message)
         except rospy.ROSException as error:
             if not rospy.is_shutdown():
                 rospy.logerr(f"Publishing SMACH introspection of '{self._path}' failed: {error}")
 
-    def _transition_cb(self, *args: Any, **kwargs: Any) -> None:
+    def _transition_cb(self, *args: object, **kwargs: object) -> None:
         self._publish_status(f"{args}, {kwargs}")
 
     def _init_cmd_cb(self, msg: SmachContainerInitialStatusCmd) -> None:

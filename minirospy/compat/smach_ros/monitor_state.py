@@ -8,6 +8,7 @@ from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.smach.state import State
+from minirospy.compat.smach.user_data import Values
 from minirospy.idl.protocols import Message
 
 __all__ = ["MonitorState"]
@@ -39,7 +40,7 @@ class MonitorState(State):
         self._n_checks = 0
         self._trigger_event = threading.Event()
 
-    def execute(self, ud: Any) -> str:
+    def execute(self, ud: Values) -> str:
         """Check the messages of the topic until an outcome is certain; "preempted" at a shutdown, too."""
         if self.preempt_requested():
             self.service_preempt()
@@ -60,7 +61,7 @@ class MonitorState(State):
             return "preempted"
         return "valid" if 0 < self._max_checks <= self._n_checks else "invalid"
 
-    def _check(self, message: Any, ud: Any) -> None:
+    def _check(self, message: Message, ud: Values) -> None:
         if self._trigger_event.is_set():
             return
         try:

@@ -32,7 +32,7 @@ _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg"}
 _MESSAGE = re.compile(r"\w+\.(?:msg|srv)\._\w+")
 
 
-def pickle_userdata(data: Mapping[str, Any]) -> tuple[str, list[str]]:
+def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
     """Return the values as text, and the keys of those that cannot be pickled, which are left out."""
     try:
         return _encoded(dict(data)), []
@@ -49,7 +49,7 @@ def pickle_userdata(data: Mapping[str, Any]) -> tuple[str, list[str]]:
     return _encoded(kept), left_out
 
 
-def unpickle_userdata(text: str) -> dict[str, Any]:
+def unpickle_userdata(text: str) -> dict[str, object]:
     """Return the values of a text. Raises ValueError for what is not one, or holds values that may not be made."""
     try:
         data = _Unpickler(io.BytesIO(base64.b64decode(text, validate=True))).load()
@@ -60,7 +60,7 @@ def unpickle_userdata(text: str) -> dict[str, Any]:
     return data
 
 
-def _encoded(data: dict[str, Any]) -> str:
+def _encoded(data: dict[str, object]) -> str:
     return base64.b64encode(pickle.dumps(data, 2)).decode("ascii")
 
 

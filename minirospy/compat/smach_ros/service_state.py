@@ -7,7 +7,9 @@ from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.smach.state import State
+from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach_ros.callbacks import StateCallback
+from minirospy.idl.protocols import Message
 
 __all__ = ["ServiceState"]
 
@@ -20,14 +22,14 @@ class ServiceState(State):
         service_name: str,
         service_spec: Any,
         request: Any = None,
-        request_cb: Callable[..., Any] | None = None,
-        request_cb_args: Sequence[Any] = (),
-        request_cb_kwargs: Mapping[str, Any] | None = None,
+        request_cb: Callable[..., object] | None = None,
+        request_cb_args: Sequence[object] = (),
+        request_cb_kwargs: Mapping[str, object] | None = None,
         request_key: str | None = None,
         request_slots: Sequence[str] = (),
-        response_cb: Callable[..., Any] | None = None,
-        response_cb_args: Sequence[Any] = (),
-        response_cb_kwargs: Mapping[str, Any] | None = None,
+        response_cb: Callable[..., object] | None = None,
+        response_cb_args: Sequence[object] = (),
+        response_cb_kwargs: Mapping[str, object] | None = None,
         response_key: str | None = None,
         response_slots: Sequence[str] = (),
         input_keys: Iterable[str] = (),
@@ -59,7 +61,7 @@ class ServiceState(State):
         self.register_output_keys([*output_keys, *response_slots, *([response_key] if response_key else [])])
         self.register_outcomes(outcomes)
 
-    def execute(self, ud: Any) -> str:
+    def execute(self, ud: Values) -> str:
         """Call the service."""
         if self.preempt_requested():
             rospy.loginfo(f"Preempting {self._service_name} before sending request.")
@@ -98,7 +100,7 @@ class ServiceState(State):
                 rospy.logwarn(f"Still waiting for service '{self._service_name}'...")
         return None
 
-    def _make_request(self, ud: Any) -> str | None:
+    def _make_request(self, ud: Values) -> str | None:
         """Put the request together; return an outcome where that fails."""
         if self._request_key is not None:
             if self._request_key not in ud:
@@ -124,7 +126,7 @@ class ServiceState(State):
             self._request = changed
         return None
 
-    def _take_response(self, ud: Any, response: Any) -> str:
+    def _take_response(self, ud: Values, response: Message) -> str:
         is_fine, outcome = self._response_cb(ud, response)
         if not is_fine:
             return "aborted"

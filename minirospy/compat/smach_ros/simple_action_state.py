@@ -13,7 +13,9 @@ from minirospy import client as rospy
 from minirospy.actionlib.simple_client import SimpleActionClient
 from minirospy.compat.smach.exceptions import InvalidStateError
 from minirospy.compat.smach.state import State
+from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach_ros.callbacks import StateCallback
+from minirospy.idl.protocols import Message
 from minirospy.times import Duration
 
 __all__ = ["SimpleActionState"]
@@ -39,14 +41,14 @@ class SimpleActionState(State):
         goal: Any = None,
         goal_key: str | None = None,
         goal_slots: Sequence[str] = (),
-        goal_cb: Callable[..., Any] | None = None,
-        goal_cb_args: Sequence[Any] = (),
-        goal_cb_kwargs: Mapping[str, Any] | None = None,
+        goal_cb: Callable[..., object] | None = None,
+        goal_cb_args: Sequence[object] = (),
+        goal_cb_kwargs: Mapping[str, object] | None = None,
         result_key: str | None = None,
         result_slots: Sequence[str] = (),
-        result_cb: Callable[..., Any] | None = None,
-        result_cb_args: Sequence[Any] = (),
-        result_cb_kwargs: Mapping[str, Any] | None = None,
+        result_cb: Callable[..., object] | None = None,
+        result_cb_args: Sequence[object] = (),
+        result_cb_kwargs: Mapping[str, object] | None = None,
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),
         outcomes: Iterable[str] = (),
@@ -94,7 +96,7 @@ class SimpleActionState(State):
 
         self._status = SimpleActionState.WAITING_FOR_SERVER
         self._goal_status = 0
-        self._goal_result: Any = None
+        self._goal_result: Message | None = None
         self._duration: Duration = rospy.Duration(0)
         self._activate_time = rospy.Time.now()
         self._done = threading.Event()
@@ -124,7 +126,7 @@ class SimpleActionState(State):
             rospy.loginfo(f"Preempt on action '{self._action_name}' cancelling goal: \n{self._goal}")
             self._action_client.cancel_goal()
 
-    def execute(self, ud: Any) -> str:
+    def execute(self, ud: Values) -> str:
         """Send the goal, and wait for its result."""
         failure = self._connect() or self._make_goal(ud)
         if failure:
@@ -158,7 +160,7 @@ class SimpleActionState(State):
             return "aborted"
         return None
 
-    def _make_goal(self, ud: Any) -> str | None:
+    def _make_goal(self, ud: Values) -> str | None:
         """Put the goal together; return an outcome where that fails."""
         if self._goal_key is not None:
             self._goal = ud[self._goal_key]
@@ -198,7 +200,7 @@ class SimpleActionState(State):
                 cancelled = now
         return True
 
-    def _take_result(self, ud: Any) -> str:
+    def _take_result(self, ud: Values) -> str:
         is_fine, outcome = self._result_cb(ud, self._goal_status, self._goal_result)
         if not is_fine:
             return "aborted"
@@ -230,10 +232,10 @@ class SimpleActionState(State):
     def _goal_active_cb(self) -> None:
         rospy.logdebug(f"Action {self._action_name} has gone active.")
 
-    def _goal_feedback_cb(self, feedback: Any) -> None:
+    def _goal_feedback_cb(self, feedback: Message) -> None:
         rospy.logdebug(f"Action {self._action_name} sent feedback.")
 
-    def _goal_done_cb(self, result_state: int, result: Any) -> None:
+    def _goal_done_cb(self, result_state: int, result: Message) -> None:
         self._duration = rospy.Time.now() - self._activate_time
         self._goal_status, self._goal_result = result_state, result
         self._done.set()
