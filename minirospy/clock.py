@@ -56,7 +56,7 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
     """Return the nanoseconds in a message of /clock, as it came; None where it is of another type than rosgraph_msgs/Clock."""
-    # One time: seconds and nanoseconds. Any node may publish something else.
+    # One time: seconds and nanoseconds. A node may publish something else.
     if len(body) != _CLOCK.size:
         return None
     seconds, nanoseconds = _CLOCK.unpack(body)

@@ -207,7 +207,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
     """Return the folder of a run's log files; None for a /run_id that cannot be the name of one folder.
 
-    Any node may set that parameter, also to a path that leads elsewhere.
+    Every node may set that parameter, also to a path that leads elsewhere.
     """
     if not isinstance(run_id, str) or not _RUN_ID.fullmatch(run_id):
         return None

@@ -4,7 +4,7 @@ A record is a header (its length, then fields ``name=value``, each with its leng
 bytes). Which record it is, the field ``op`` says. All numbers are little-endian; times are nanoseconds since 1970 here,
 and seconds and nanoseconds of 32 bits each in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
 
-Any order of fields is read, and unknown fields and records are passed over. The way back: `minirospy.bag.encoding`.
+Fields may have every order, and unknown fields and records are passed over. The way back: `minirospy.bag.encoding`.
 """
 
 from __future__ import annotations

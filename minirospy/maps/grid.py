@@ -110,7 +110,7 @@ def read_settings(text: str) -> MapSettings:
     )
 
 
-def _number(fields: dict[str, Any], name: str, article: str) -> float:
+def _number(fields: dict[str, object], name: str, article: str) -> float:
     try:
         return _finite(fields[name])
     except (KeyError, TypeError, ValueError):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,5 +146,5 @@ def _has_alpha(image: Image.Image) -> bool:
     )
 
 
-def _array(image: Any) -> NDArray[np.uint8]:
+def _array(image: object) -> NDArray[np.uint8]:
     return np.asarray(image, np.uint8)

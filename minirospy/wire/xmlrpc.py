@@ -42,7 +42,7 @@ class Call(NamedTuple):
     """A method call."""
 
     method: str
-    args: list[Any]
+    args: list[object]
 
 
 class Serialized:

@@ -183,7 +183,7 @@ class Reader:
             raise RpcProtocolError("ROS has no nil")
         self._clear_text()
 
-    def _scalar(self, tag: str, read: Callable[[str], Any]) -> Any:
+    def _scalar(self, tag: str, read: Callable[[str], Any]) -> object:
         text = self._whole_text()
         if self._binary:
             self._binary.write(read(text))

@@ -82,7 +82,8 @@ def _write_bytes(value: bytes, parts: list[str], depth: int) -> None:
     parts.append(f"<value><base64>{base64.b64encode(value).decode()}</base64></value>")
 
 
-_WRITERS: dict[type, Callable[[Any, list[str], int], None]] = {
+_Writer = Callable[[Any, list[str], int], None]
+_WRITERS: dict[type, _Writer] = {
     int: _write_int,
     bool: _write_bool,
     float: _write_float,
@@ -203,7 +204,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
     out.parts.append("</base64></value>")
 
 
-def _writer_of_kin(value: object) -> Callable[[Any, list[str], int], None]:
+def _writer_of_kin(value: object) -> _Writer:
     """Return the writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):

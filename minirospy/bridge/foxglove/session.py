@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -152,7 +152,7 @@ class FoxgloveSession:
             )
             raise BridgeError(f"{doing} is not allowed: {why}")
 
-    def _spawn(self, work: Any) -> None:
+    def _spawn(self, work: Coroutine[object, object, object]) -> None:
         if len(self._calls) >= _MOST_CALLS:
             work.close()
             raise BridgeError(f"{_MOST_CALLS} requests are under way: wait for an answer")

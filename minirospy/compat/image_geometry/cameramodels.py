@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     Matrix: TypeAlias = Any
     """A numpy.matrix of doubles, which is what programs get from ROS."""
+    Array: TypeAlias = NDArray[Any]
     Point: TypeAlias = Sequence[float]
 
 __all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
@@ -78,7 +79,7 @@ class PinholeCameraModel:
             matrix[0, :3] /= self.binning_x
             matrix[1, :3] /= self.binning_y
 
-    def rectifyImage(self, raw: NDArray[Any], rectified: NDArray[Any]) -> None:
+    def rectifyImage(self, raw: Array, rectified: Array) -> None:
         """Write the rectified image of a raw one into ``rectified``, an array of the same shape and type.
 
         By OpenCV where it is installed, else by numpy with the same interpolation. Raises ValueError where the arrays do
@@ -87,12 +88,12 @@ class PinholeCameraModel:
         self._check()
         rectified_image(raw, rectified, (self.K, self._distortion(), self.R, self.P), self.resolution)
 
-    def rectifyPoint(self, uv_raw: Point) -> NDArray[Any]:
+    def rectifyPoint(self, uv_raw: Point) -> Array:
         """Return the pixel of the rectified image, as an array (u, v), for one of the raw image."""
         self._check()
         return undistorted(uv_raw, self.K, self._distortion(), self.R, self.P)
 
-    def unrectifyPoint(self, uv_rect: Point) -> NDArray[Any]:
+    def unrectifyPoint(self, uv_rect: Point) -> Array:
         """Return the pixel of the raw image, as an array (u, v), for one of the rectified image, as the C++ class does."""
         import numpy as np
 
@@ -198,9 +199,9 @@ class PinholeCameraModel:
         value: float = self._checked_P()[row, column]
         return value
 
-    def _checked_P(self) -> NDArray[Any]:
+    def _checked_P(self) -> Array:
         self._check()
-        array: NDArray[Any] = self.P.A
+        array: Array = self.P.A
         return array
 
     def _check(self) -> None:
@@ -227,7 +228,7 @@ class StereoCameraModel:
         fx, cx, cy = self.right.fx(), self.right.cx(), self.right.cy()
         baseline = _ratio(-self.right.Tx(), fx)
 
-        self.Q: NDArray[Any] = np.zeros((4, 4))
+        self.Q: Array = np.zeros((4, 4))
         self.Q[0, 0] = self.Q[1, 1] = 1.0
         self.Q[0, 3], self.Q[1, 3], self.Q[2, 3] = -cx, -cy, fx
         self.Q[3, 2] = _ratio(1.0, baseline)

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from sensor_msgs.msg import PointCloud2, PointField
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import genpy
     from geometry_msgs.msg import TransformStamped
     from numpy.typing import NDArray
     from sensor_msgs.msg import LaserScan
@@ -69,7 +72,7 @@ class LaserProjection:
         chosen = np.flatnonzero((ranges < limit) & (ranges >= scan_in.range_min))
         distances = ranges[chosen]
 
-        columns: list[tuple[str, int, Any]] = [
+        columns: list[tuple[str, int, Values | int]] = [
             (name, _FLOAT32, axis * distances)
             for name, axis in zip("xy", self._directions_of(scan_in, len(ranges))[:, chosen], strict=True)
         ]
@@ -147,7 +150,7 @@ class LaserProjection:
         return self._directions
 
 
-def _cloud(scan: LaserScan, columns: list[tuple[str, int, Any]], count: int) -> PointCloud2:
+def _cloud(scan: LaserScan, columns: Sequence[tuple[str, int, Values | int]], count: int) -> PointCloud2:
     """Return a cloud of these fields: (name, type, values)."""
     import numpy as np
 
@@ -167,7 +170,7 @@ def _dtype(cloud: PointCloud2) -> Any:
     return np.dtype([(field.name, "<i4" if field.datatype == _INT32 else "<f4") for field in cloud.fields])
 
 
-def _later(stamp: Any, seconds: float) -> Any:
+def _later(stamp: genpy.Time, seconds: float) -> genpy.Time:
     import genpy
 
     return stamp + genpy.Duration.from_sec(seconds)

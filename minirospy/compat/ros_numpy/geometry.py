@@ -115,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
     return position(*matrix[:3, 3].tolist()), Quaternion(*rotation.tolist())
 
 
-def _each(arr: Array, dimensions: int, make: Callable[[Array], Any]) -> Any:
+def _each(arr: Array, dimensions: int, make: Callable[[Array], Any]) -> object:
     """Return a message of the last dimensions; an array of messages where there are more."""
     if arr.ndim == dimensions:
         return make(arr)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -51,7 +51,7 @@ def fields_to_dtype(
     formats = [
         np.dtype(_DTYPES[each.datatype]).newbyteorder(">" if is_bigendian else "<") for each in ordered
     ]
-    shaped: list[Any] = [
+    shaped: list[object] = [
         dtype if each.count == 1 else (dtype, (each.count,))
         for dtype, each in zip(formats, ordered, strict=True)
     ]
@@ -138,7 +138,7 @@ def split_rgb_field(cloud_arr: Array) -> Array:
 
 def _without(cloud: Array, left_out: tuple[str, ...], added: list[tuple[str, type]]) -> Array:
     kept = [name for name in cloud.dtype.names or () if name not in left_out]
-    dtype: list[Any] = [*((name, cloud.dtype[name]) for name in kept), *added]
+    dtype: list[object] = [*((name, cloud.dtype[name]) for name in kept), *added]
     made = np.zeros(cloud.shape, dtype)
     for name in kept:
         made[name] = cloud[name]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["converts_from_numpy", "converts_to_numpy", "msgify", "numpify"]
 
-_Function: TypeAlias = Callable[..., Any]
+_Function: TypeAlias = Callable[..., object]
 _F = TypeVar("_F", bound=_Function)
 
 _to_numpy: dict[tuple[str, bool], _Function] = {}

@@ -380,7 +380,7 @@ class Bag(OpenedBag):
 
         kinds: list[type[Message] | None] = [None] * len(connections)
         new_time, new_message, new_tuple = Time.__new__, object.__new__, tuple.__new__
-        message: Any
+        message: object
         try:
             for chunk, data, found in self._current().blocks([each.id for each in connections], start, end):
                 for nanoseconds, rank, at, body, after in found:

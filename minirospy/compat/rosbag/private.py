@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.bag.compression import NONE
 from minirospy.bag.index import merge_entries
@@ -36,7 +36,7 @@ class BagMessage(NamedTuple):
     """A message; with ``raw`` its type, bytes, md5sum, place and class."""
 
     topic: str
-    message: Any
+    message: object
     timestamp: RospyTime
 
 
@@ -44,7 +44,7 @@ class BagMessageWithConnectionHeader(NamedTuple):
     """A message, and the connection header of its publisher."""
 
     topic: str
-    message: Any
+    message: object
     timestamp: RospyTime
     connection_header: Header
 

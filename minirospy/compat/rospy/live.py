@@ -25,13 +25,17 @@ from minirospy.compat.rospy.rostime import (
 __all__: list[str] = []
 
 
-def _install(module: ModuleType, **names: tuple[Callable[[], object], Callable[[Any], object]]) -> None:
+_Get = Callable[[], object]
+_Put = Callable[[Any], object]
+
+
+def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
     """Give ``module`` attributes: each a function that returns the value, and one that takes a new one.
 
     To delete one brings back the value before, which is how unittest.mock ends a patch.
     """
 
-    def attribute(get: Callable[[], object], put: Callable[[Any], object]) -> property:
+    def attribute(get: _Get, put: _Put) -> property:
         before: list[object] = []
 
         def replace(_: ModuleType, value: object) -> None:

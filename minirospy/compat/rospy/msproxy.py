@@ -44,7 +44,7 @@ class ServerProxy:
     """An XML-RPC server: each attribute is a method of it.
 
     As with xmlrpc.client, a server that cannot be reached is an OSError (ConnectionRefusedError, TimeoutError),
-    a fault of it an xmlrpc.client.Fault. Any number of threads may call.
+    a fault of it an xmlrpc.client.Fault. Many threads may call.
     """
 
     def __init__(self, uri: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 from minirospy.compat.rospy_message_converter.message_converter import (
     convert_dictionary_to_ros_message,
@@ -21,7 +20,7 @@ def convert_json_to_ros_message(
     check_missing_fields: bool = False,
     check_types: bool = True,
     log_level: str = "error",
-) -> Any:
+) -> object:
     """Return a message of a type with the values of a JSON object. Raises ValueError, TypeError, NotFoundError."""
     return convert_dictionary_to_ros_message(
         message_type,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
@@ -35,7 +34,7 @@ class Concurrence(Container):
         output_keys: Iterable[str] = (),
         outcome_map: Mapping[str, Mapping[str, str]] | None = None,
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
-        child_termination_cb: Callable[[dict[str, str | None]], Any] | None = None,
+        child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
         """``outcome_map``: outcome -> (label -> outcome of that state).
 
@@ -82,7 +81,7 @@ class Concurrence(Container):
     # Construction.
 
     @staticmethod
-    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> Any:
+    def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
         """Add a state to the open container, and return it; ``remapping``: the state's key -> the container's."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state

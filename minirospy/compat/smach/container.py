@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.compat.smach.exceptions import (
     InvalidConstructionError,
@@ -199,7 +199,7 @@ class Container(State):
         return stack[-1]
 
 
-def _copy(keys: Iterable[str], source: Any, target: Any, kind: str) -> None:
+def _copy(keys: Iterable[str], source: Values, target: Values, kind: str) -> None:
     for key in keys:
         try:
             target[key] = source[key]

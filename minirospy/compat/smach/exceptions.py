@@ -14,7 +14,7 @@ __all__ = [
 
 
 class SmachError(Exception):
-    """Any of the errors of smach."""
+    """The base of the errors of smach."""
 
     def __init__(self, message: str) -> None:
         logerr(f"{type(self).__name__}: {message}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from minirospy.compat.smach.exceptions import SmachError
 from minirospy.compat.smach.log import logerr
@@ -34,7 +33,7 @@ class Sequence(StateMachine):
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
-    ) -> Any:
+    ) -> object:
         """Add a state, to which the connector outcome of the one before leads unless its transitions say otherwise."""
         sequence = Sequence._currently_opened_container()
         last = sequence._last_added_seq_label

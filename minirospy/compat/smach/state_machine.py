@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from minirospy.compat.smach.container import Container
 from minirospy.compat.smach.exceptions import InvalidStateError, InvalidTransitionError, InvalidUserCodeError
@@ -63,7 +62,7 @@ class StateMachine(Container):
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
-    ) -> Any:
+    ) -> object:
         """Add a state to the open machine, and return it.
 
         ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's;
@@ -82,7 +81,7 @@ class StateMachine(Container):
         transitions: Transitions | None = None,
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
-    ) -> Any:
+    ) -> object:
         """Add a state whose ``connector_outcomes`` lead to the state that is added next; else as ``add``."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
@@ -104,7 +103,7 @@ class StateMachine(Container):
         transitions: Transitions | None,
         remapping: Mapping[str, str] | None,
         constants: Mapping[str, object] | None,
-    ) -> Any:
+    ) -> object:
         targets = dict(transitions or {})
         logdebug(f"Adding state ({label}, {state}, {targets})")
         self.check_state_spec(label, state, targets)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 __all__ = ["CBInterface", "cb_interface", "has_smach_interface", "is_shutdown", "set_shutdown_check"]
 
@@ -42,7 +41,7 @@ class CBInterface:
         self._outcomes = tuple(outcomes or ())
         self._cb = cb
 
-    def __call__(self, *args: object, **kwargs: object) -> Any:
+    def __call__(self, *args: object, **kwargs: object) -> object:
         """Call the callback."""
         return self._cb(*args, **kwargs)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.smach.exceptions import InvalidUserCodeError
@@ -19,7 +18,7 @@ class ConditionState(State):
 
     def __init__(
         self,
-        cond_cb: Callable[[Any], object],
+        cond_cb: Callable[[Values], object],
         input_keys: Iterable[str] = (),
         poll_rate: rospy.Duration = rospy.Duration(0.05),  # noqa: B008 - a Duration does not change
         timeout: rospy.Duration | None = None,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.smach.state import State
@@ -24,7 +23,7 @@ class MonitorState(State):
         self,
         topic: str,
         msg_type: type[Message],
-        cond_cb: Callable[[Any, Any], object],
+        cond_cb: Callable[[Values, Message], object],
         max_checks: int = -1,
         input_keys: Iterable[str] = (),
         output_keys: Iterable[str] = (),

@@ -38,7 +38,7 @@ class SimpleActionState(State):
         self,
         action_name: str,
         action_spec: Any,
-        goal: Any = None,
+        goal: Message | None = None,
         goal_key: str | None = None,
         goal_slots: Sequence[str] = (),
         goal_cb: Callable[..., object] | None = None,

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 from minirospy.errors import RpcError, RpcProtocolError, RpcUnreachable
 from minirospy.graph.master_api import PARAMETERS, Notice
@@ -54,7 +54,7 @@ class State(Protocol):
     def publisher_uris(self, topic: str) -> list[str]:
         """Return the URIs of a topic's publishers."""
 
-    def parameter(self, key: str) -> Any:
+    def parameter(self, key: str) -> object:
         """Return a parameter's value, {} where it is not set; it is not changed afterwards."""
 
     def subscribed_parameters(self, uri: str) -> list[str]:

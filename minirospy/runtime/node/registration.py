@@ -128,7 +128,7 @@ class Registrations:
         """
         return unwrap(method, await self._call_master(method, self._name, *args))
 
-    async def _call_master(self, method: str, *args: object) -> Any:
+    async def _call_master(self, method: str, *args: object) -> object:
         """Call any method of the master. Raises MasterUnreachableError, RpcError."""
         uri = self._environment.master_uri
         # Of a node that closes _wait_for_answers() decides.

@@ -23,7 +23,7 @@ _CONNECT_SECONDS = 5.0
 
 
 class RpcClient:
-    """Calls methods of one server. Any number of threads may call; connections are kept and reused.
+    """Calls methods of one server. Many threads may call; connections are kept and reused.
 
     A call takes a connection out of the pool while it lasts, so that a signal handler which calls in the
     middle of another call of the same thread gets one of its own.
