@@ -48,7 +48,7 @@ async def _start(node: Node) -> Bridge:
     return Bridge(node, options_of(private, os.environ))
 
 
-def options_of(private: Mapping[str, Any], environ: Mapping[str, str]) -> BridgeOptions:
+def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
     """Return the options that a node's private parameters mean. Raise BridgeError."""
     address = _value(private, "address", str, "127.0.0.1")
     beyond = not is_loopback(address)
@@ -97,14 +97,14 @@ def _capabilities(names: Sequence[str]) -> list[str]:
     return [name for name in names if name != "time"]
 
 
-def _value(private: Mapping[str, Any], name: str, kind: type, default: Any) -> Any:
+def _value(private: Mapping[str, object], name: str, kind: type, default: Any) -> Any:
     value = private.get(name, default)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise BridgeError(f"parameter ~{name} is {value!r}: it has to be of type {kind.__name__}")
     return value
 
 
-def _texts(private: Mapping[str, Any], name: str, default: Sequence[str]) -> list[str]:
+def _texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
     value = private.get(name, default)
     if not isinstance(value, list | tuple) or not all(isinstance(each, str) for each in value):
         raise BridgeError(f"parameter ~{name} is {value!r}: it has to be a list of strings")

@@ -43,7 +43,7 @@ def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
 
 
 @converts_from_numpy(Vector3)
-def numpy_to_vector3(arr: Array) -> Any:
+def numpy_to_vector3(arr: Array) -> object:
     """Return three values, or four of which the last is 0, as a vector. Raises AssertionError where it is not."""
     if arr.shape[-1] == 4:
         assert np.all(arr[..., -1] == 0)
@@ -58,7 +58,7 @@ def point_to_numpy(msg: Point, hom: bool = False) -> Floats:
 
 
 @converts_from_numpy(Point)
-def numpy_to_point(arr: Array) -> Any:
+def numpy_to_point(arr: Array) -> object:
     """Return three values, or four homogeneous ones, as a point."""
     if arr.shape[-1] == 4:
         arr = arr[..., :-1] / arr[..., -1:]
@@ -72,7 +72,7 @@ def quat_to_numpy(msg: Quaternion) -> Floats:
 
 
 @converts_from_numpy(Quaternion)
-def numpy_to_quat(arr: Array) -> Any:
+def numpy_to_quat(arr: Array) -> object:
     """Return x, y, z, w as a quaternion. Raises AssertionError where there are not four."""
     assert arr.shape[-1] == 4
     return _each(arr, 1, lambda row: Quaternion(*row.tolist()))
@@ -85,7 +85,7 @@ def transform_to_numpy(msg: Transform) -> Floats:
 
 
 @converts_from_numpy(Transform)
-def numpy_to_transform(arr: Array) -> Any:
+def numpy_to_transform(arr: Array) -> object:
     """Return a 4x4 matrix as a transform. Raises AssertionError where it is not one."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Transform(*_parts(matrix, Vector3)))
@@ -98,7 +98,7 @@ def pose_to_numpy(msg: Pose) -> Floats:
 
 
 @converts_from_numpy(Pose)
-def numpy_to_pose(arr: Array) -> Any:
+def numpy_to_pose(arr: Array) -> object:
     """Return a 4x4 matrix as a pose. Raises AssertionError where it is not one."""
     assert arr.shape[-2:] == (4, 4)
     return _each(arr, 2, lambda matrix: Pose(*_parts(matrix, Point)))

@@ -19,8 +19,7 @@ __all__ = ["numpy_to_occupancy_grid", "occupancygrid_to_numpy"]
 def occupancygrid_to_numpy(msg: OccupancyGrid) -> np.ma.MaskedArray[Any, Any]:
     """Return a map whose unknown cells, -1, are masked. Raises ValueError where it has less data than its size needs."""
     data = np.asarray(msg.data, dtype=np.int8).reshape(msg.info.height, msg.info.width)
-    masked: np.ma.MaskedArray[Any, Any] = np.ma.MaskedArray(data, mask=data == -1, fill_value=-1)
-    return masked
+    return np.ma.MaskedArray(data, mask=data == -1, fill_value=-1)
 
 
 @converts_from_numpy(OccupancyGrid)

@@ -69,7 +69,7 @@ class ROSMasterHandler:
         self._lock = threading.Lock()
         threading.Thread(target=self._notify, name="rosmaster", daemon=True).start()
 
-    def __getattr__(self, name: str) -> Callable[..., tuple[int, str, Any]]:
+    def __getattr__(self, name: str) -> Callable[..., tuple[int, str, object]]:
         # One method for each call of the table.
         if name.startswith("_") or name not in self._api.dispatcher.methods:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
@@ -88,7 +88,7 @@ class ROSMasterHandler:
     def _ok(self) -> bool:
         return not self.done
 
-    def _call(self, name: str, args: tuple[object, ...]) -> tuple[int, str, Any]:
+    def _call(self, name: str, args: tuple[object, ...]) -> tuple[int, str, object]:
         with self._lock:
             answer = self._api.dispatch(name, args)
             code, text, value = (
