@@ -31,6 +31,8 @@ class Measurement(NamedTuple):
     ours: str = ""
     """The program with ours, where that offers a better way."""
     needs_master: bool = False
+    peer: str = ""
+    """The interpreter that runs both programs, where only what they start is ours or real; else each runs its own."""
 
 
 SYNCHRONIZER = """
@@ -146,7 +148,70 @@ print(sorted(times)[len(times) // 2] * 1e3)
 """
 
 
+PASS_ON = """
+import os, subprocess, sys, threading, time
+import rospy
+from sensor_msgs.msg import Image
+
+rospy.init_node("bench", argv=[])
+arrived, sent, times = threading.Semaphore(0), [0.0], []
+
+def received(message):
+    times.append(time.perf_counter() - sent[0])
+    arrived.release()
+
+program = subprocess.Popen(COMMAND, stdout=subprocess.DEVNULL)
+publisher = rospy.Publisher("/bench_in", Image, queue_size=1)
+subscriber = rospy.Subscriber("/bench_out", Image, received, queue_size=1, buff_size=1 << 24)
+image = Image(height=1080, width=1920, encoding="bgr8", step=5760, data=bytes(1080 * 5760))
+
+def send():
+    sent[0] = time.perf_counter()
+    publisher.publish(image)
+
+while not arrived.acquire(timeout=0.2):
+    send()
+time.sleep(0.5)
+while arrived.acquire(timeout=0.1):
+    pass
+times.clear()
+
+def used():
+    words = open(f"/proc/{program.pid}/stat").read().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+before = used()
+for _ in range(100):
+    send()
+    arrived.acquire(timeout=2)
+cpu = (used() - before) / 100
+times.sort()
+program.terminate()
+program.wait()
+print(cpu * 1e3 if WHAT == "cpu" else times[len(times) // 2] * 1e3)
+"""
+
+
+def pass_on(what: str, peer: str, *words: str) -> Measurement:
+    """Return the cost of an image through a program of topic_tools, ours or Debian's, between the same two ends."""
+    scripts = Path(__file__).resolve().parents[1] / "msgs" / "topic_tools" / "scripts"
+    code = PASS_ON.replace("WHAT", repr(what))
+    real = code.replace("COMMAND", repr([f"/usr/lib/topic_tools/{words[0]}", *words[1:]]))
+    ours = code.replace("COMMAND", repr([sys.executable, str(scripts / words[0]), *words[1:]]))
+    unit = "ms of CPU" if what == "cpu" else "ms until it has arrived"
+    return Measurement(f"{unit}, a 6 MB image", real, ours, needs_master=True, peer=peer)
+
+
+RELAY = ("relay", "/bench_in", "/bench_out")
+THROTTLE = ("throttle", "messages", "/bench_in", "1000000", "/bench_out")
+
 MEASUREMENTS = {
+    "relay": pass_on("time", sys.executable, *RELAY),
+    "relay-cpu": pass_on("cpu", sys.executable, *RELAY),
+    "relay-rospy": pass_on("time", REAL, *RELAY),
+    "relay-rospy-cpu": pass_on("cpu", REAL, *RELAY),
+    "throttle": pass_on("time", sys.executable, *THROTTLE),
+    "throttle-cpu": pass_on("cpu", sys.executable, *THROTTLE),
     "image": Measurement("us a 6 MB image", IMAGE.replace("WANTED", "passthrough")),
     "image-rgb": Measurement("us a 6 MB image", IMAGE.replace("WANTED", "rgb8")),
     "reconfigure": Measurement("ms a change of 1 of 10 parameters", RECONFIGURE, needs_master=True),
@@ -192,6 +257,7 @@ def measure(python: str, measurement: Measurement) -> float:
     environment = {**os.environ, "ROS_HOSTNAME": "localhost"}
     if measurement.needs_master:
         environment["ROS_MASTER_URI"] = f"http://localhost:{our_master()}"
+    python = measurement.peer or python
     done = subprocess.run([python, "-c", code], env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{python}: {done.stderr}")

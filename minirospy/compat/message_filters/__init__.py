@@ -229,24 +229,38 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
         """Store a message of an input; pass on the set that it completes."""
-        stamp = _stamp_of(msg, self.allow_headerless)
-        if stamp is None:
-            return
+        try:
+            stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
+        except AttributeError:
+            instead = _stamp_of(msg, self.allow_headerless)
+            if instead is None:
+                return
+            stamp = instead
 
+        nanoseconds = stamp.to_nsec()
         with self.lock:
-            is_stale = self._reset_if_time_jumped(my_queue, my_queue_index)
-            my_queue[stamp] = msg
+            is_stale = self.enable_reset and self._reset_if_time_jumped(my_queue, my_queue_index)
+            if isinstance(my_queue, StampQueue):
+                my_queue.put(nanoseconds, stamp, msg)
+            else:
+                my_queue[stamp] = msg
             now = _now()
             if now < self._last_added:
                 rospy.loginfo("ApproximateTimeSynchronizer: Detected jump back in time. Clearing buffer.")
                 for queue in self.queues:
                     queue.clear()
             self._last_added = now
-            _keep_newest(my_queue, self.queue_size)
+            if len(my_queue) > self.queue_size:
+                _keep_newest(my_queue, self.queue_size)
             if is_stale:
                 return
 
-            found = self._match(my_queue, my_queue_index, stamp)
+            # Most messages come while another input has none: no search for them.
+            if self.queues is self._stamp_queues:
+                for each in self._stamp_queues:
+                    if not each.order:
+                        return
+            found = self._match(my_queue, my_queue_index, stamp, nanoseconds)
             if found:
                 self.signalMessage(*found)
 
@@ -255,7 +269,9 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         """When a message arrived last."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
-    def _match(self, my_queue: Queue, my_queue_index: int | None, stamp: Time) -> list[object]:
+    def _match(
+        self, my_queue: Queue, my_queue_index: int | None, stamp: Time, nanoseconds: int
+    ) -> list[object]:
         """Take the set that a stamp completes out of the queues; return its messages, none without such a set."""
         # A class that is derived from this one may have made its own list, of dicts.
         queues = self._stamp_queues
@@ -264,7 +280,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         if my_queue_index is not None and stamp not in my_queue:
             # It was older than all that the queue keeps.
             return []
-        found = closest_stamps(queues, stamp.to_nsec(), self.slop.to_nsec(), my_queue_index)
+        found = closest_stamps(queues, nanoseconds, self.slop.to_nsec(), my_queue_index)
         if found is None:
             return []
         return [

@@ -26,17 +26,7 @@ class StampQueue(MutableMapping[Time, object]):
             self.update(messages)
 
     def __setitem__(self, stamp: Time, message: object) -> None:
-        nanoseconds = stamp.to_nsec()
-        before = self._entries.get(nanoseconds)
-        if before:
-            # As in a dict, the key that is there keeps its place and its identity.
-            self._entries[nanoseconds] = before[0], before[1], message
-            return
-        self._entries[nanoseconds] = next(self._numbers), stamp, message
-        if self.order and nanoseconds < self.order[-1]:
-            insort(self.order, nanoseconds)
-        else:
-            self.order.append(nanoseconds)
+        self.put(stamp.to_nsec(), stamp, message)
 
     def __getitem__(self, stamp: Time) -> object:
         return self._entries[stamp.to_nsec()][2]
@@ -55,6 +45,20 @@ class StampQueue(MutableMapping[Time, object]):
 
     def __repr__(self) -> str:
         return repr(dict(self))
+
+    def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
+        """Store a message by its stamp, given in nanoseconds, too."""
+        before = self._entries.get(nanoseconds)
+        if before:
+            # As in a dict, the key that is there keeps its place and its identity.
+            self._entries[nanoseconds] = before[0], before[1], message
+            return
+        self._entries[nanoseconds] = next(self._numbers), stamp, message
+        order = self.order
+        if order and nanoseconds < order[-1]:
+            insort(order, nanoseconds)
+        else:
+            order.append(nanoseconds)
 
     def clear(self) -> None:
         """Remove every message."""
