@@ -55,7 +55,12 @@ class Bridge:
     ) -> None:
         self.options = options or BridgeOptions()
         self.node = node
-        self.graph = SharedGraph(node, self.options.filters, slowest_look=self.options.slowest_look)
+        self.graph = SharedGraph(
+            node,
+            self.options.filters,
+            slowest_look=self.options.slowest_look,
+            clock=playback.now if playback else None,
+        )
         self.foxglove = FoxgloveDoor(
             self.graph,
             Assets(Packages(), self.options.assets),

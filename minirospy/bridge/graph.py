@@ -149,9 +149,17 @@ class _SharedPublisher:
 class SharedGraph:
     """The graph for all clients of the bridge; on the node's loop."""
 
-    def __init__(self, node: Node, filters: Filters | None = None, *, slowest_look: float = 1.0) -> None:
-        """``slowest_look``: seconds between looks at a graph that does not change."""
+    def __init__(
+        self,
+        node: Node,
+        filters: Filters | None = None,
+        *,
+        slowest_look: float = 1.0,
+        clock: Callable[[], int] | None = None,
+    ) -> None:
+        """``slowest_look``: seconds between looks at a graph that does not change. ``clock``: see :meth:`now`."""
         self.node = node
+        self._clock = clock
         self.filters = filters or Filters()
         self.snapshot = Snapshot()
         self.topics: dict[str, SharedTopic] = {}
@@ -167,7 +175,9 @@ class SharedGraph:
         self._probing = asyncio.Semaphore(_PROBES)
 
     def now(self) -> int:
-        """Return the node's time in nanoseconds."""
+        """Return the time of messages in nanoseconds: the node's, unless ``clock`` gives another."""
+        if self._clock:
+            return self._clock()
         now = self.node.now()
         return now.secs * 1_000_000_000 + now.nsecs
 

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy import client
 from minirospy.bag.base import StoredMessage
@@ -27,7 +27,7 @@ from minirospy.recording.sources import Bags, ReadAhead, Selection
 if TYPE_CHECKING:
     from std_srvs.srv import SetBoolRequest, SetBoolResponse
 
-__all__ = ["Player"]
+__all__ = ["Player", "PlayerState"]
 
 _SECOND = 10**9
 _TICK = _SECOND // 10
@@ -77,12 +77,33 @@ class _LateSubscribers(client.SubscribeListener):
             peer_publish(message)
 
 
+class PlayerState(NamedTuple):
+    """The state of a player: the bag's time in nanoseconds, and how fast that runs."""
+
+    time: int
+    rate: float
+    is_paused: bool
+    is_at_end: bool
+
+
 class Player:
     """Plays bags, as this process's node, which init_node has made."""
 
-    def __init__(self, bags: Bags, options: PlayOptions) -> None:
+    def __init__(
+        self, bags: Bags, options: PlayOptions, on_ready: Callable[[int, int], object] | None = None
+    ) -> None:
+        """``on_ready(first, last)`` gets the times of what is to be played, before that starts.
+
+        Its caller controls the player from then on by :meth:`control`: so the player stays at the end of the bags.
+        """
         self._bags = bags
         self._options = options
+        self._on_ready = on_ready
+        self._span = (0, 0)
+        self._seek_to: int | None = None
+        self._starts_paused = False
+        self._is_started = False
+        self._is_at_end = False
         self._publishers: dict[str, tuple[client.Publisher[client.AnyMsg], _LateSubscribers]] = {}
         self._outlets: dict[tuple[int, int], _Outlet | None] = {}
         self._wait = PreciseWait()
@@ -112,12 +133,52 @@ class Player:
         self._offer_services()
         last = self._bags.last_time(selection) if options.topics or end else times[1]
         latched = self._bags.last_latched(selection) if options.start else []
+        self._span = first[1].time, last
+        if self._on_ready:
+            # Its clock stands still until the playing starts.
+            self._schedule = Schedule(options._replace(paused=True), *self._span, time.perf_counter_ns())
+            self._starts_paused = options.paused
+            self._on_ready(*self._span)
         # From here on the files are its thread's.
         messages = ReadAhead(self._bags.messages(selection))
         with contextlib.closing(messages):
             self._wait_before(latched)
             self._play_precisely(messages, selection, (first[1].time, last))
         return 0
+
+    def state(self) -> PlayerState:
+        """Return where the player is. From any thread."""
+        with self._lock:
+            schedule = self._schedule
+            if schedule is None:
+                return PlayerState(self._span[0], self._options.rate, self._options.paused, False)
+            now = time.perf_counter_ns()
+            is_paused = schedule.is_paused if self._is_started else self._starts_paused
+            return PlayerState(schedule.status(now).time, schedule.rate, is_paused, self._is_at_end)
+
+    def control(
+        self, *, is_paused: bool | None = None, rate: float | None = None, seek: int | None = None
+    ) -> None:
+        """Pause or go on, change the rate, go on at another time of the bag. From any thread."""
+        now = time.perf_counter_ns()
+        with self._lock:
+            if (schedule := self._schedule) is None:
+                return
+            if rate is not None and rate != schedule.rate:
+                schedule.set_rate(rate, now)
+            if seek is not None:
+                self._seek_to = min(max(seek, self._span[0]), self._span[1])
+                # What is shown until the files have been read from there.
+                schedule.seek(self._seek_to, now)
+            if is_paused is not None and not self._is_started:
+                self._starts_paused = is_paused
+            elif is_paused is not None:
+                schedule.set_paused(is_paused, now)
+            if self._is_at_end and is_paused is False and seek is None:
+                self._seek_to = self._span[0]
+            if self._seek_to is not None:
+                self._is_at_end = False
+        self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
         """Wait for subscribers, as the options demand; publish what was latched before the start."""
@@ -141,11 +202,21 @@ class Player:
         try:
             messages.wait()
             # Before the keys are read: the first ones count.
-            self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
+            with self._lock:
+                self._start(span)
             with read_keys(self._on_key):
                 self._play_all(messages, selection, span)
         finally:
             sys.setswitchinterval(interval)
+
+    def _start(self, span: tuple[int, int]) -> None:
+        """Start the clock, with what was requested since the schedule was made."""
+        now = time.perf_counter_ns()
+        schedule, self._is_started = self._schedule, True
+        if schedule is None:
+            self._schedule = Schedule(self._options, *span, now)
+        elif not self._starts_paused:
+            schedule.set_paused(False, now)
 
     # --- what it offers
 
@@ -221,6 +292,11 @@ class Player:
             if self._schedule and not self._ended and not self._options.quiet:
                 # All of it has been played, however long ago the last line was.
                 self._show_status(self._schedule, time.perf_counter_ns())
+            if self._on_ready and not self._options.loop:
+                self._wait_at_end()
+            if (start := self._take_seek()) is not None and not self._ended:
+                messages = self._read_from(start, messages, selection)
+                continue
             if self._options.keep_alive:
                 self._keep_alive()
             if self._ended:
@@ -233,18 +309,55 @@ class Player:
             messages = ReadAhead(self._bags.messages(selection))
             messages.wait()
             with self._lock:
-                self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
+                if self._schedule and self._on_ready:
+                    # With the rate that was set meanwhile.
+                    self._schedule.seek(span[0], time.perf_counter_ns())
+                else:
+                    self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
+
+    def _wait_at_end(self) -> None:
+        """Wait for a seek; the keys and the clock work as ever."""
+        schedule = self._schedule
+        assert schedule
+        self._is_at_end = self._seek_to is None
+        while not self._ended and self._seek_to is None:
+            now = time.perf_counter_ns()
+            self._tick(schedule, now)
+            self._wait.until(now + _TICK)
+        self._is_at_end = False
+
+    def _take_seek(self) -> int | None:
+        with self._lock:
+            start, self._seek_to = self._seek_to, None
+        return start
+
+    def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
+        """Return the messages from a time on, after publishing what was latched before."""
+        messages.join()
+        selection = selection._replace(start=start)
+        for number, message in self._bags.last_latched(selection):
+            self._publish(number, message)
+        found = ReadAhead(self._bags.messages(selection))
+        found.wait()
+        with self._lock:
+            if self._schedule and self._seek_to is None:
+                self._schedule.seek(start, time.perf_counter_ns())
+        return found
 
     def _play(self, message: StoredMessage) -> bool:
-        """Wait until a message is due; return False at a shutdown."""
+        """Wait until a message is due; return False at a shutdown, and where another time is wanted."""
         schedule = self._schedule
         assert schedule
         now = time.perf_counter_ns()
         with self._lock:
+            if self._seek_to is not None:
+                return False
             schedule.offer(message.time, message.connection.topic, now)
         while not self._ended:
             self._tick(schedule, now)
             with self._lock:
+                if self._seek_to is not None:
+                    return False
                 wait = schedule.poll(now)
             if wait is None:
                 # At a step the clock shows the message's time first.

@@ -81,6 +81,7 @@ class Schedule:
         self._delayed = False
         self._pauses_at: Collection[str] = options.pause_topics
         self._controlled = first
+        self._rate = options.rate
         self._next_tick = wall
         self._period = max(1, int(_SECOND / options.clock_hz)) if options.clock else 0
 
@@ -88,6 +89,26 @@ class Schedule:
     def is_paused(self) -> bool:
         """Return whether it is paused."""
         return self._paused
+
+    @property
+    def rate(self) -> float:
+        """Return how fast the bag's clock runs, compared with the wall's."""
+        return self._rate
+
+    def set_rate(self, rate: float, wall: int) -> None:
+        """Go on at another rate, from where the clock is."""
+        self._advance(wall)
+        self._rate = rate
+        self._start_from(self._clock, wall)
+
+    def seek(self, time: int, wall: int) -> None:
+        """Go on at another time of the bag; the next message is to be offered."""
+        self._clock = self._message = time
+        self._is_due = False
+        self._delayed = False
+        self._steps = 0
+        self._next_tick = wall
+        self._start_from(time, wall)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
         """Take the next message: its time, its topic, and the time now."""
@@ -186,13 +207,18 @@ class Schedule:
 
     def _due(self) -> int:
         """Return the wall's time of the message."""
-        return self._origin + self._scaled(self._message - self._first, 1 / self._options.rate)
+        return self._origin + self._scaled(self._message - self._first, 1 / self._rate)
 
     def _bag_time(self, wall: int) -> int:
-        return self._first + self._scaled(wall - self._origin, self._options.rate)
+        return self._first + self._scaled(wall - self._origin, self._rate)
 
     def _scaled(self, span: int, factor: float) -> int:
-        return span if self._options.rate == 1.0 else round(span * factor)
+        return span if self._rate == 1.0 else round(span * factor)
+
+    def _start_from(self, time: int, wall: int) -> None:
+        """Let the clock show ``time`` at ``wall``."""
+        self._origin = wall - self._scaled(time - self._first, 1 / self._rate)
+        self._since = wall
 
     def _advance(self, wall: int) -> None:
         """Move the clock on, at most to the message that is next."""

@@ -114,7 +114,10 @@ class ReadAhead:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
         self._stop = threading.Event()
         self._first = threading.Event()
-        threading.Thread(target=self._read, args=(messages,), name="rosbag-reader", daemon=True).start()
+        self._thread = threading.Thread(
+            target=self._read, args=(messages,), name="rosbag-reader", daemon=True
+        )
+        self._thread.start()
 
     def __iter__(self) -> Iterator[tuple[int, StoredMessage]]:
         """Yield what the iterator yields; raise what it raises."""
@@ -130,6 +133,10 @@ class ReadAhead:
     def close(self) -> None:
         """Have the thread end."""
         self._stop.set()
+
+    def join(self) -> None:
+        """Wait until the thread has ended, after :meth:`close`: then the files are the caller's again."""
+        self._thread.join()
 
     def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         try:

@@ -226,3 +226,35 @@ def test_the_clock_runs_on_when_it_is_kept_alive() -> None:
     wall.schedule.run_on(3 * SECOND)
 
     assert wall.schedule.tick(3 * SECOND) == START + 3 * SECOND
+
+
+def test_rate_changes_from_where_the_clock_is() -> None:
+    wall = Wall(PlayOptions())
+    wall.play(0.0, 1.0)
+    wall.schedule.set_rate(2.0, wall.now)
+    assert wall.schedule.rate == 2.0
+    assert wall.play(3.0)[-1] == Published(3.0, 2.0)
+    wall.schedule.set_rate(0.5, wall.now)
+    assert wall.play(4.0)[-1] == Published(4.0, 4.0)
+
+
+def test_seek_goes_on_at_another_time() -> None:
+    wall = Wall(PlayOptions())
+    wall.play(0.0, 1.0)
+    wall.schedule.seek(START + 8 * SECOND, wall.now)
+    assert wall.schedule.status(wall.now).played == 8 * SECOND
+    assert wall.play(8.5)[-1] == Published(8.5, 1.5)
+    wall.schedule.seek(START + 2 * SECOND, wall.now)
+    assert wall.play(3.0)[-1] == Published(3.0, 2.5)
+
+
+def test_seek_while_paused_waits_there() -> None:
+    wall = Wall(PlayOptions())
+    wall.play(0.0)
+    wall.schedule.set_paused(True, wall.now)
+    wall.schedule.seek(START + 5 * SECOND, wall.now)
+    wall.events = []
+    wall.now = 3 * SECOND
+    assert wall.schedule.status(wall.now).played == 5 * SECOND
+    wall.schedule.set_paused(False, wall.now)
+    assert wall.play(5.5)[-1] == Published(5.5, 3.5)

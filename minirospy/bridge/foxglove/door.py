@@ -41,6 +41,9 @@ class Playback(Protocol):
     def range(self) -> tuple[int, int]:
         """Start and end of what is played, in nanoseconds."""
 
+    def now(self) -> int:
+        """Return the time of what is played, which stamps messages."""
+
     def state(self) -> PlaybackState: ...
 
     def control(self, control: PlaybackControl) -> None: ...
@@ -128,7 +131,7 @@ class FoxgloveDoor:
     def capabilities_of(self, client: WebClient) -> list[str]:
         """Return what a client may do."""
         found = list(self._options.capabilities)
-        if self.graph.node.simulated:
+        if self.graph.node.simulated or self.playback:
             found.append("time")
         if self.playback:
             found.append("playbackControl")

@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/rosbag/Commandline#play. Options and texts are those
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -76,6 +77,10 @@ def _parser() -> Parser:
         "topic publishes again to continue playback")  # fmt: skip
     add("--rate-control-max-delay", type=float, default=1.0, metavar="RATE_CONTROL_MAX_DELAY",
         help="maximum time difference from <rate-control-topic> before pausing")  # fmt: skip
+    own = parser.own_options().add_argument
+    own("--foxglove", action="store_true",
+        help="serve Foxglove and Lichtblick, which get a timeline to pause, seek and change the rate")  # fmt: skip
+    own("--foxglove-port", type=int, default=8765, metavar="PORT", help="port for that (8765)")
     return parser
 
 
@@ -102,6 +107,8 @@ def _play(
     wait_for_subscribers: bool,
     rate_control_topic: str,
     rate_control_max_delay: float,
+    foxglove: bool,
+    foxglove_port: int,
 ) -> int:
     from minirospy.names import parse_arguments
     from minirospy.recording.schedule import PlayOptions
@@ -135,7 +142,9 @@ def _play(
         rate_control_max_delay=_nanoseconds("--rate-control-max-delay", rate_control_max_delay),
         quiet=quiet,
     )
-    return _run(paths, options)
+    if not 0 <= foxglove_port < 65536:
+        raise UsageError(f"--foxglove-port {foxglove_port} is not between 0 and 65535")
+    return _run(paths, options, foxglove_port if foxglove else None)
 
 
 def _nanoseconds(name: str, seconds: float) -> int:
@@ -144,19 +153,32 @@ def _nanoseconds(name: str, seconds: float) -> int:
     return round(seconds * 1e9)
 
 
-def _run(paths: list[str], options: PlayOptions) -> int:
+def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> int:
     # Imported here: the help needs none of it.
     from minirospy import client
     from minirospy.recording.player import Player
     from minirospy.recording.sources import Bags
 
-    with Bags(paths) as bags:
+    with Bags(paths) as bags, contextlib.ExitStack() as serving:
+        if foxglove_port is not None:
+            from minirospy.bridge.serve import require_libraries
+
+            require_libraries()
+
+        def serve(first: int, last: int) -> None:
+            from minirospy.bridge.playback import PlayerBridge
+
+            assert foxglove_port is not None
+            bridge = serving.enter_context(PlayerBridge(player, (first, last), foxglove_port))
+            print("\n".join(bridge.lines), flush=True)
+
         try:
             # Without the ROS time: that is what it may publish.
             client.init_node("play", anonymous=True, disable_rostime=True)
             for path in paths:
                 client.loginfo("Opening %s", path)
-            return Player(bags, options).run()
+            player = Player(bags, options, serve if foxglove_port is not None else None)
+            return player.run()
         except ROSInterruptException:
             return 0  # while it registered
         finally:
