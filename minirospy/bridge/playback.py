@@ -103,7 +103,7 @@ class PlayerBridge:
         time = -1
         while True:
             state = self._playback.state()
-            if (state.status, state.speed) != shown or state.request_id or state.did_seek:
+            if (state.status, state.speed) != shown:
                 shown = (state.status, state.speed)
                 bridge.foxglove.playback_changed(state)
             if state.now != time:

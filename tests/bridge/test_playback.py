@@ -91,7 +91,7 @@ def test_front_end_controls_the_player(player: Client) -> None:
         pass
 
     # At the end: back, at another rate.
-    status, time, _, _ = control(player, 0, 100.0, START + 98 * SECOND, b"back")
+    status, time, _, _ = control(player, 0, 20.0, START + 98 * SECOND, b"back")
     assert status == PLAYING
     assert [text_of(player.next_binary(1))[1] for _ in range(3)] == [
         f"message {number}" for number in (98, 99, 100)

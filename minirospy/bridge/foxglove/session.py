@@ -343,3 +343,4 @@ class FoxgloveSession:
         self._require("playbackControl", "controlling the player")
         assert self._door.playback
         self._door.playback.control(event)
+        self._door.playback_changed(self._door.playback.state())
