@@ -38,13 +38,14 @@ __all__ = [
 
 PROVIDED = frozenset(
     """
-    actionlib angles catkin class_loader cmake_modules cpp_common cv_bridge diagnostic_updater dynamic_reconfigure
-    eigen_conversions gencpp geneus genlisp genmsg gennodejs genpy image_geometry image_transport
-    interactive_markers joint_state_publisher kdl_parser laser_geometry message_filters message_generation
-    message_runtime nodelet pluginlib python_qt_binding robot_state_publisher rosbag rosbuild rosbash rosconsole
-    rosgraph roslang roslaunch roslib roslint rosmaster rosmsg rosnode rosout rospack rosparam rospy rosservice
-    rostest rostime rostopic rosunit roswtf rqt_gui rqt_gui_py rviz tf tf2 tf2_eigen tf2_geometry_msgs tf2_kdl
-    tf2_py tf2_ros tf2_sensor_msgs tf_conversions urdf urdfdom xacro xmlrpcpp
+    actionlib angles camera_calibration_parsers camera_info_manager camera_info_manager_py catkin class_loader
+    cmake_modules cpp_common cv_bridge diagnostic_updater dynamic_reconfigure eigen_conversions gencpp geneus
+    genlisp genmsg gennodejs genpy image_geometry image_transport interactive_markers joint_state_publisher
+    kdl_parser laser_geometry message_filters message_generation message_runtime nodelet pluginlib python_qt_binding
+    resource_retriever robot_state_publisher rosbag rosbuild rosbash rosconsole rosgraph roslang roslaunch roslib
+    roslint rosmaster rosmsg rosnode rosout rospack rosparam rospy rosservice rostest rostime rostopic rosunit
+    roswtf rqt_gui rqt_gui_py rviz tf tf2 tf2_eigen tf2_geometry_msgs tf2_kdl tf2_py tf2_ros tf2_sensor_msgs
+    tf_conversions urdf urdfdom xacro xmlrpcpp
     """.split()  # noqa: SIM905
 )
 """Packages without messages that packages of Python name: minirospy does their part, or a compiler would."""

@@ -18,6 +18,7 @@ libactionlib-dev
 libbondcpp-dev
 libdiagnostic-aggregator-tools
 libdynamic-reconfigure-config-init-mutex-dev
+liblaser-geometry-dev
 libroscpp-dev
 libroslib-dev
 libsensor-msgs-dev
