@@ -223,7 +223,7 @@ def test_wrong_words_are_refused(words: list[str], status: int, text: str) -> No
 
 def test_list_of_transports() -> None:
     done = subprocess.run(
-        [sys.executable, str(PROGRAM.with_name("list_transports"))],
+        [str(Path(sys.executable).with_name("rosrun")), "image_transport", "list_transports"],
         capture_output=True,
         text=True,
         timeout=60,

@@ -16,6 +16,14 @@ from sensor_msgs.msg import CameraInfo
 from tests.interop.conftest import REAL_PYTHON, environment
 
 CONVERT = "/usr/lib/camera_calibration_parsers/convert"
+OUR_CONVERT = (
+    Path(__file__).parents[2]
+    / "minirospy"
+    / "ros_packages"
+    / "camera_calibration_parsers"
+    / "nodes"
+    / "convert"
+)
 QUERY = """
 import json, sys
 from image_geometry import PinholeCameraModel
@@ -48,6 +56,28 @@ def test_written_calibration_is_the_real_one(kind: str, name: str, tmp_path: Pat
     assert done.returncode == 0, done.stdout + done.stderr
     assert ours.read_text() == theirs.read_text()
     assert readCalibration(str(theirs)) == readCalibration(str(ours))
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        ([], "Usage: "),
+        (["missing.yaml", "x.ini"], "Failed to load camera model from file missing.yaml"),
+        (["good.ini", "x.foo"], "Failed to save camera model to file x.foo"),
+        (["good.ini", "x.yaml"], "Saved x.yaml"),
+    ],
+)
+def test_convert_exits_as_the_real_one(words: list[str], text: str, tmp_path: Path) -> None:
+    info = CameraInfo(width=4, height=3, distortion_model="plumb_bob", D=[0.0] * 5)
+    assert writeCalibration(str(tmp_path / "good.ini"), "camera", info)
+    found = [
+        subprocess.run(
+            [*program, *words], capture_output=True, text=True, timeout=60, cwd=tmp_path, check=False
+        )
+        for program in ([CONVERT], [sys.executable, str(OUR_CONVERT)])
+    ]
+    assert all(text in done.stdout + done.stderr for done in found)
+    assert found[0].returncode == found[1].returncode
 
 
 def test_random_cameras_give_the_real_numbers(tmp_path: Path) -> None:

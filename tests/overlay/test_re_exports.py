@@ -12,6 +12,7 @@ COMPAT = OVERLAY.with_name("compat")
 SHARED = {
     "cv_bridge/compressed.py",
     "elsewhere.py",
+    "camera_calibration_parsers/convert.py",
     "camera_calibration_parsers/texts.py",
     "image_geometry/rectification.py",
     "image_transport/__init__.py",
