@@ -24,7 +24,7 @@ help:
 	@echo "make lint     check style (ruff) and types (mypy)"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
-	@echo "make fuzz     send random requests to a master for ten minutes"
+	@echo "make fuzz     send random requests to a master and to the bridge, ten minutes each"
 	@echo "make mutants  put small faults into graph/, wire/ and the journal; list those that no test notices"
 	@echo "make clean    remove the environment and all that was generated"
 
@@ -52,6 +52,7 @@ bench: $(STAMP)
 
 fuzz: $(STAMP)
 	@$(BIN)/python tests/fuzz.py
+	@$(BIN)/python tests/fuzz_bridge.py
 
 lint: $(STAMP)
 	@$(BIN)/python -m ruff check .
