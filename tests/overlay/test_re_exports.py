@@ -33,6 +33,7 @@ SHARED = {
     "rpi.py",
     "rospy/live.py",
     "rospy/passing.py",
+    "bondpy/machine.py",
     "smach_ros/callbacks.py",
     "smach_ros/pickled.py",
     "rostopic/echo.py",

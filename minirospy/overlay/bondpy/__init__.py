@@ -1,0 +1,1 @@
+"""bondpy, provided by minirospy. Source: http://wiki.ros.org/bondpy."""
