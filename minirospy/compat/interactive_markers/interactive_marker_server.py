@@ -1,0 +1,260 @@
+"""The server of interactive markers: what a program inserts, moves and erases, and what viewers report.
+
+Topics: NS/update, NS/update_full (latched, all markers), NS/feedback.
+Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Basic%20Controls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Lock
+
+from geometry_msgs.msg import Pose
+from std_msgs.msg import Header
+from visualization_msgs.msg import (
+    InteractiveMarker,
+    InteractiveMarkerFeedback,
+    InteractiveMarkerInit,
+    InteractiveMarkerPose,
+    InteractiveMarkerUpdate,
+)
+
+from minirospy import client as rospy
+
+__all__ = ["InteractiveMarkerServer", "MarkerContext", "UpdateContext"]
+
+Callback = Callable[[InteractiveMarkerFeedback], object]
+
+_QUEUE_SIZE = 100
+_KEEP_ALIVE = 0.5
+"""Seconds between two updates, so that viewers know that the server is there."""
+_TURN = 1.0
+"""Seconds for which a marker belongs to the viewer that moved it last."""
+_UNCHANGED: Callback | int = -1
+
+
+class MarkerContext:
+    """A marker that viewers know."""
+
+    def __init__(self) -> None:
+        self.last_feedback = rospy.Time.now()
+        self.last_client_id = ""
+        self.default_feedback_cb: Callback | None = None
+        self.feedback_cbs: dict[int, Callback] = {}
+        self.int_marker = InteractiveMarker()
+
+
+@dataclass
+class UpdateContext:
+    """A change of a marker that is not published yet."""
+
+    FULL_UPDATE = 0
+    POSE_UPDATE = 1
+    ERASE = 2
+
+    update_type: int = FULL_UPDATE
+    int_marker: InteractiveMarker = field(default_factory=InteractiveMarker)
+    default_feedback_cb: Callback | None = None
+    feedback_cbs: dict[int, Callback] = field(default_factory=dict)
+
+
+class InteractiveMarkerServer:
+    """Markers of one namespace. What changes them is published by ``applyChanges``."""
+
+    DEFAULT_FEEDBACK_CB = 255
+
+    def __init__(self, topic_ns: str, server_id: str = "", q_size: int = 100) -> None:
+        """``server_id``: to be given where a node has several servers; ``q_size``: of the feedback's queue."""
+        self.topic_ns = topic_ns
+        self.seq_num = 0
+        self.mutex = Lock()
+        self.server_id = rospy.get_name() + server_id
+        self.marker_contexts: dict[str, MarkerContext] = {}
+        self.pending_updates: dict[str, UpdateContext] = {}
+
+        self.init_pub: rospy.Publisher[InteractiveMarkerInit] = rospy.Publisher(
+            f"{topic_ns}/update_full", InteractiveMarkerInit, latch=True, queue_size=_QUEUE_SIZE
+        )
+        self.update_pub: rospy.Publisher[InteractiveMarkerUpdate] = rospy.Publisher(
+            f"{topic_ns}/update", InteractiveMarkerUpdate, queue_size=_QUEUE_SIZE
+        )
+        self._subscriber = rospy.Subscriber(
+            f"{topic_ns}/feedback", InteractiveMarkerFeedback, self.processFeedback, queue_size=q_size
+        )
+        self._timer = rospy.Timer(rospy.Duration(_KEEP_ALIVE), self.keepAlive, reset=True)
+        self.publishInit()
+
+    # What a program calls.
+
+    def insert(
+        self,
+        marker: InteractiveMarker,
+        feedback_cb: Callback | int | None = _UNCHANGED,
+        feedback_type: int = DEFAULT_FEEDBACK_CB,
+    ) -> None:
+        """Add or replace a marker; see ``setCallback`` for the other arguments."""
+        with self.mutex:
+            update = self.pending_updates.setdefault(marker.name, UpdateContext())
+            update.update_type = UpdateContext.FULL_UPDATE
+            update.int_marker = marker
+        if not isinstance(feedback_cb, int):
+            self.setCallback(marker.name, feedback_cb, feedback_type)
+
+    def setCallback(
+        self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
+    ) -> bool:
+        """Set what is called with feedback of a type, or with all feedback that has no function of its own.
+
+        None: nothing. Return whether there is such a marker. It holds at once.
+        """
+        with self.mutex:
+            found = [
+                context
+                for context in (self.marker_contexts.get(name), self.pending_updates.get(name))
+                if context is not None
+            ]
+            for context in found:
+                if feedback_type == self.DEFAULT_FEEDBACK_CB:
+                    context.default_feedback_cb = feedback_cb
+                elif feedback_cb:
+                    context.feedback_cbs[feedback_type] = feedback_cb
+                else:
+                    context.feedback_cbs.pop(feedback_type, None)
+            return bool(found)
+
+    def setPose(self, name: str, pose: Pose, header: Header | None = None) -> bool:
+        """Move a marker; a header without a frame keeps the marker's. Return whether viewers know such a marker.
+
+        As in ROS, one that is to be added or replaced by the next ``applyChanges`` is not moved.
+        """
+        with self.mutex:
+            context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
+            if context is None or (update is not None and update.update_type == UpdateContext.FULL_UPDATE):
+                return False
+            if header is None or not header.frame_id:
+                header = context.int_marker.header
+            self.doSetPose(update, name, pose, header)
+            return True
+
+    def erase(self, name: str) -> bool:
+        """Erase a marker; return whether there is one."""
+        with self.mutex:
+            if name not in self.pending_updates and name not in self.marker_contexts:
+                return False
+            self.pending_updates.setdefault(name, UpdateContext()).update_type = UpdateContext.ERASE
+            return True
+
+    def clear(self) -> None:
+        """Erase all markers, and forget changes that are not published."""
+        with self.mutex:
+            self.pending_updates = {name: UpdateContext(UpdateContext.ERASE) for name in self.marker_contexts}
+
+    def get(self, name: str) -> InteractiveMarker | None:
+        """Return a marker as it will be after the changes; None without it."""
+        context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
+        if update is None:
+            return context.int_marker if context else None
+        if update.update_type == UpdateContext.FULL_UPDATE:
+            return update.int_marker
+        if update.update_type == UpdateContext.ERASE or context is None:
+            return None
+        context.int_marker.pose = update.int_marker.pose
+        return context.int_marker
+
+    def applyChanges(self) -> None:
+        """Publish what has changed."""
+        with self.mutex:
+            if not self.pending_updates:
+                return
+            message = InteractiveMarkerUpdate(type=InteractiveMarkerUpdate.UPDATE)
+            for name, update in self.pending_updates.items():
+                self._apply(name, update, message)
+            self.pending_updates = {}
+            self.seq_num += 1
+        self.publish(message)
+        self.publishInit()
+
+    def _apply(self, name: str, update: UpdateContext, message: InteractiveMarkerUpdate) -> None:
+        """Change a marker, and add that to a message."""
+        context = self.marker_contexts.get(name)
+        if update.update_type == UpdateContext.FULL_UPDATE:
+            if context is None:
+                context = self.marker_contexts[name] = MarkerContext()
+                context.default_feedback_cb = update.default_feedback_cb
+                context.feedback_cbs = update.feedback_cbs
+            context.int_marker = update.int_marker
+            message.markers.append(context.int_marker)
+        elif context is None:
+            # A marker that was to be added and was erased before; viewers never knew it.
+            return
+        elif update.update_type == UpdateContext.POSE_UPDATE:
+            marker = context.int_marker
+            marker.pose, marker.header = update.int_marker.pose, update.int_marker.header
+            message.poses.append(
+                InteractiveMarkerPose(header=marker.header, pose=marker.pose, name=marker.name)
+            )
+        else:
+            del self.marker_contexts[name]
+            message.erases.append(name)
+
+    # What comes from viewers, and goes to them.
+
+    def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        """Move a marker as a viewer says, and call the program's function.
+
+        For a second, another viewer's feedback for the marker is ignored.
+        """
+        with self.mutex:
+            context = self.marker_contexts.get(feedback.marker_name)
+            if context is None:
+                return
+            now = rospy.Time.now()
+            age = (now - context.last_feedback).to_sec()
+            # Negative: the clock has jumped back.
+            if context.last_client_id != feedback.client_id and 0 <= age < _TURN:
+                rospy.logdebug(
+                    f"Rejecting feedback for {feedback.marker_name}: conflicting feedback from separate clients."
+                )
+                return
+            context.last_feedback, context.last_client_id = now, feedback.client_id
+
+            if feedback.event_type == feedback.POSE_UPDATE:
+                # A marker without a stamp stays in its frame.
+                header = context.int_marker.header
+                self.doSetPose(
+                    self.pending_updates.get(feedback.marker_name),
+                    feedback.marker_name,
+                    feedback.pose,
+                    feedback.header if header.stamp else header,
+                )
+            callback = context.feedback_cbs.get(feedback.event_type, context.default_feedback_cb)
+        if callback is not None:
+            callback(feedback)
+
+    def keepAlive(self, msg: object) -> None:
+        """Publish an update without changes."""
+        self.publish(InteractiveMarkerUpdate(type=InteractiveMarkerUpdate.KEEP_ALIVE))
+
+    def publish(self, update: InteractiveMarkerUpdate) -> None:
+        """Publish an update with the server's name and the number of its last change."""
+        update.server_id = self.server_id
+        update.seq_num = self.seq_num
+        self.update_pub.publish(update)
+
+    def publishInit(self) -> None:
+        """Publish all markers, for viewers that come later."""
+        with self.mutex:
+            markers = [context.int_marker for context in self.marker_contexts.values()]
+            self.init_pub.publish(
+                InteractiveMarkerInit(server_id=self.server_id, seq_num=self.seq_num, markers=markers)
+            )
+
+    def doSetPose(self, update: UpdateContext | None, name: str, pose: Pose, header: Header) -> None:
+        """Move a marker with the next changes; the lock is held by the caller."""
+        if update is None:
+            update = self.pending_updates[name] = UpdateContext(UpdateContext.POSE_UPDATE)
+        elif update.update_type != UpdateContext.FULL_UPDATE:
+            update.update_type = UpdateContext.POSE_UPDATE
+        update.int_marker.pose = pose
+        update.int_marker.header = header

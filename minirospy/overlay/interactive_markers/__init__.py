@@ -1,0 +1,1 @@
+"""interactive_markers, provided by minirospy. Source: http://wiki.ros.org/interactive_markers."""

@@ -1,0 +1,13 @@
+"""interactive_markers.interactive_marker_server, provided by minirospy. Source: http://wiki.ros.org/interactive_markers."""
+
+from minirospy.compat.interactive_markers.interactive_marker_server import (
+    InteractiveMarkerServer,
+    MarkerContext,
+    UpdateContext,
+)
+
+__all__ = [
+    "InteractiveMarkerServer",
+    "MarkerContext",
+    "UpdateContext",
+]

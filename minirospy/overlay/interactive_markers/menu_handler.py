@@ -1,0 +1,11 @@
+"""interactive_markers.menu_handler, provided by minirospy. Source: http://wiki.ros.org/interactive_markers."""
+
+from minirospy.compat.interactive_markers.menu_handler import (
+    EntryContext,
+    MenuHandler,
+)
+
+__all__ = [
+    "EntryContext",
+    "MenuHandler",
+]
