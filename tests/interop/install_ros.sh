@@ -16,6 +16,7 @@ iproute2
 joint-state-publisher
 libactionlib-dev
 libbondcpp-dev
+libdiagnostic-aggregator-dev
 libdiagnostic-aggregator-tools
 libdynamic-reconfigure-config-init-mutex-dev
 liblaser-geometry-dev

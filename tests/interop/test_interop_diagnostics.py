@@ -1,0 +1,35 @@
+"""diagnostic_aggregator: Debian's programs publish what is recorded in tests/compat/aggregator; bonds with both."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.interop.conftest import REAL_PYTHON, environment
+
+HERE = Path(__file__).parents[1] / "compat" / "aggregator"
+OURS = HERE.parents[2] / "minirospy" / "ros_packages" / "diagnostic_aggregator" / "nodes"
+REAL = Path("/usr/lib/diagnostic_aggregator")
+
+
+@pytest.mark.parametrize(
+    ("python", "programs"),
+    [
+        pytest.param(REAL_PYTHON, [str(REAL)], id="real programs, real rospy"),
+        pytest.param(REAL_PYTHON, [str(OURS), sys.executable], id="our programs, real rospy"),
+        pytest.param(sys.executable, [str(REAL)], id="real programs, our rospy"),
+    ],
+)
+def test_programs_publish_what_is_recorded(python: str, programs: list[str], master: str) -> None:
+    done = subprocess.run(
+        [python, str(HERE / "drive.py"), *programs],
+        env=environment(master, "rospy"),
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
+    assert done.stdout == (HERE / "drive.txt").read_text(encoding="utf-8"), done.stderr
