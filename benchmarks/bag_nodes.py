@@ -3,7 +3,8 @@
 record: a publisher that waits for its subscriber sends images of 6 MB, then messages of 1 kB, as fast as it takes them;
 measured are the bytes a second that are in the bag when the recorder has ended, with the messages that are missing in
 it, its CPU time and its peak memory. play: how much later than stored each message arrives, from the earliest one on, at
-one subscriber for all players. `--rounds 3` repeats all; `--folder` is where the bags go: the disk that is measured.
+one subscriber for all players. `--rounds 3` repeats all, in turns, and prints the medians of the rounds; `--folder` is where
+the bags go: the disk that is measured.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import argparse
 import os
 import random
 import signal
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -19,6 +21,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from minirospy.bag.reader import open_bag
 from minirospy.bag.writer import BagWriter
@@ -49,7 +52,19 @@ def stacks() -> list[str]:
     return ["C++", "minirospy"] if (CPP / "record").exists() else ["minirospy"]
 
 
-def record(stack: str, size: int, count: int, folder: Path) -> str:
+class Measured(NamedTuple):
+    """A case, the stack, and what was measured: names with their units, and values."""
+
+    case: str
+    stack: str
+    values: dict[str, float]
+
+    def __str__(self) -> str:
+        values = "  ".join(f"{name} {value:.0f}" for name, value in self.values.items())
+        return f"{self.case:26} {self.stack:10} {values}"
+
+
+def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     """Record ``count`` messages of ``size`` bytes; return what was measured."""
     loop = LoopThread("publisher")
     node = Node(f"/bench_{time.time_ns()}", Environment.read())
@@ -82,10 +97,16 @@ def record(stack: str, size: int, count: int, folder: Path) -> str:
     bag.unlink()
     loop.run(node.close())
     loop.close()
-    return (
-        f"record {size:>8} B x {count:<7} {stack:10} {size * found / seconds / 1e6:7.0f} MB/s "
-        f"{found / seconds:8.0f} messages/s  lost {count - found}  "
-        f"CPU {usage.ru_utime + usage.ru_stime:5.2f} s  peak {usage.ru_maxrss / 1024:5.0f} MB"
+    return Measured(
+        f"record {size} B",
+        stack,
+        {
+            "MB/s": size * found / seconds / 1e6,
+            "messages/s": found / seconds,
+            "lost": count - found,
+            "CPU ms": 1000 * (usage.ru_utime + usage.ru_stime),
+            "peak MB": usage.ru_maxrss / 1024,
+        },
     )
 
 
@@ -112,8 +133,8 @@ def make_bag(path: Path, hz: float, seconds: float, size: int) -> list[int]:
     return times
 
 
-def play(stack: str, path: Path, times: list[int], what: str) -> str:
-    """Play a bag; return how late its messages came."""
+def play(stack: str, path: Path, times: list[int], what: str) -> Measured:
+    """Play a bag; return how many microseconds later than stored its messages came."""
     arrived: dict[int, int] = {}
 
     def deliver(body: memoryview | bytes, _: Header) -> None:
@@ -131,14 +152,28 @@ def play(stack: str, path: Path, times: list[int], what: str) -> str:
     def quantile(fraction: float) -> float:
         return errors[int(fraction * (len(errors) - 1))]
 
-    return (
-        f"play {what:20} {stack:10} later than stored, us: median {quantile(0.5):6.0f}  90 % {quantile(0.9):6.0f}  "
-        f"99 % {quantile(0.99):6.0f}  most {errors[-1]:6.0f}  lost {len(times) - len(errors)}"
+    return Measured(
+        f"play {what}",
+        stack,
+        {
+            "median us": quantile(0.5),
+            "90 %": quantile(0.9),
+            "99 %": quantile(0.99),
+            "most": errors[-1],
+            "lost": len(times) - len(errors),
+        },
     )
 
 
-def run(arguments: argparse.Namespace, folder: Path) -> Iterator[str]:
-    """Yield a line of each case."""
+def medians(measured: list[Measured]) -> Iterator[Measured]:
+    """Yield the medians of all rounds of each case and stack."""
+    for key in dict.fromkeys((one.case, one.stack) for one in measured):
+        rounds = [one.values for one in measured if (one.case, one.stack) == key]
+        yield Measured(*key, {name: statistics.median(each[name] for each in rounds) for name in rounds[0]})
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> Iterator[Measured]:
+    """Yield what each case gives, round by round."""
     for _ in range(arguments.rounds):
         if "record" in arguments.cases:
             for size, count in ((6_000_000, arguments.megabytes // 6), (1000, arguments.megabytes * 250)):
@@ -176,8 +211,13 @@ def main() -> None:
         os.environ.update(
             ROS_MASTER_URI=f"http://localhost:{master.port}", ROS_HOSTNAME="localhost", ROS_HOME=folder
         )
-        for line in run(arguments, Path(folder)):
-            print(line, flush=True)
+        measured = []
+        for one in run(arguments, Path(folder)):
+            measured.append(one)
+            print(one, flush=True)
+        if arguments.rounds > 1:
+            print(f"medians of {arguments.rounds} rounds:")
+            print(*medians(measured), sep="\n")
     loop.run(master.close())
     loop.close()
     assert threading.active_count() < 20

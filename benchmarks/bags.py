@@ -1,8 +1,10 @@
 """`python benchmarks/bags.py`: messages a second and memory of the rosbag API and commands, beside Debian's and rosbags.
 
 Each case is a process: minirospy's, Debian's rosbag (where /usr/bin/python3 has it) and PyPI's rosbags, on the same bag. Rates
-are of CPU time, so that a busy machine disturbs them less; memory is the peak of the process. `--messages 10000000 --cases
-open,list,filter` shows the memory of a large bag; `--large 5000 --cases info` the time for one of 5 GB.
+are of CPU time, so that a busy machine disturbs them less; memory is the peak of the process. All modules are compiled before,
+as they are where packages are installed. `--messages 10000000 --cases open,list,filter` shows the memory of a large bag;
+`--large 5000 --cases info,info_mcap` the time for one of 5 GB and its MCAP twin; `--nodes 3` adds three rounds of bag_nodes.py:
+record and play beside the C++ ones.
 """
 
 from __future__ import annotations
@@ -70,8 +72,8 @@ store = get_typestore(Stores.ROS1_NOETIC)
 
 def write():
     String = store.types["std_msgs/msg/String"]
-    path.with_suffix(".rosbags").unlink(missing_ok=True)
-    with Writer(path.with_suffix(".rosbags")) as bag:
+    path.with_suffix(".bag.rosbags").unlink(missing_ok=True)
+    with Writer(path.with_suffix(".bag.rosbags")) as bag:
         connection = bag.add_connection("/chatter", "std_msgs/msg/String", typestore=store)
         message = String("x" * 100)
         for number in range(count):
@@ -108,6 +110,8 @@ CASES = {
     "open": ("ms", ("minirospy", "Debian's rosbag", "rosbags")),
     "list": ("ms", ("minirospy", "Debian's rosbag")),
     "info": ("ms", ("minirospy", "Debian's rosbag")),
+    "info_mcap": ("ms", ("minirospy",)),
+    "start": ("ms", ("minirospy", "Debian's rosbag")),
     "filter": ("ms", ("minirospy", "Debian's rosbag")),
 }
 """What is measured -> its unit, and who takes part."""
@@ -136,7 +140,7 @@ def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
 
 def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
     """Return how many were done, CPU seconds, seconds and MB of one process; None where the peer is missing."""
-    if case in ("info", "filter"):
+    if case in ("info", "info_mcap", "start", "filter"):
         return command(case, stack, path)
     python, program = {
         "minirospy": (sys.executable, API),
@@ -163,6 +167,8 @@ def command(case: str, stack: str, path: Path) -> list[float] | None:
         return None
     words = {
         "info": ["info", str(path)],
+        "info_mcap": ["info", str(path.with_suffix(".mcap"))],
+        "start": ["-h"],
         "filter": ["filter", str(path), f"{path}.filtered", "topic == '/topic3'"],
     }[case]
     measuring = (
@@ -189,8 +195,13 @@ def main() -> None:
         "--large", type=int, default=0, metavar="MB", help="messages of 1 MB, so many, instead"
     )
     parser.add_argument("--compression", default="none", choices=["none", "bz2", "lz4"])
-    parser.add_argument("--cases", default=",".join(CASES), help="some of: " + ", ".join(CASES))
+    parser.add_argument(
+        "--cases",
+        default=",".join(case for case in CASES if case != "info_mcap"),
+        help="some of: " + ", ".join(CASES),
+    )
     parser.add_argument("--stacks", default="minirospy,Debian's rosbag,rosbags")
+    parser.add_argument("--nodes", type=int, default=0, metavar="ROUNDS", help="rounds of bag_nodes.py")
     options = parser.parse_args()
 
     with tempfile.TemporaryDirectory() as folder:
@@ -201,8 +212,23 @@ def main() -> None:
             f"{messages} messages of {size} bytes, {options.compression}: {path.stat().st_size / 1e6:.0f} MB"
         )
         print(f"{'case':8}{'stack':18}{'CPU':>14} {'':12}{'wall s':>8}{'peak MB':>9}{'to minirospy':>14}")
-        for case in options.cases.split(","):
+        os.environ["PYTHONPYCACHEPREFIX"] = str(Path(folder) / "compiled")
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        cases = options.cases.split(",")
+        if "info_mcap" in cases:
+            subprocess.run(
+                [
+                    str(Path(sys.executable).with_name("rosbag")),
+                    "convert",
+                    "-q",
+                    path,
+                    path.with_suffix(".mcap"),
+                ],
+                check=True,
+            )
+        for case in cases:
             ours = 0.0
+            run(case, "minirospy", path, messages)
             unit, stacks = CASES[case]
             for stack in stacks:
                 figures = run(case, stack, path, messages) if stack in options.stacks.split(",") else None
@@ -213,8 +239,11 @@ def main() -> None:
                 ours = ours or value
                 ratio = ours / value if unit == "messages/s" else value / ours
                 print(f"{case:8}{stack:18}{value:>14,.0f} {unit:12}{wall:>8.2f}{memory:>9.0f}{ratio:>13.1f}x")
-            for extra in Path(folder).glob("bench.*[!g]"):
+            for extra in Path(folder).glob("bench.bag.*"):
                 extra.unlink()
+    if options.nodes:
+        nodes = Path(__file__).with_name("bag_nodes.py")
+        subprocess.run([sys.executable, nodes, "--rounds", str(options.nodes)], check=True)
 
 
 if __name__ == "__main__":
