@@ -16,11 +16,12 @@ from minirospy.bag import compression as compressions
 from minirospy.bag.base import BagReader
 from minirospy.bag.mcap_reader import open_bag_or_mcap
 from minirospy.bag.mcap_repair import MAGIC, McapRepair
+from minirospy.bag.reader import ChunkedReader
 from minirospy.bag.reader12 import unindexed_bag12
 from minirospy.bag.records import Connection, read_version
 from minirospy.bag.repair import Repair
 from minirospy.bag.writer import BagWriter, Continued
-from minirospy.errors import BagFormatError, DefinitionError, UsageError, ValueTextError
+from minirospy.errors import BagError, BagFormatError, DefinitionError, UsageError, ValueTextError
 from minirospy.times import Time
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ __all__ = [
     "Progress",
     "backup_path",
     "check_bag_name",
+    "chunks_end",
     "class_of",
     "class_of_connection",
     "compress",
@@ -75,6 +77,15 @@ def data_size(reader: BagReader) -> int:
     """Return the bytes of all chunks, decompressed; of a bag without chunks the size of the file."""
     headers = reader.chunk_headers().values()
     return sum(each.chunk.size for each in headers) or reader.size()
+
+
+def chunks_end(path: str) -> int:
+    """Return where the index of a bag of version 2.0 is; 0 if it has none. Raise OSError."""
+    try:
+        with open_reader(path) as reader:
+            return reader.index_position if isinstance(reader, ChunkedReader) else 0
+    except BagError:
+        return 0
 
 
 def backup_path(path: str) -> str:

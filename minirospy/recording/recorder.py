@@ -88,6 +88,8 @@ class Recorder:
             self._announcement = client.Publisher("begin_write", String, latch=True, queue_size=1)
         if not self._wait_for_time():
             return 0
+        if self.options.node:
+            client.loginfo("Recording from: %s", self.options.node)
 
         workers = os.cpu_count() or 1
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None

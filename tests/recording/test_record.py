@@ -87,8 +87,9 @@ def test_a_node_s_topics_are_recorded(talker: Talker, start: Start, tmp_path: Pa
     say(listened, "one")
     say(other, "two")
     written(tmp_path / "out.bag", b"one")
-    end(process)
+    _, output, _ = end(process)
 
+    assert output.startswith("Recording from: talker\n")
     assert [said(one.body) for one in messages(tmp_path / "out.bag")] == ["one"]
 
 

@@ -94,7 +94,7 @@ def _reindex_one(source: str, target: str, quiet: bool) -> None:
             bags.convert12(source, target, progress)
         return
     shutil.copy(source, target)
-    with showing_progress(target, size, quiet=quiet) as progress:
+    with showing_progress(target, bags.chunks_end(source) or size, quiet=quiet) as progress:
         problems = bags.reindex(target, progress)
     for problem in problems:
         warn(f"{source}: {problem}")
