@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.srv import FrameGraph, FrameGraphRequest, FrameGraphResponse
 
@@ -83,15 +85,11 @@ class Buffer(BufferCore, BufferInterface):
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """
-        if nanoseconds(timeout) > 0:
-            wait_until(
-                self,
-                lambda: bool(self.can_transform_core(target_frame, source_frame, time)[0]),
-                timeout,
-                self.CAN_TRANSFORM_POLLING_SCALE,
-            )
-        result = self.can_transform_core(target_frame, source_frame, time)
-        return result if return_debug_tuple else result[0]
+
+        def possible() -> tuple[int, str]:
+            return self.can_transform_core(target_frame, source_frame, time)
+
+        return self._wait_and_test(possible, timeout, return_debug_tuple)
 
     def can_transform_full(
         self,
@@ -110,6 +108,11 @@ class Buffer(BufferCore, BufferInterface):
                 target_frame, target_time, source_frame, source_time, fixed_frame
             )
 
+        return self._wait_and_test(possible, timeout, return_debug_tuple)
+
+    def _wait_and_test(
+        self, possible: Callable[[], tuple[int, str]], timeout: Moment, return_debug_tuple: bool
+    ) -> int | tuple[int, str]:
         if nanoseconds(timeout) > 0:
             wait_until(self, lambda: bool(possible()[0]), timeout, self.CAN_TRANSFORM_POLLING_SCALE)
         result = possible()

@@ -5,7 +5,9 @@ The texts are ROS's; tests/interop compares them with what the real commands pri
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -124,3 +126,15 @@ def test_exit_status_of_help_is_that_of_ros(
     main = import_module(f"minirospy.cli.ros.{name}").main
     assert tuple(main(words) for words in ([], ["-h"], ["--help"], ["nope"])) == statuses
     assert f"Commands:\n\t{name} " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("command", "kind"), [("main", "msg"), ("main_srv", "srv")])
+def test_unknown_package_of_a_type_lists_where_it_was_searched(
+    command: str, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = getattr(import_module("minirospy.cli.ros.rosmsg"), command)
+    assert main(["show", "nope/Nope"]) == 1
+    text, _, searched = capsys.readouterr().err.splitlines()[0].partition(" on search path ")
+    assert text.endswith("Cannot locate message [Nope]: unknown package [nope]")
+    (folders,) = ast.literal_eval(searched)
+    assert [Path(folder).parts[-2:] for folder in folders["std_msgs"]] == [("std_msgs", kind)]

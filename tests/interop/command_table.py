@@ -189,6 +189,7 @@ rosmsg show Log
 rosmsg show actionlib/TestAction
 rosmsg show <<< std_msgs/Header\\n
 rosmsg show std_msgs/Bol
+rosmsg show unknown/X
 rosmsg show -b nope.bag std_msgs/Bool
 rosmsg show -r std_msgs/Header ## the comments of the definitions are our own
 rosmsg show ''
@@ -208,6 +209,7 @@ rossrv show Empty
 rossrv show <<< std_srvs/SetBool\\n
 rossrv show nope
 rossrv show std_srvs/Nope
+rossrv show unknown/X
 rossrv show -b nope.bag std_srvs/Empty
 rossrv info std_srvs/Trigger
 rossrv md5 std_srvs/SetBool
@@ -573,6 +575,7 @@ _CHANGING = [
     (re.compile(r"\[\['\S*/(?=\w+/(?:msg|srv)'\]\])"), "[['SHARE/"),
     (re.compile(r"(?<=named nope below )\S*/"), "SHARE/"),
     (re.compile(r"(?<=package \[std_msgs\] in )\S*/"), "SHARE/"),
+    (re.compile(r"(?<=on search path \[)\{.*?\}(?=\]$)", re.MULTILINE), "SHARE"),
     (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
     # roslaunch colours its errors also where they go to a file, and writes tracebacks that ours has none of.
     (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),

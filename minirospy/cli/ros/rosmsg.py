@@ -79,10 +79,12 @@ class _Verbs:
         )
         if "/" in base:
             return f"{refused}: invalid name [{name}]"
+        packages = Packages()
         try:
-            folder = Packages().find(package) / self.kind.value
+            folder = packages.find(package) / self.kind.value
         except NotFoundError:
-            return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path"
+            searched = {name: [str(path / self.kind.value)] for name, path in packages.folders().items()}
+            return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path [{searched}]"
         return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"
 
     def list_parser(self) -> Parser:
