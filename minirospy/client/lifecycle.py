@@ -9,7 +9,7 @@ import contextlib
 import logging
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 from minirospy import errors
 from minirospy.client.deferral import Deferral, is_main_thread
@@ -32,6 +32,24 @@ class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
 class _ThisThread(threading.local):
     def __init__(self, main: ThreadState) -> None:
         self.state = main if is_main_thread() else ThreadState()
+
+
+class _Interrupting:
+    """The block of :meth:`Lifecycle.interrupting`; a class, since each service call passes through it."""
+
+    __slots__ = ("_interrupt", "_lifecycle")
+
+    def __init__(self, lifecycle: Lifecycle, interrupt: Callable[[], object]) -> None:
+        self._lifecycle = lifecycle
+        self._interrupt = interrupt
+
+    def __enter__(self) -> None:
+        self._lifecycle.interrupts.append(self._interrupt)
+        if self._lifecycle.shutting_down.is_set():
+            self._interrupt()
+
+    def __exit__(self, *_: object) -> None:
+        self._lifecycle.interrupts.remove(self._interrupt)
 
 
 class Lifecycle:
@@ -105,19 +123,12 @@ class Lifecycle:
                     self.left.set()
         return True
 
-    @contextlib.contextmanager
-    def interrupting(self, interrupt: Callable[[], object]) -> Iterator[None]:
+    def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
         """While a block runs, have a shutdown call ``interrupt`` to end what blocks in it.
 
         A signal's handler may call it, in any moment of the main thread: the events that it sets are SignalSafeEvents.
         """
-        self.interrupts.append(interrupt)
-        try:
-            if self.is_shutdown():
-                interrupt()
-            yield
-        finally:
-            self.interrupts.remove(interrupt)
+        return _Interrupting(self, interrupt)
 
     def spin(self) -> None:
         """Wait until the node shuts down."""
