@@ -1,0 +1,85 @@
+"""Which program of this machine plays a file or says a text, and how it is called. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+__all__ = ["PLAYERS", "SPEAKERS", "Command", "play_command", "say_command"]
+
+Which = Callable[[str], "str | None"]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A program with its arguments, and what it reads on its standard input."""
+
+    words: Sequence[str]
+    text: str | None = None
+
+
+def _powershell(script: str) -> list[str]:
+    return ["-NoProfile", "-NonInteractive", "-Command", script]
+
+
+# The file is the last word, or $args[0].
+PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
+    "paplay": lambda file, volume: [f"--volume={round(volume * 65536)}", file],
+    "pw-play": lambda file, volume: [f"--volume={volume:.3f}", file],
+    "ffplay": lambda file, volume: [
+        *("-nodisp", "-autoexit", "-loglevel", "error", "-volume", str(round(volume * 100))),
+        file,
+    ],
+    "gst-play-1.0": lambda file, volume: ["--no-interactive", "--quiet", f"--volume={volume:.3f}", file],
+    "afplay": lambda file, volume: ["-v", f"{volume:.3f}", file],
+    "aplay": lambda file, volume: ["-q", file],
+    "powershell": lambda file, volume: _powershell(
+        f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
+    ),
+}
+"""Players in order of preference -> the arguments for a file and a volume from 0 to 1."""
+
+SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
+    "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
+    "espeak": lambda text, voice, volume: Command(_espeak(voice, volume), text),
+    "festival": lambda text, voice, volume: Command([*_festival(voice), "--tts"], text),
+    "flite": lambda text, voice, volume: Command(["-t", text]),
+    "say": lambda text, voice, volume: Command(["-f", "-"], text),
+    "powershell": lambda text, voice, volume: Command(
+        _powershell(
+            "Add-Type -AssemblyName System.Speech; $s = New-Object Speech.Synthesis.SpeechSynthesizer; "
+            f"$s.Volume = {round(volume * 100)}; $s.Speak([Console]::In.ReadToEnd())"
+        ),
+        text,
+    ),
+}
+"""Programs that say a text, in order of preference."""
+
+
+def _espeak(voice: str, volume: float) -> list[str]:
+    # Names such as voice_kal_diphone are festival's.
+    names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
+    return ["--stdin", "-a", str(round(volume * 100)), *names]
+
+
+def _festival(voice: str) -> list[str]:
+    return [f"({voice})"] if voice.startswith("voice_") and voice.replace("_", "").isalnum() else []
+
+
+def play_command(file: str, volume: float, which: Which) -> Command | None:
+    """Return what plays a file; None without a player."""
+    for name, arguments in PLAYERS.items():
+        program = which(name)
+        if program:
+            return Command([program, *arguments(file, volume)])
+    return None
+
+
+def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
+    """Return what says a text; None without a program for it."""
+    for name, make in SPEAKERS.items():
+        program = which(name)
+        if program:
+            command = make(text, voice, volume)
+            return Command([program, *command.words], command.text)
+    return None
