@@ -107,6 +107,10 @@ AROUND = [
     "dynamic_reconfigure.encoding",
     "dynamic_reconfigure.server",
     "dynamic_reconfigure.parameter_generator_catkin",
+    "diagnostic_updater",
+    "bondpy.bondpy",
+    "interactive_markers.interactive_marker_server",
+    "interactive_markers.menu_handler",
 ]
 """The modules of the second page."""
 FRAMES = [
@@ -142,6 +146,7 @@ OF_ROS = (
     "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
     "PyKDL",
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
+    "diagnostic_updater", "bondpy", "interactive_markers",
     "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure", "image_geometry", "laser_geometry", "camera_calibration_parsers",
     "resource_retriever",
 )  # fmt: skip
@@ -298,6 +303,9 @@ MEMBERS_INSIDE = {
         ),
         "the generator's inside",
     ),
+    **dict.fromkeys(
+        ("Connected", "Death", "Heartbeat", "SisterDied", "StartDying"), "the inside of Bond's state machine"
+    ),
     "decode": "xmlrpc's own",
     "custom_strify_message": "the inside of CallbackEcho",
     "findCaller": "logging's own",
@@ -393,7 +401,7 @@ def shown_default(default: Any) -> str:
         return "sys.argv"
     if isinstance(default, set):
         return "{" + ", ".join(sorted(map(repr, default))) + "}"
-    return re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default))
+    return " ".join(re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default)).split())
 
 
 def compare(real: Any, ours: Any) -> str:

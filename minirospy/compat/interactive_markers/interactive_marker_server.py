@@ -123,7 +123,7 @@ class InteractiveMarkerServer:
                     context.feedback_cbs.pop(feedback_type, None)
             return bool(found)
 
-    def setPose(self, name: str, pose: Pose, header: Header | None = None) -> bool:
+    def setPose(self, name: str, pose: Pose, header: Header = Header()) -> bool:  # noqa: B008 - it is only read
         """Move a marker; a header without a frame keeps the marker's. Return whether viewers know such a marker.
 
         As in ROS, one that is to be added or replaced by the next ``applyChanges`` is not moved.
@@ -132,7 +132,7 @@ class InteractiveMarkerServer:
             context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
             if context is None or (update is not None and update.update_type == UpdateContext.FULL_UPDATE):
                 return False
-            if header is None or not header.frame_id:
+            if not header.frame_id:
                 header = context.int_marker.header
             self.doSetPose(update, name, pose, header)
             return True

@@ -1,5 +1,7 @@
 """interactive_markers.interactive_marker_server, provided by minirospy. Source: http://wiki.ros.org/interactive_markers."""
 
+from std_msgs.msg import Header
+
 from minirospy.compat.interactive_markers.interactive_marker_server import (
     InteractiveMarkerServer,
     MarkerContext,
@@ -7,6 +9,7 @@ from minirospy.compat.interactive_markers.interactive_marker_server import (
 )
 
 __all__ = [
+    "Header",
     "InteractiveMarkerServer",
     "MarkerContext",
     "UpdateContext",
