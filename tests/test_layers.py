@@ -17,7 +17,7 @@ LAYERS = [
     {"launch"},
     {"bridge"},
     {"frames"},
-    {"introspect", "actionlib", "robots", "maps", "recording", "teleop", "topic_tools"},
+    {"introspect", "actionlib", "robots", "maps", "recording", "rosserial", "teleop", "topic_tools"},
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},

@@ -172,11 +172,8 @@ _QT_LIBRARIES = (
 )
 
 _MESSAGES = (
-    "ackermann_msgs",
     "mavros_msgs",
     "moveit_msgs",
-    "object_recognition_msgs",
-    "octomap_msgs",
     "costmap_converter",
     "robot_localization_msgs",
 )

@@ -1,0 +1,182 @@
+"""What a device asks for: its topics and services, each a publisher, subscriber, service or proxy of the node."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+from rosserial_msgs.msg import TopicInfo
+
+from minirospy import client as rospy
+from minirospy.errors import MinirospyError
+from minirospy.idl.load import get_message_class, get_service_class
+
+__all__ = ["EndpointError", "Publisher", "ServiceClient", "ServiceServer", "Subscriber", "to_bytes"]
+
+Send = Callable[[int, bytes], object]
+
+_LOOK_SECONDS = 0.2
+
+
+class EndpointError(MinirospyError):
+    """A topic or service cannot be had as a device describes it."""
+
+
+def to_bytes(message: Any) -> bytes:
+    """Return a message as it goes over the line."""
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def _message_class(info: TopicInfo) -> Any:
+    found = get_message_class(info.message_type)
+    if found is None:
+        raise EndpointError(
+            f"Cannot import package of message type [{info.message_type}]: build or install it on this side, too"
+        )
+    _compare(found._md5sum, info.md5sum)
+    return found
+
+
+def _compare(ours: str, theirs: str) -> None:
+    if ours != theirs:
+        raise EndpointError(f"Checksum does not match: {ours},{theirs}")
+
+
+class Publisher:
+    """Passes messages of the device on to ROS. Raises EndpointError."""
+
+    def __init__(self, info: TopicInfo) -> None:
+        self.topic = info.topic_name
+        self.message = _message_class(info)
+        self.publisher: rospy.Publisher[Any] = rospy.Publisher(self.topic, self.message, queue_size=10)
+
+    def handle(self, data: bytes) -> None:
+        """Publish a message."""
+        message = self.message()
+        message.deserialize(data)
+        self.publisher.publish(message)
+
+    def unregister(self) -> None:
+        """Stop publishing."""
+        self.publisher.unregister()
+
+
+class Subscriber:
+    """Passes messages of ROS on to the device. Raises EndpointError."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        self.topic = info.topic_name
+        self.id = info.topic_id
+        self.message = _message_class(info)
+        self._send = send
+        self._subscriber: rospy.Subscriber[Any] = rospy.Subscriber(self.topic, self.message, self._receive)
+
+    def _receive(self, message: Any) -> None:
+        self._send(self.id, to_bytes(message))
+
+    def unregister(self) -> None:
+        """Stop subscribing."""
+        rospy.loginfo("Removing subscriber: %s", self.topic)
+        self._subscriber.unregister()
+
+
+class _Service:
+    """A service's classes, and the id under which the device gets its half of a call. Raises EndpointError."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        self.topic = info.topic_name
+        self.id = -1
+        self._send = send
+        found = get_service_class(info.message_type)
+        if found is None:
+            raise EndpointError(
+                f"Cannot import package of service type [{info.message_type}]: build or install it on this side, too"
+            )
+        self.service_class: Any = found
+        self.request: Any = self.service_class._request_class
+        self.response: Any = self.service_class._response_class
+
+    def check_request(self, info: TopicInfo) -> None:
+        """Raise EndpointError where the device's request is another."""
+        _compare(self.request._md5sum, info.md5sum)
+
+    def check_response(self, info: TopicInfo) -> None:
+        """Raise EndpointError where the device's response is another."""
+        _compare(self.response._md5sum, info.md5sum)
+
+
+class ServiceServer(_Service):
+    """A service of the device: one call at a time."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        super().__init__(info, send)
+        self._responses: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._turn = threading.Lock()
+        self._is_closed = False
+        self._service = rospy.Service(self.topic, self.service_class, self._call)
+
+    def _call(self, request: Any) -> Any:
+        with self._turn:
+            if self.id < 0:
+                raise rospy.ServiceException("the device has not finished to describe this service")
+            while not self._responses.empty():
+                # Of a call that was given up.
+                self._responses.get_nowait()
+            self._send(self.id, to_bytes(request))
+            while not self._is_closed and not rospy.is_shutdown():
+                try:
+                    return self._responses.get(timeout=_LOOK_SECONDS)
+                except queue.Empty:
+                    continue
+        raise rospy.ServiceException("the device is gone")
+
+    def handle(self, data: bytes) -> None:
+        """Return the device's response to the caller."""
+        response = self.response()
+        response.deserialize(data)
+        self._responses.put(response)
+
+    def unregister(self) -> None:
+        """Stop the service."""
+        rospy.loginfo("Removing service: %s", self.topic)
+        self._is_closed = True
+        self._service.shutdown()
+
+
+class ServiceClient(_Service):
+    """Calls of the device: in a thread, so that its other topics go on meanwhile."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        super().__init__(info, send)
+        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        rospy.loginfo("Starting service client, waiting for service '%s'", self.topic)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def handle(self, data: bytes) -> None:
+        """Call the service with the device's request."""
+        request = self.request()
+        request.deserialize(data)
+        self._requests.put(request)
+
+    def _run(self) -> None:
+        proxy: Any = rospy.ServiceProxy(self.topic, self.service_class)
+        while (request := self._requests.get()) is not None:
+            try:
+                rospy.wait_for_service(self.topic)
+                self._send(self.id, to_bytes(proxy(request)))
+            except rospy.ROSInterruptException:
+                return
+            except rospy.ROSException as error:
+                # The device waits until its own time limit.
+                rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
+            except rospy.ServiceException as error:
+                rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
+
+    def unregister(self) -> None:
+        """End the thread."""
+        self._requests.put(None)

@@ -1,0 +1,128 @@
+"""Bytes of a serial line <-> packets. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
+
+A packet: ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of id and data. A
+checksum makes the sum of what it covers 255 modulo 256.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+__all__ = ["LONGEST", "Decoder", "Fault", "Packet", "WrongVersion", "encode"]
+
+_SYNC, _VERSION = 0xFF, 0xFE
+_HEAD = struct.Struct("<HBH")
+LONGEST = 0xFFFF
+"""Bytes of the longest message that a packet can hold."""
+
+
+class Packet(NamedTuple):
+    """A message of the topic with that id."""
+
+    topic_id: int
+    data: bytes
+
+
+class Fault(NamedTuple):
+    """A packet that is dropped: what is wrong with it, in the real program's words."""
+
+    text: str
+
+
+class WrongVersion(NamedTuple):
+    """The second byte of a packet is that of another version of the protocol, or of no packet."""
+
+    byte: int
+
+
+def _checksum(data: bytes) -> int:
+    return 255 - sum(data) % 256
+
+
+def encode(topic_id: int, data: bytes) -> bytes:
+    """Return a packet. Raises ValueError for data that is too long for one."""
+    if len(data) > LONGEST:
+        raise ValueError(f"{len(data)} bytes: a packet holds {LONGEST}")
+    length, topic = struct.pack("<H", len(data)), struct.pack("<H", topic_id)
+    return b"".join(
+        (
+            bytes((_SYNC, _VERSION)),
+            length,
+            bytes((_checksum(length),)),
+            topic,
+            data,
+            bytes((_checksum(topic + data),)),
+        )
+    )
+
+
+class Decoder:
+    """Packets from bytes as they come, in pieces of any size."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+
+    @property
+    def missing(self) -> int:
+        """How many bytes the packet that has started lacks; 0 between packets."""
+        return self._needed() - len(self._bytes) if self._bytes else 0
+
+    @property
+    def received(self) -> int:
+        """How many bytes of a packet that has started are there."""
+        return len(self._bytes)
+
+    @property
+    def step(self) -> str:
+        """What is read next of a packet, in the real program's words."""
+        count = len(self._bytes)
+        for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
+            if count < end:
+                return name
+        return "data" if self.missing > 1 else "data checksum"
+
+    def reset(self) -> None:
+        """Forget a packet that has started."""
+        self._bytes.clear()
+
+    def feed(self, data: bytes) -> Iterator[Packet | Fault | WrongVersion]:
+        """Yield what is complete with these bytes."""
+        self._bytes += data
+        while self._bytes:
+            if self._bytes[0] != _SYNC:
+                start = self._bytes.find(_SYNC)
+                del self._bytes[: start if start >= 0 else len(self._bytes)]
+                continue
+            if len(self._bytes) < self._needed():
+                return
+            found = self._take()
+            if found is not None:
+                yield found
+
+    def _needed(self) -> int:
+        """Return how many bytes must be there before something can be decided."""
+        if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
+            return 2
+        if len(self._bytes) < 5 or not self._has_right_length():
+            return 5
+        return 8 + int(_HEAD.unpack_from(bytes(self._bytes[2:7]).ljust(5, b"\0"))[0])
+
+    def _has_right_length(self) -> bool:
+        return sum(self._bytes[2:5]) % 256 == 255
+
+    def _take(self) -> Packet | Fault | WrongVersion:
+        if self._bytes[1] != _VERSION:
+            version = self._bytes[1]
+            del self._bytes[:2]
+            return WrongVersion(version)
+        length, _, topic_id = _HEAD.unpack(bytes(self._bytes[2:7]).ljust(5, b"\0"))
+        if not self._has_right_length():
+            del self._bytes[:5]
+            return Fault(f"Wrong checksum for msg length, length {length}, dropping message.")
+        covered = bytes(self._bytes[5 : 8 + length])
+        del self._bytes[: 8 + length]
+        if sum(covered) % 256 != 255:
+            return Fault("wrong checksum for topic id and msg")
+        return Packet(topic_id, covered[2:-1])
