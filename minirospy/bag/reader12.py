@@ -102,14 +102,17 @@ class Reader12(BagReader):
         for entry in entries:
             connection, time, body, position = self.message_at(entry.offset)
             assert isinstance(position, int)
-            yield Block(None, body, [(time, ranks[connection.id], position, 0, len(body))])
+            rank = ranks.get(connection.id)
+            if rank is None:
+                raise BagFormatError("an index entry does not point to its message", entry.offset)
+            yield Block(None, body, [(time, rank, position, 0, len(body))])
 
     def message_at(self, position: Position) -> StoredMessage:
         """See :meth:`BagReader.message_at`."""
         if not isinstance(position, int):
             raise BagFormatError("a bag of version 1.2 has no chunks")
         limit = size_of(self.stream)
-        self.stream.seek(position)
+        self._seek(position, limit)
         record = records.read_record(self.stream, limit)
         while record.op == records.OP_MESSAGE_DEFINITION:
             self.stream.seek(record.end)
@@ -125,6 +128,12 @@ class Reader12(BagReader):
         """See :meth:`BagReader.index`."""
         return [self._indexes[number] for number in connections]
 
+    def _seek(self, position: int, limit: int) -> None:
+        """Seek to a position that the index has. Raise BagFormatError if it is behind the file's end."""
+        if position > limit:
+            raise BagFormatError("an index entry is behind the file's end", position)
+        self.stream.seek(position)
+
     def _read_topic_index(self, record: Record, limit: int) -> None:
         record.expect(records.OP_INDEX_DATA)
         if (version := record.uint32("ver")) != 0:
@@ -135,7 +144,7 @@ class Reader12(BagReader):
         entries = list(_ENTRY.iter_unpack(self.stream.read(count * _ENTRY.size)))
 
         # The first message of a topic is preceded by its definition, and the index points there.
-        self.stream.seek(entries[0][2])
+        self._seek(entries[0][2], limit)
         definition = records.read_record(self.stream, limit)
         definition.expect(records.OP_MESSAGE_DEFINITION)
         number = self._define(definition)

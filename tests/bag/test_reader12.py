@@ -11,7 +11,7 @@ import pytest
 from minirospy.bag.encoding import encode_fields
 from minirospy.bag.reader import open_bag
 from minirospy.bag.reader12 import unindexed_bag12
-from minirospy.errors import BagFormatError, BagUnindexedError
+from minirospy.errors import BagError, BagFormatError, BagUnindexedError
 from tests.bag.bags import STRING, STRING_MD5
 
 MESSAGES = [("/a", 30, b"3"), ("/b", 10, b"1"), ("/a", 20, b"2")]
@@ -95,3 +95,27 @@ def test_message_without_a_definition_ends_the_scan() -> None:
     assert list(reader.messages()) == []
     with pytest.raises(BagFormatError):
         reader.message_at(5)
+
+
+def fault(data: bytes) -> str:
+    """Read a damaged bag; return the error, "" if it could be read."""
+    try:
+        reader = open_bag(io.BytesIO(data))
+        reader.prepare()
+        list(reader.messages())
+    except BagError as error:
+        return str(error) or "no text"
+    return ""
+
+
+@pytest.mark.parametrize("indexed", [True, False])
+def test_flipped_byte_is_refused_in_one_line_or_read(indexed: bool) -> None:
+    data = make_bag12(MESSAGES, indexed=indexed)
+    for at in range(len(data)):
+        for flip in (0x01, 0xFF):
+            assert "\n" not in fault(data[:at] + bytes((data[at] ^ flip,)) + data[at + 1 :])
+
+
+def test_bag_that_is_cut_off_is_refused_in_one_line_or_read() -> None:
+    data = make_bag12(MESSAGES)
+    assert all("\n" not in fault(data[:end]) for end in range(len(data)))
