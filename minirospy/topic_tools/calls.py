@@ -21,7 +21,7 @@ class _Verb(NamedTuple):
     service: type
     takes_topic: bool
     text: Callable[[str, str, str], str]
-    """What is printed before the call, of the program (mux or demux), the node's name and the topic."""
+    """The line before the call, of the program (mux or demux), the node's name and the topic."""
 
 
 _VERBS = {

@@ -92,7 +92,7 @@ class CameraInfoManager:
             self.camera_info = loadCalibrationFile(filename, self.cname)
 
     def setCameraInfo(self, req: SetCameraInfoRequest) -> SetCameraInfoResponse:
-        """Take a calibration and save it: the handler of the service."""
+        """Store a calibration and save it: the handler of the service."""
         rospy.logdebug("SetCameraInfo received for %s", self.cname)
         self.camera_info = req.camera_info
         if saveCalibration(req.camera_info, self.url, self.cname):

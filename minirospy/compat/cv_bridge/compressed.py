@@ -24,7 +24,7 @@ _QUALITY = 95
 
 
 class Options(NamedTuple):
-    """How an image is compressed."""
+    """Options of the compression."""
 
     quality: int = _QUALITY
     """Of JPEG, from 1 to 100."""

@@ -57,7 +57,7 @@ class PinholeCameraModel:
         self.stamp: genpy.Time | None = None
 
     def fromCameraInfo(self, msg: CameraInfo) -> None:
-        """Take the parameters of a camera."""
+        """Set the parameters of the camera."""
         self.K = mkmat(3, 3, msg.K)
         self.D = mkmat(len(msg.D), 1, msg.D) if msg.D else None
         self.R = mkmat(3, 3, msg.R)
@@ -220,7 +220,7 @@ class StereoCameraModel:
         self.right = PinholeCameraModel()
 
     def fromCameraInfo(self, left_msg: CameraInfo, right_msg: CameraInfo) -> None:
-        """Take the parameters of both cameras."""
+        """Set the parameters of both cameras."""
         import numpy as np
 
         self.left.fromCameraInfo(left_msg)

@@ -24,7 +24,7 @@ else:
 __all__ = ["Distortion", "distorted", "rectified_image", "undistorted"]
 
 _ITERATIONS = 5
-"""How often OpenCV improves the point that it looks for."""
+"""The number of times that OpenCV improves the point that it looks for."""
 _STEPS = 32
 """Into how many parts OpenCV divides a pixel to interpolate."""
 _ONE = 1 << 15
