@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import struct
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +30,7 @@ from minirospy.compat.image_transport.republish import settings_of
 BRIDGE = CvBridge()
 PROGRAM = Path(__file__).parents[2] / "minirospy" / "ros_packages" / "image_transport" / "nodes" / "republish"
 PNG = Settings(format="png")
+RECORDED = json.loads(Path(__file__).with_name("compressed_images.json").read_text(encoding="utf-8"))
 
 
 def image(encoding: str) -> Image:
@@ -90,6 +94,46 @@ def test_jpeg_is_close_and_smaller_with_less_quality(encoding: str) -> None:
     assert (found.encoding, found.header, found.step) == (encoding, sent.header, sent.step)
     difference = BRIDGE.imgmsg_to_cv2(found).astype(int) - BRIDGE.imgmsg_to_cv2(sent)
     assert abs(difference).mean() < 4
+
+
+def recorded_source(encoding: str) -> Image:
+    """Return the image that the real plug-ins compressed for the record."""
+    dtype, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
+    v, u = np.mgrid[:48, :64]
+    if dtype == "float32":
+        pixels = (0.3 + u * 0.2 + v * 0.01).astype(np.float32)
+        pixels[5, 5] = np.nan
+    else:
+        planes = [(u * 2 + v * (1 + at)) % 200 for at in range(channels)]
+        pixels = np.stack(planes, -1).astype(dtype) * (100 if dtype == "uint16" else 1)
+        pixels = pixels if channels > 1 else pixels[..., 0]
+    return BRIDGE.cv2_to_imgmsg(np.ascontiguousarray(pixels), encoding)
+
+
+@pytest.mark.parametrize("row", RECORDED, ids=lambda row: row["format"])
+def test_messages_of_the_real_plug_ins_are_read_as_they_read_them(row: dict[str, Any]) -> None:
+    """The record is what Debian's republish and the plug-ins of image_transport_plugins 1.15 (noetic) made and read."""
+    message = CompressedImage(format=row["format"], data=bytes.fromhex(row["data"]))
+    source = recorded_source(row["encoding"])
+    assert hashlib.sha256(source.data).hexdigest() == row["source"]
+    encode, decode = {
+        "compressed": (compressed, uncompressed),
+        "compressedDepth": (compressed_depth, uncompressed_depth),
+    }[row["transport"]]
+    found = decode(message)
+    *shape, digest = row["decoded"]
+    assert [found.encoding, found.width, found.height, found.step, found.is_bigendian] == shape
+    if "jpeg" in row["format"]:
+        # Decoders of JPEG round differently.
+        ours = BRIDGE.imgmsg_to_cv2(uncompressed(compressed(source, Settings()))).astype(int)
+        assert abs(ours - BRIDGE.imgmsg_to_cv2(found)).max() <= 12
+    else:
+        assert hashlib.sha256(found.data).hexdigest() == digest
+
+    made = encode(source, Settings(format="jpeg" if "jpeg" in row["format"] else "png"))
+    assert made.format == message.format
+    if row["transport"] == "compressedDepth":
+        assert made.data[:12] == message.data[:12]
 
 
 def test_format_without_semicolon_is_that_of_the_picture() -> None:
