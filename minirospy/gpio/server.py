@@ -54,9 +54,16 @@ LOCK_PATIENCE = 5.0
 def main(argv: list[str]) -> int:
     """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
     place = Place(argv[1], Path(argv[0]))
+    # A board that somebody kept stays, whoever starts it again.
+    is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not place.state_path.exists()
     with _locked(place) as owned:
         if owned:
             asyncio.run(_Server(place).serve())
+    if owned and is_temporary:
+        for path in (place.state_path, place.log_path, place.lock_path):
+            # Windows removes no file that is open, such as the log of this process.
+            with contextlib.suppress(OSError):
+                path.unlink()
     return 0
 
 

@@ -224,3 +224,25 @@ def test_a_server_that_a_ctrl_c_killed_is_started_again(monkeypatch: pytest.Monk
     with Board() as board:
         assert board.get(7) == 0
     assert [process.wait(30) for process in started] == [-signal.SIGINT, 0]
+
+
+def test_temporary_board_leaves_no_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MINIROSPY_BOARD_TEMPORARY", "1")
+    place = Place.find()
+    with Board() as board:
+        board.press(11)
+        assert place.lock_path.exists()
+    wait_until_gone(place)
+    assert not [*place.folder.glob(f"{place.name}.*")]
+
+
+def test_kept_board_outlives_a_temporary_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    place = Place.find()
+    with Board():
+        pass
+    wait_until_gone(place)
+    monkeypatch.setenv("MINIROSPY_BOARD_TEMPORARY", "1")
+    with Board():
+        pass
+    wait_until_gone(place)
+    assert place.state_path.exists()

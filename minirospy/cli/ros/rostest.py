@@ -96,6 +96,8 @@ def _rostest(
     from minirospy.testing.runner import RosTest
 
     base = _base(results_base_dir)
+    # The boards that the test's nodes start, such as MINIROSPY_BOARD=$(anon test), end without a trace.
+    os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,
         spec=load_files([str(file)], args, packages),
