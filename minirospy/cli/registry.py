@@ -58,6 +58,7 @@ COMMANDS = (
     Entry("ros.master", "main", "MASTER", "", "master", "start the master in the foreground (as roscore)"),
     Entry("board", "main", "FAMILY", "", "board", "see the virtual board, press its buttons"),
     Entry("ros.rosrun", "main", "", "rosrun", "run", "run a package's program (as rosrun)", "rosrun_words"),
+    Entry("python", "main", "", "", "python", "run a file with minirospy's own Python", "files"),
     Entry("ros.roslaunch", "main", "COMMAND", "roslaunch", "launch", "run a launch file (as roslaunch)"),
     Entry("ros.rostopic", "main", "FAMILY", "rostopic", "topic", "list, echo, publish topics (as rostopic)"),
     Entry("ros.rosnode", "main", "FAMILY", "rosnode", "node", "list, ping, stop nodes (as rosnode)"),

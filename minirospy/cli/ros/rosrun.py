@@ -15,7 +15,7 @@ from minirospy.environment import export_local
 from minirospy.errors import NotFoundError, UsageError
 from minirospy.workspace.packages import NotExecutableError, Packages, why_ros_refuses, with_prefix
 
-__all__ = ["main"]
+__all__ = ["become", "main"]
 
 _ROS_USAGE = """Usage: rosrun [--prefix cmd] [--debug] PACKAGE EXECUTABLE [ARGS]
   rosrun will locate PACKAGE and try to find
@@ -75,7 +75,7 @@ def _rosrun(words: list[str]) -> int:
         print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)
     sys.stdout.flush()
     export_local(os.environ)
-    return _replace(command)
+    return become(command)
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
@@ -135,7 +135,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
             return commands[int(answer) - 1]
 
 
-def _replace(command: list[str]) -> int:
+def become(command: list[str]) -> int:
     """Become the program: its signals and its exit status are this process's."""
     if sys.platform == "win32":
         # Windows has no exec that keeps the console: wait, and let Ctrl-C be the program's.

@@ -1,0 +1,37 @@
+"""`minirospy python FILE`: run a program with the Python that minirospy is installed in.
+
+For an installation of its own (`pipx install minirospy`, `uv tool install minirospy`), where `python FILE` is another Python.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from minirospy.cli.command import run
+from minirospy.cli.ros.rosrun import become
+from minirospy.environment import export_local
+
+__all__ = ["main"]
+
+_HELP = """usage: minirospy python [FILE [ARGS]]
+
+Run a program with the Python that minirospy is installed in, so that it can `import rospy`; without FILE, Python's prompt.
+What follows is passed on as it is: options of Python (-m, -c, -i), the file, its arguments.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; return the program's exit status."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    # The program decides which signals it ignores.
+    return run("minirospy python", lambda: _python(words), heeds_interrupts=False)
+
+
+def _python(words: list[str]) -> int:
+    if words[:1] in (["-h"], ["--help"]):
+        print(_HELP, end="")
+        return 0
+    export_local(os.environ)
+    return become([sys.executable, *words])
