@@ -276,6 +276,8 @@ def _message_text(message: protocols.Message, indent: str, options: _Options) ->
         if type_.startswith("uint8[") and isinstance(value, bytes | bytearray | memoryview):
             # Bytes are numbers to the reader; genpy leaves a char[] as it is.
             value = list(value)
+        elif type_.startswith("uint8[") and isinstance(value, str):
+            value = [ord(letter) for letter in value]
         lines.append(f"{indent}{name}: {strify_message(value, indent + '  ', *options)}")
     text = "\n".join(lines)
     return "\n" + text if indent else text

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 from minirospy.errors import UsageError
 from minirospy.idl.protocols import is_message, is_stamped
 from minirospy.introspect.fields import field_type, field_value, parse_path
-from minirospy.introspect.messages import MessageClasses, fill, serialize
+from minirospy.introspect.messages import MessageClasses, fill, serialize, words_of
 from minirospy.introspect.plot import plot_header, plot_row
 from minirospy.times import Time
 
@@ -121,14 +121,7 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 
     Raise MessageException where they do not fit, with the names of the fields that there are.
     """
-    now = Time(*divmod(time.time_ns() if nanoseconds is None else nanoseconds, 10**9))
-    from minirospy.idl.load import get_message_class
-
-    keys: dict[str, object] = {"now": now}
-    header = get_message_class("std_msgs/Header")
-    if header is not None:
-        keys["auto"] = header(stamp=now)
-    message = fill(cls(), values, keys)
+    message = fill(cls(), values, words_of(time.time_ns() if nanoseconds is None else nanoseconds))
     serialize(message)
     return message
 

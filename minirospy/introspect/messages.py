@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from minirospy.idl.protocols import Message
     from minirospy.introspect.streams import Received
 
-__all__ = ["MessageClasses", "check", "fill", "serialize"]
+__all__ = ["MessageClasses", "check", "fill", "serialize", "words_of"]
 
 _MOST_CLASSES = 256
 _M = TypeVar("_M", bound="Message")
@@ -84,6 +84,16 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
     except (MessageException, ValueError, TypeError, AttributeError) as error:
         raise _does_not_fit(message, error, values) from error
     return message
+
+
+def words_of(nanoseconds: int) -> dict[str, object]:
+    """Return the words that represent a value: ``now`` is the time, ``auto`` a stamped header."""
+    from minirospy.idl.load import get_message_class
+    from minirospy.times import Time
+
+    now = Time(*divmod(nanoseconds, 10**9))
+    header = get_message_class("std_msgs/Header")
+    return {"now": now} if header is None else {"now": now, "auto": header(stamp=now)}
 
 
 def check(message: Message) -> None:

@@ -171,3 +171,15 @@ def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
     assert call.returncode == 0
     assert out == "data (bool) [False]: " * 2 + 'success: True\nmessage: "Successfully changed LED state."\n'
     assert err == "rosservice: ERROR: field data is not a bool ([std_srvs/SetBoolRequest] has bool data)\n"
+
+
+def test_words_for_values_work_in_nested_headers() -> None:
+    """As real rosservice: `auto` is a stamped header, `now` the time."""
+    from sensor_msgs.srv import SetCameraInfoRequest
+
+    from minirospy.introspect.services import fill_request
+
+    for values in ({"camera_info": {"header": "auto"}}, {"camera_info": {"header": {"stamp": "now"}}}):
+        request = fill_request("sensor_msgs/SetCameraInfo", [values])
+        assert isinstance(request, SetCameraInfoRequest)
+        assert request.camera_info.header.stamp.secs > 1_000_000_000

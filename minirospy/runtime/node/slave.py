@@ -44,6 +44,7 @@ class ServedNode(Protocol):
     environment: Environment
     name: str
     this_host: str
+    parameters: set[str]
     publications: dict[str, Publication]
     subscriptions: dict[str, Subscription]
 
@@ -162,8 +163,12 @@ class SlaveApi:
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: object) -> Answer:
-        """Accept a new value of a parameter that this node subscribed to."""
+        """Accept a new value of a parameter that this node subscribed to, of its namespace, or of what is below it."""
         self._node.parameter_changed(key, value)
+        changed = names.canonicalize(key).rstrip("/") + "/"
+        known = (f"{each.rstrip('/')}/" for each in list(self._node.parameters))
+        if not any(each.startswith(changed) or changed.startswith(each) for each in known):
+            return [ERROR, "not subscribed", 0]
         return [SUCCESS, "", 0]
 
     def publisher_update(self, caller_id: str, topic: str, publishers: list[str]) -> Answer:
