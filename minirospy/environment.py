@@ -204,6 +204,22 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
     return True
 
 
+def wrong_address(environment: Environment) -> str:
+    """Return what is wrong with the address in ROS_IP or ROS_HOSTNAME by which others reach this process; else nothing.
+
+    Names are not checked: a name server that is out of reach would delay every program.
+    """
+    host = environment.host
+    variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
+    if host.replace(".", "").isdigit() and not is_own_host(host):
+        return (
+            f"{variable}={host} is not an address of this machine: correct only behind NAT or in a container"
+        )
+    if ":" in host and not environment.ipv6:
+        return f"{variable}={host} is an IPv6 address, where no node listens without ROS_IPV6=on"
+    return ""
+
+
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
     """Return the folder of a run's log files; None for a /run_id that cannot be the name of one folder.
 

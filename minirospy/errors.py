@@ -60,6 +60,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 __all__ = [
+    "SUSPENDED",
     "BagCompressionError",
     "BagEncryptedError",
     "BagError",
@@ -94,6 +95,7 @@ __all__ = [
     "ROSTimeMovedBackwardsException",
     "RpcError",
     "RpcFault",
+    "RpcLate",
     "RpcProtocolError",
     "RpcRefused",
     "RpcUnreachable",
@@ -147,16 +149,19 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master answers at ``uri``; ``why``: what keeps this process from calling it."""
+    """No master answers at ``uri``; ``why``: what keeps this process from calling it; ``cause``: why it does not answer."""
 
-    def __init__(self, uri: str, why: str = "") -> None:
-        super().__init__(uri, why)
+    def __init__(self, uri: str, why: str = "", cause: str = "") -> None:
+        super().__init__(uri, why, cause)
         self.uri = uri
         self.why = why
+        self.cause = cause
 
     def __str__(self) -> str:
         if self.why:
             return f"the master at {self.uri} cannot be called: {self.why}"
+        if self.cause:
+            return f"no ROS master answers at {self.uri}: {self.cause}"
         return (
             f"no ROS master answers at {self.uri}: start one with `roscore`, "
             "or set ROS_MASTER_URI to the machine where it runs"
@@ -179,6 +184,12 @@ class NodeUnreachableError(MinirospyError):
             f"{self.kind} [{self.name}] does not answer at {self.uri}{why}: "
             "`rosnode cleanup` forgets nodes that have ended, `minirospy doctor` says what else is wrong"
         )
+
+
+SUSPENDED = (
+    "it takes connections, so it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
+)
+"""What to say of a process that answers nothing."""
 
 
 class RpcError(MinirospyError):
@@ -228,6 +239,17 @@ class RpcUnreachable(RpcError):
 
     def __str__(self) -> str:
         return f"no answer from {self.uri}: {self.why}"
+
+
+class RpcLate(RpcUnreachable):
+    """The peer took the connection, and did not answer in time: its process is stopped, or busy."""
+
+    def __init__(self, uri: str, seconds: float) -> None:
+        super().__init__(uri, f"timed out after {seconds:g} s")
+        self.seconds = seconds
+
+    def __reduce__(self) -> tuple[type[RpcLate], tuple[str, float]]:
+        return RpcLate, (self.uri, self.seconds)
 
 
 class WireError(MinirospyError):

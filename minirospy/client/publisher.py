@@ -290,15 +290,20 @@ class PublishedTopic(SharedTopic):
             message.serialize(pieces)
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
-                raise ROSSerializationException(str(error)) from error
+                raise self._refused(message, error) from None
             # What rospy makes of None.
             message.header.frame_id = "0"
             pieces.clear()
             try:
                 message.serialize(pieces)
             except SerializationError as again:
-                raise ROSSerializationException(str(again)) from again
+                raise self._refused(message, again) from None
         return pieces.frame()
+
+    def _refused(self, message: Any, error: SerializationError) -> ROSSerializationException:
+        """Return the error of a message that does not fit its type: rospy's words, then where it was published."""
+        where = f"topic {self.resolved_name}, type {message._type}"
+        return ROSSerializationException(f"{error}\n({where})")
 
     def _on_link(self, link: OutLink, is_up: bool) -> None:
         self._had_subscriber = True

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import logging
 import os
 import signal
 import sys
@@ -20,11 +21,14 @@ from minirospy.client.identity import private_parameters
 from minirospy.client.session import Session, current_session, replace_session_in_fork
 from minirospy.client.subscriber import Subscriber
 from minirospy.clock import SimulatedClock, wait_for_event
+from minirospy.environment import wrong_address
 from minirospy.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 
 __all__ = ["init_node", "start_clock"]
 
 _POLL_SECONDS = 0.25
+
+_log = logging.getLogger("rosout")
 
 
 def init_node(
@@ -73,6 +77,8 @@ def init_node(
     session.has_time = True
     session.publish_node()
     log_setup.start(session, rosout=not disable_rosout)
+    if why := wrong_address(session.identity.environment):
+        _log.warning("%s: other nodes may not reach this one", why)
 
 
 def start_clock() -> None:
@@ -155,11 +161,11 @@ def _wait_for_master(session: Session) -> None:
     while not session.lifecycle.is_shutdown_requested:
         try:
             session.master.get_pid()
-        except MasterUnreachableError:
+        except MasterUnreachableError as error:
             if not is_reported:
+                hint = f"({error.cause}.)" if error.cause else "(Start one with `roscore`.)"
                 print(
-                    f"Unable to register with master node [{uri}]: master may not be running yet. Will keep trying. "
-                    "(Start one with `roscore`.)",
+                    f"Unable to register with master node [{uri}]: master may not be running yet. Will keep trying. {hint}",
                     file=sys.stderr,
                     flush=True,
                 )

@@ -11,9 +11,11 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import (
+    SUSPENDED,
     NodeUnreachableError,
     NotFoundError,
     RpcError,
+    RpcLate,
     RpcProtocolError,
     RpcRefused,
     RpcUnreachable,
@@ -277,6 +279,8 @@ def _named(node: NodeAddress) -> Iterator[None]:
     """Faults of a call to ``node``, named after it."""
     try:
         yield
+    except RpcLate as error:
+        raise NodeUnreachableError(node.name, error.uri, f"{error.why}; {SUSPENDED}") from error
     except RpcUnreachable as error:
         raise NodeUnreachableError(node.name, error.uri, error.why) from error
     except RpcError as error:

@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.errors import (
+    SUSPENDED,
     CallFailed,
     HandshakeRefused,
     NodeUnreachableError,
@@ -117,12 +118,13 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
+    ``now`` represents the time, ``auto`` a stamped header.
     Raise NotFoundError where the type is not installed, MessageException where the values do not fit.
     """
     from minirospy.idl.load import service_class
-    from minirospy.introspect.messages import fill
+    from minirospy.introspect.messages import fill, words_of
 
-    return fill(service_class(type_)._request_class(), arguments)
+    return fill(service_class(type_)._request_class(), arguments, words_of(time.time_ns()))
 
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
@@ -180,7 +182,9 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return `Connection refused` rather than `[Errno 111] Connection refused`."""
+    """Return `Connection refused` rather than `[Errno 111] Connection refused`; of a silent process what may stop it."""
+    if isinstance(error, TimeoutError):
+        return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)
 
 

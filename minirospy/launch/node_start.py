@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import tempfile
+from pathlib import Path
 
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError
@@ -26,6 +28,7 @@ class NodeStarter:
         self._packages = packages
         self._options = options
         self._master = master
+        self._has_warned = False
 
     def start(self, node: NodeSpec, name: str) -> Process:
         """Start a node as the process ``name``. Raises MinirospyError."""
@@ -37,11 +40,7 @@ class NodeStarter:
             # So that what a node prints is seen when it prints it. On a terminal Python does so by itself, and
             # writes whole lines, which those of another node do not cut in two.
             environ.setdefault("PYTHONUNBUFFERED", "1")
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            why = error.strerror or error
-            raise MinirospyError(f"the folder {folder} cannot be made: {why}; set ROS_HOME") from error
+        folder = self._made(folder)
 
         log = self._master.log_folder / name.replace("/", "-")
         process = start_process(
@@ -55,6 +54,22 @@ class NodeStarter:
         process.node = node
         process.log_files = f"{log}*.log" if self._master.has_logs else "none"
         return process
+
+    def _made(self, folder: Path) -> Path:
+        """Return a node's folder, which is made; where ROS_HOME cannot be written to, the folder of temporary files."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = error.strerror or error
+            if folder != self._environment.home:
+                raise MinirospyError(f"the folder {folder} cannot be made: {why}") from error
+            instead = Path(tempfile.gettempdir())
+            if not self._has_warned:
+                self._has_warned = True
+                text = f"WARNING: the folder {folder} cannot be made: {why}; nodes start in {instead}; set ROS_HOME"
+                print(text, file=sys.stderr)
+            return instead
+        return folder
 
     def _uses_screen(self, node: NodeSpec) -> bool:
         """Return whether a node prints to the terminal instead of a file."""

@@ -136,7 +136,8 @@ class Packages:
             raise NotExecutableError(candidates[0])
         known = self.executables(package)
         has = ", ".join(known[:_SHOWN]) + (" ..." if known[_SHOWN:] else "") if known else "no programs"
-        raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}")
+        hidden = self._hidden(package, name, folder)
+        raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
         """Return a launch file of a package, by its path or, below the package, by its name. Raises NotFoundError."""
@@ -148,7 +149,15 @@ class Packages:
                 return path
         kinds = {Path(name).suffix} - {""} or {".launch", ".test"}
         same_kind = [path.name for path in _files(folder) if path.suffix in kinds]
-        raise NotFoundError("file", name, same_kind, f"package [{package}] is in {folder}")
+        hint = f"package [{package}] is in {folder}{self._hidden(package, name, folder)}"
+        raise NotFoundError("file", name, same_kind, hint)
+
+    def _hidden(self, package: str, name: str, found: Path) -> str:
+        """Return a hint where another package of the same name, which the found one hides, has the file; else nothing."""
+        for folder in self.copies().get(package, ()):
+            if folder != found and any(path.name == name for path in _files(folder)):
+                return f"; the package of that name in {folder}, which this one hides, has it"
+        return ""
 
     def _crawled(self, root: Path) -> list[Path]:
         if root not in self._crawls:

@@ -334,6 +334,7 @@ def test_the_other_name_of_each_command() -> None:
         "complete": "",
         "doctor": "",
         "bridge": "",
+        "python": "",
     }
     for noun in re.findall(r"^  minirospy (\w+) ", run("minirospy -h").out, re.M):
         name = twins.get(noun, "ros" + noun)
@@ -374,7 +375,7 @@ def test_a_name_that_nobody_has(line: str, graph: Robot) -> None:
     ("uri", "status", "says"),
     [
         ("http://localhost:1", 1, "start one with `roscore`"),
-        ("http://no-such-host.invalid:11311", 1, "or set ROS_MASTER_URI to the machine"),
+        ("http://no-such-host.invalid:11311", 1, "the name [no-such-host.invalid] has no address here"),
         ("nonsense", 2, "is not of the form http://host:port"),
         ("http://localhost", 2, "is not of the form http://host:port"),
         ("http://localhost:99999", 2, "is not of the form http://host:port"),

@@ -7,6 +7,7 @@ import signal
 import socket
 import stat
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -259,3 +260,15 @@ def test_program_that_ros_refuses_is_named_and_runs(start: Start, master: str, p
     path = package / "stop.py"
     assert f"WARNING: {path} is not executable, which ROS 1 refuses: chmod +x {path}" in said + (errors or "")
     assert "process has finished cleanly" in said
+
+
+def test_ros_home_that_cannot_be_made_stops_no_node(
+    start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("below a file nothing can be made")
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "file" / "home"))
+    running = start('<node name="n" pkg="pkg" type="stop.py" args="0" output="screen" required="true"/>')
+    said = running.read_until("out ")
+    assert said.count("cannot be made") == 1
+    assert f"nodes start in {tempfile.gettempdir()}; set ROS_HOME" in said
+    assert f"out {os.path.realpath(tempfile.gettempdir())} " in said

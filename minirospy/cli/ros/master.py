@@ -23,7 +23,7 @@ from minirospy import private_files
 from minirospy.cli.command import warn
 from minirospy.cli.parser import Misuse, Parser, attach_completer, split_assignments
 from minirospy.cli.verbs import Command
-from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host
+from minirospy.environment import DISTRO, ROS_VERSION, Environment, is_local, is_own_host, wrong_address
 from minirospy.errors import MinirospyError, RpcError, RpcFault, RpcUnreachable
 from minirospy.log_levels import LEVEL_NAMES, set_logger_level
 from minirospy.rosout import RosoutNode
@@ -360,19 +360,10 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if no node can reach ROS_IP: most often it is an address of another network.
-
-    Names are not checked: a name server that is out of reach would delay the master.
-    """
-    host = environment.host
-    variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
-    if host.replace(".", "").isdigit() and not is_own_host(host):
-        warn(
-            f"{variable}={host} is not an address of this machine: correct only behind NAT or in a container "
-            "(`minirospy doctor` shows more)"
-        )
-    elif ":" in host and not environment.ipv6:
-        warn(f"{variable}={host} is an IPv6 address, where no node listens without ROS_IPV6=on")
+    """Warn if no node can reach ROS_IP: most often it is an address of another network."""
+    why = wrong_address(environment)
+    if why:
+        warn(f"{why} (`minirospy doctor` shows more)")
 
 
 def _warn_of_uri(environment: Environment, master: Master) -> None:

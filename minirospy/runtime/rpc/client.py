@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from minirospy.environment import split_uri
-from minirospy.errors import RpcProtocolError, RpcUnreachable
+from minirospy.errors import RpcLate, RpcProtocolError, RpcUnreachable
 from minirospy.runtime.transport import local, sockets
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.wire.http import HttpMessage, HttpReader, serialize_request
@@ -70,7 +70,7 @@ class RpcClient:
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)
         except TimeoutError as error:
-            raise self._late(self._timeout) from error
+            raise RpcLate(self.uri, self._timeout) from error
         except (OSError, EOFError) as error:
             why = explain(error) if is_file_limit(error) else getattr(error, "strerror", None) or str(error)
             why = why or "the connection was closed"

@@ -6,9 +6,11 @@ http://wiki.ros.org/ROS/Parameter%20Server%20API.
 
 from __future__ import annotations
 
+import socket
 from typing import Any, NamedTuple
 
-from minirospy.errors import MasterUnreachableError, RpcRefused, RpcUnreachable
+from minirospy.environment import split_uri
+from minirospy.errors import SUSPENDED, MasterUnreachableError, RpcLate, RpcRefused, RpcUnreachable
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.transport.limits import is_file_limit
 
@@ -48,7 +50,14 @@ def unwrap(method: str, answer: object) -> Any:
 
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
     """Return the error of a master that cannot be called: it does not answer, or this process has no socket left."""
-    return MasterUnreachableError(error.uri, error.why if is_file_limit(error.__cause__) else "")
+    cause = error.__cause__
+    if isinstance(error, RpcLate):
+        return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")
+    if isinstance(cause, socket.gaierror):
+        host = split_uri(error.uri)[0]
+        why = f"the name [{host}] has no address here: set ROS_MASTER_URI to its IP address, or enter it in the hosts file"
+        return MasterUnreachableError(error.uri, cause=why)
+    return MasterUnreachableError(error.uri, error.why if is_file_limit(cause) else "")
 
 
 class MasterProxy:
