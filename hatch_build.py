@@ -1,4 +1,4 @@
-"""Build hook: compiles ``msgs/`` into Python modules, and adds the files that the wheel has in addition to the package.
+"""Build hooks: what PyPI shows of the README; ``msgs/`` as Python modules, and the files that the wheel has in addition.
 
 An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
 checkout, where everything else already is.
@@ -6,12 +6,35 @@ checkout, where everything else already is.
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.config import BuilderConfig
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
+
+_LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
+
+
+def readme_of_wheel(text: str, url: str = "") -> str:
+    """Return the README with links that work outside of the sources: below ``url``, or as the names of files without one."""
+    if url:
+        return _LINK.sub(lambda link: f"[{link[1]}]({url.rstrip('/')}/{link[2]})", text)
+    return _LINK.sub(lambda link: link[1] if link[1] == link[2] else f"{link[1]} ({link[2]})", text)
+
+
+class DescribeProject(MetadataHookInterface):
+    """Writes the description of the package: the README, whose links lead to ``urls.Documentation`` where it is set."""
+
+    PLUGIN_NAME = "custom"
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Set the readme."""
+        text = Path(self.root, "README.md").read_text(encoding="utf-8")
+        url = metadata.get("urls", {}).get("Documentation", "")
+        metadata["readme"] = {"content-type": "text/markdown", "text": readme_of_wheel(text, url)}
 
 
 class CompileDefinitions(BuildHookInterface[BuilderConfig]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -88,11 +89,22 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/share/launch/package.xml",
         "minirospy/workspace/shell/ros.bash",
         "minirospy/workspace/shell/ros.bat",
+        "minirospy/workspace/shell/ros.ps1",
     ):
         assert name in names
 
     assert wheel.stat().st_size < MOST_BYTES
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
+
+
+def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
+    """PyPI shows the README without the files next to it."""
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode()
+    assert "# minirospy" in text
+    assert not re.findall(r"\]\((?!https?:|#)", text)
+    assert "security (docs/security.md)" in text
 
 
 @pytest.mark.timeout(180)
