@@ -10,11 +10,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.workspace import powershell
 from minirospy.workspace.plan import DIST_PACKAGES
 
 __all__ = ["SHELLS", "SetUp", "setup_files", "shell_text"]
 
-SHELLS = ("bash", "zsh", "sh", "fish", "bat")
+SHELLS = ("bash", "zsh", "sh", "fish", "powershell", "bat")
 
 
 class SetUp(NamedTuple):
@@ -22,7 +23,7 @@ class SetUp(NamedTuple):
 
     ``prefix``: the devel or install folder; ``sources``: its folders of packages; ``parents``: the prefixes of the
     workspaces below it, the nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own
-    packages; ``functions``: the folder of ros.bash, ros.fish, ros.bat.
+    packages; ``functions``: the folder of ros.bash, ros.fish, ros.ps1, ros.bat.
     """
 
     prefix: Path
@@ -44,6 +45,8 @@ def setup_files(setup: SetUp) -> dict[str, str]:
         "setup.fish": _fish(setup),
         "setup.bat": _bat(setup, _others_make_way_bat(setup)),
         "local_setup.bat": _bat(setup, ""),
+        "setup.ps1": _ps1(setup, extends=False),
+        "local_setup.ps1": _ps1(setup, extends=True),
         "env.bat": '@echo off\r\ncall "%~dp0setup.bat"\r\n%*\r\n',
     }
     for stem in ("setup", "local_setup"):
@@ -58,6 +61,9 @@ def shell_text(shell: str, setup: SetUp) -> str:
     """Return the text for ``eval "$(minirospy shell)"``: the environment without a workspace, and the functions."""
     if shell == "fish":
         return _fish_base(setup) + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
+    if shell == "powershell":
+        base = powershell.powershell_base(_BASE, setup.programs)
+        return base + f". {powershell.quoted(setup.functions / 'ros.ps1')}\n"
     if shell == "bat":
         return _bat_base(setup) + f'call "{setup.functions / "ros.bat"}"\n'
     functions = "" if shell == "sh" else f". {_quoted(setup.functions / 'ros.bash')}\n"
@@ -292,6 +298,16 @@ def _fish_base(setup: SetUp) -> str:
 def _fish_quoted(path: Path) -> str:
     """Return a path as one word of fish, whose single quotes know two escapes, unlike those of other shells."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
+# --- PowerShell
+
+
+def _ps1(setup: SetUp, *, extends: bool) -> str:
+    base = powershell.powershell_base(_BASE, setup.programs)
+    return powershell.powershell_setup(
+        base, setup.parents, setup.share, setup.functions, DIST_PACKAGES, extends=extends
+    )
 
 
 # --- cmd.exe

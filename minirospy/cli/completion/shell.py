@@ -38,6 +38,8 @@ def _parser() -> Parser:
 def _shell(shell: str | None) -> None:
     default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = shell or Path(default).stem
+    # Its program's name on Linux and macOS, and on Windows from version 6 on.
+    name = "powershell" if name == "pwsh" else name
     if name not in SHELLS:
         raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")
     sys.stdout.write(shell_text(name, own_set_up(Path(), (), ())))
