@@ -40,7 +40,7 @@ FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205
 
 
 class MapError(MinirospyError):
-    """A map's YAML file is wrong, or a grid is: one line that says what."""
+    """A map's YAML file is wrong, or a grid is: one line with the fault."""
 
 
 class Mode(Enum):
@@ -64,7 +64,7 @@ class MapSettings(NamedTuple):
 
 
 def read_settings(text: str) -> MapSettings:
-    """Return what a map's YAML file says. Raises MapError in the real program's words."""
+    """Return the settings in a map's YAML file. Raises MapError in the real program's words."""
     try:
         # As texts: yaml-cpp takes `1e-3` as a number, which YAML 1.1 does not, and refuses `false` as one.
         found = yaml.load(text, yaml.BaseLoader)

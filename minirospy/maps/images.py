@@ -29,7 +29,7 @@ _REVERSED_FORMATS = ("BMP", "TGA")
 
 
 class ImageError(MinirospyError):
-    """An image cannot be read: one line that says why."""
+    """An image cannot be read: one line with the reason."""
 
 
 class Pixels(NamedTuple):

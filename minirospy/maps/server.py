@@ -90,7 +90,7 @@ def _number(name: str, default: float) -> float:
 
 
 def settings_of_file(name: str) -> MapSettings:
-    """Return what a YAML file says, its image as a path from here. Raises MapError."""
+    """Return the settings in a YAML file, the image as a path from here. Raises MapError."""
     try:
         text = Path(name).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:

@@ -296,39 +296,34 @@ class SerialClient:
 
     def setupServiceServerPublisher(self, data: bytes) -> None:  # noqa: N802
         """Take the responses of a service of the device."""
-        with _Creation("service server"):
-            info = _info(data)
-            self.setPublishSize(info.buffer_size)
-            server = self._service(info, ServiceServer, "server")
-            server.check_response(info)
-            self.callbacks[info.topic_id] = server.handle
+        self._set_up_half(data, ServiceServer, "server", from_device=True)
 
     def setupServiceServerSubscriber(self, data: bytes) -> None:  # noqa: N802
         """Send requests to a service of the device."""
-        with _Creation("service server"):
-            info = _info(data)
-            self.setSubscribeSize(info.buffer_size)
-            server = self._service(info, ServiceServer, "server")
-            server.check_request(info)
-            server.id = info.topic_id
+        self._set_up_half(data, ServiceServer, "server", from_device=False)
 
     def setupServiceClientPublisher(self, data: bytes) -> None:  # noqa: N802
         """Take the requests of calls by the device."""
-        with _Creation("service client"):
-            info = _info(data)
-            self.setPublishSize(info.buffer_size)
-            client = self._service(info, ServiceClient, "client")
-            client.check_request(info)
-            self.callbacks[info.topic_id] = client.handle
+        self._set_up_half(data, ServiceClient, "client", from_device=True)
 
     def setupServiceClientSubscriber(self, data: bytes) -> None:  # noqa: N802
         """Send the responses of calls by the device."""
-        with _Creation("service client"):
+        self._set_up_half(data, ServiceClient, "client", from_device=False)
+
+    def _set_up_half(self, data: bytes, kind: type[Any], name: str, *, from_device: bool) -> None:
+        """Set up one half of a service's calls: the one that the device sends, or the one that it gets."""
+        with _Creation(f"service {name}"):
             info = _info(data)
-            self.setSubscribeSize(info.buffer_size)
-            client = self._service(info, ServiceClient, "client")
-            client.check_response(info)
-            client.id = info.topic_id
+            (self.setPublishSize if from_device else self.setSubscribeSize)(info.buffer_size)
+            service = self._service(info, kind, name)
+            if from_device == (kind is ServiceServer):
+                service.check_response(info)
+            else:
+                service.check_request(info)
+            if from_device:
+                self.callbacks[info.topic_id] = service.handle
+            else:
+                service.id = info.topic_id
 
     def _service(self, info: TopicInfo, kind: type[Any], name: str) -> Any:
         known = self.services.get(info.topic_name)

@@ -1,4 +1,4 @@
-"""What a device asks for: its topics and services, each a publisher, subscriber, service or proxy of the node."""
+"""The topics and services that a device describes, each a publisher, subscriber, service or proxy of the node."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _CHUNK = 4096
 
 
 class PortError(MinirospyError):
-    """A line cannot be opened, or has broken: one line that says why."""
+    """A line cannot be opened, or has broken: one line with the reason."""
 
 
 class Port(Protocol):

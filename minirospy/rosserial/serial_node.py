@@ -84,7 +84,7 @@ def _follow(port: str, baud: int, uses_handshake: bool) -> None:
 
 
 def message_info_service() -> int:
-    """Run the node of that name, which only says that it is not needed; return the exit status."""
+    """Run the node of that name, which only logs that it is not needed; return the exit status."""
     try:
         rospy.init_node("message_info_service")
         rospy.logwarn(

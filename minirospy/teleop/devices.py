@@ -39,7 +39,7 @@ _POLL_SECONDS = 0.002
 
 
 class DeviceError(MinirospyError):
-    """A joystick cannot be opened, or is gone: one line that says why."""
+    """A joystick cannot be opened, or is disconnected: one line with the reason."""
 
 
 class Device(Protocol):

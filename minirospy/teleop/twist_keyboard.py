@@ -164,7 +164,7 @@ class _Output:
             threading.Thread(target=self._repeat, daemon=True).start()
 
     def wait_for_subscribers(self) -> None:
-        """Wait until a node subscribes; say so every 2.5 seconds."""
+        """Wait until a node subscribes; print a line every 2.5 seconds."""
         waited = 0
         while not self._publisher.get_num_connections() and not rospy.is_shutdown():
             if waited % 50 == 40:
@@ -213,7 +213,7 @@ def main() -> int:
     """Run the node until Ctrl-C; return the exit status: 1 without a terminal, or with a wrong parameter."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
-            "teleop_twist_keyboard: ERROR: keys come from a terminal, and standard input is none: "
+            "teleop_twist_keyboard: ERROR: keys come from a terminal, which standard input is not: "
             "`rosrun teleop_twist_keyboard teleop_twist_keyboard.py` in a terminal of its own",
             file=sys.stderr,
         )
@@ -225,7 +225,7 @@ def main() -> int:
         rospy.logerr("%s", error)
         return 1
     except OSError:
-        # The terminal's window was closed: there is nobody to show the keys to.
+        # The terminal's window was closed: no key can come any more.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSInterruptException:
         pass

@@ -83,7 +83,7 @@ def test_program_without_a_terminal_is_one_line(start: Start) -> None:
     output, errors = process.communicate(timeout=SECONDS)
     assert (process.returncode, output) == (1, "")
     assert errors.count("\n") == 1
-    assert "keys come from a terminal, and standard input is none" in errors
+    assert "keys come from a terminal, which standard input is not" in errors
 
 
 class Terminal:
