@@ -200,6 +200,7 @@ class Node:
             del self.publications[publication.topic]
             try:
                 await self._registrations.update(("Publisher", publication.topic))
+                await asyncio.gather(*(link.drain(_FLUSH_SECONDS) for link in publication.links))
             finally:
                 publication.close()
 

@@ -46,6 +46,7 @@ _WARN_AFTER = 3
 _REFUSALS_LOGGED = 10
 """Log lines about publishers that answer nonsense, before the rest are counted."""
 
+_LEAVE_SECONDS = 10.0
 _WORKED_SECONDS = 5.0
 """A link that was open for this long, or brought a message, was a good one."""
 
@@ -167,6 +168,8 @@ class InLink:
     """The last message of a publisher that latches."""
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
+    returned: bool = False
+    """Whether its publisher has left the master's list, and come back while the link was open."""
 
     @property
     def number(self) -> int:
@@ -239,6 +242,8 @@ class Subscription:
         # /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
+        # Links to publishers that have left the master's list, and what closes those links in the end.
+        self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
         self.on_connected: list[Callable[[], object]] = []
         """Called on the loop when a publisher is connected."""
         self._closed = False
@@ -256,7 +261,7 @@ class Subscription:
         self._named = list(uris)
         for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
             if isinstance(action, Disconnect):
-                self._disconnect(action.uri)
+                self._leave(action.uri)
             else:
                 self._start_connecting(action)
 
@@ -278,7 +283,7 @@ class Subscription:
             self._settling.cancel()
         for task in self._connecting.values():
             task.cancel()
-        for uri in list(self._links):
+        for uri in [*self._links, *self._leaving]:
             self._disconnect(uri)
 
     def _settle(self) -> None:
@@ -290,6 +295,19 @@ class Subscription:
             elif action.uri not in self._links:
                 self._disconnect(action.uri)
 
+    def _leave(self, uri: str) -> None:
+        """Read a publisher that has unregistered to its end: what it published before may still be on its way.
+
+        It closes the connection itself when all is sent. One that does not is disconnected after a while.
+        """
+        link = self._links.get(uri)
+        if not link:
+            self._disconnect(uri)
+            return
+        del self._links[uri]
+        timer = asyncio.get_running_loop().call_later(_LEAVE_SECONDS, self._disconnect, uri)
+        self._leaving[uri] = (link, timer)
+
     def _disconnect(self, uri: str) -> None:
         task = self._connecting.pop(uri, None)
         if task:
@@ -298,8 +316,18 @@ class Subscription:
         link = self._links.pop(uri, None)
         if link:
             link.close()
+        if uri in self._leaving:
+            link, timer = self._leaving.pop(uri)
+            timer.cancel()
+            link.close()
 
     def _start_connecting(self, action: Connect) -> None:
+        if action.uri in self._leaving:
+            # A second connection would deliver each message twice, where the publisher has kept the first.
+            link, timer = self._leaving.pop(action.uri)
+            timer.cancel()
+            link.returned = True
+            self._links[action.uri] = link
         if action.uri in self._links:
             return
         task = asyncio.ensure_future(self._connect(action.uri, action.delay))
@@ -425,7 +453,15 @@ class Subscription:
     def _link_ended(self, link: InLink) -> None:
         if link.closed:
             return
+        if link.uri in self._leaving:
+            _, timer = self._leaving.pop(link.uri)
+            timer.cancel()
+            return
         del self._links[link.uri]
+        if link.returned:
+            # It was the connection of a publisher before; that of today is to be had immediately.
+            self._start_connecting(Connect(link.uri))
+            return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
             # Logged once: what follows in such a stream is garbage too.

@@ -27,10 +27,11 @@ from minirospy.wire.framing import serialize_frame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import ANY, InterfaceType
 from tests.conftest import free_port
-from tests.manual_loop import ManualLoop, run_manually
+from tests.manual_loop import ManualLoop, run_manually, until
 
 BOOL = InterfaceType("std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a", "bool data\n")
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+FOREIGN = {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"}
 
 
 @pytest.fixture(params=["auto", "tcp"])
@@ -202,7 +203,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
     delays: list[float] = []
 
     async def garbage(sock: socket.socket) -> None:
-        await tcp.send_header(sock, {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"})
+        await tcp.send_header(sock, FOREIGN)
         await asyncio.get_running_loop().sock_sendall(sock, struct.pack("<I", 0xFFFFFFFF) + b"xxxx")
         await tcp.receive_header(sock)
 
@@ -851,3 +852,85 @@ def test_a_subscriber_that_comes_again_takes_the_place_of_its_stalled_link() -> 
             second.close()
 
     run(scene)
+
+
+def test_messages_sent_before_a_publisher_unregistered_are_delivered(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        has_unregistered = asyncio.Event()
+
+        async def serve(sock: socket.socket) -> None:
+            await tcp.send_header(sock, FOREIGN)
+            await has_unregistered.wait()
+            await clock.sock_sendall(sock, serialize_frame(b"late"))
+
+        foreign, box = Foreign(serve), Box()
+        async with graph("/n") as (_, (node,)):
+            subscription = await subscribe_to(foreign, monkeypatch, node, box)
+            await until(lambda: subscription.links)
+            subscription.publishers_changed([])
+            assert not subscription.links
+            has_unregistered.set()
+            await until(lambda: box.bodies == [b"late"])
+            await until(lambda: not subscription._leaving)
+            assert foreign.connections == 1
+            subscription.close()
+        await foreign.close()
+
+    run_manually(scene)
+
+
+def test_a_publisher_that_unregistered_and_stays_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(clock: ManualLoop) -> None:
+        has_ended = False
+
+        async def serve(sock: socket.socket) -> None:
+            nonlocal has_ended
+            await tcp.send_header(sock, FOREIGN)
+            assert await clock.sock_recv(sock, 1) == b""
+            has_ended = True
+
+        foreign = Foreign(serve)
+        async with graph("/n") as (_, (node,)):
+            subscription = await subscribe_to(foreign, monkeypatch, node, Box())
+            await until(lambda: subscription.links)
+            subscription.publishers_changed([])
+            await clock.advance(9.9)
+            assert not has_ended
+            await clock.advance(0.2)
+            await until(lambda: has_ended)
+            subscription.close()
+        await foreign.close()
+
+    run_manually(scene)
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_a_publisher_that_registers_again_is_connected_once(
+    monkeypatch: pytest.MonkeyPatch, is_kept: bool
+) -> None:
+    """``is_kept``: whether the publisher keeps the connection that it has."""
+
+    async def scene(clock: ManualLoop) -> None:
+        is_back = asyncio.Event()
+
+        async def serve(sock: socket.socket) -> None:
+            await tcp.send_header(sock, FOREIGN)
+            await is_back.wait()
+            if is_kept or foreign.connections == 2:
+                await clock.sock_sendall(sock, serialize_frame(b"back"))
+                await clock.sock_recv(sock, 1)
+
+        foreign, box = Foreign(serve), Box()
+        async with graph("/n") as (_, (node,)):
+            subscription = await subscribe_to(foreign, monkeypatch, node, box)
+            await until(lambda: subscription.links)
+            subscription.publishers_changed([])
+            subscription.publishers_changed(["http://127.0.0.1:1/"])
+            is_back.set()
+            await until(lambda: box.bodies == [b"back"])
+            assert foreign.connections == (1 if is_kept else 2)
+            assert len(subscription.links) == 1
+            subscription.close()
+        await foreign.close()
+
+    run_manually(scene)
