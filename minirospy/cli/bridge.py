@@ -37,13 +37,22 @@ def _parser() -> Parser:
         help="let other machines connect, with a token; prints their links and a QR code",
     )
     parser.add_argument(
-        "--address", default="", help="the address to listen at (127.0.0.1; with --listen 0.0.0.0)"
+        "--address",
+        default="",
+        help="the address to listen at (127.0.0.1; with --listen 0.0.0.0)",
+        completer="nothing",
     )
     parser.add_argument(
-        "--token", default="", help="the read-write token (default: one that is kept in ROS_HOME)"
+        "--token",
+        default="",
+        help="the read-write token (default: one that is kept in ROS_HOME)",
+        completer="nothing",
     )
     parser.add_argument(
-        "--read-token", default="", help="the read-only token (default: one that is kept in ROS_HOME)"
+        "--read-token",
+        default="",
+        help="the read-only token (default: one that is kept in ROS_HOME)",
+        completer="nothing",
     )
     parser.add_argument("--show-tokens", action="store_true", help="print the tokens that are kept, and exit")
     parser.add_argument("--new-tokens", action="store_true", help="replace the tokens that are kept")
@@ -56,6 +65,7 @@ def _parser() -> Parser:
         default=[],
         metavar="PATTERN",
         help="pages that may connect, as https://*.example.org",
+        completer="nothing",
     )
     parser.add_argument(
         "--host-name",
@@ -63,15 +73,17 @@ def _parser() -> Parser:
         default=[],
         metavar="NAME",
         help="a name by which clients reach this machine",
+        completer="nothing",
     )
 
-    for kind in ("topics", "services", "params"):
+    for kind, completer in (("topics", "topics"), ("services", "services"), ("params", "parameters")):
         parser.add_argument(
             f"--{kind}",
             action="append",
             default=[],
             metavar="GLOB",
             help=f"{kind} that clients may use (all)",
+            completer=completer,
         )
         parser.add_argument(
             f"--deny-{kind}",
@@ -79,12 +91,30 @@ def _parser() -> Parser:
             default=[],
             metavar="GLOB",
             help=f"{kind} that they may not use",
+            completer=completer,
         )
     parser.add_argument(
-        "--publish", action="append", default=[], metavar="GLOB", help="topics that clients may publish (all)"
+        "--publish",
+        action="append",
+        default=[],
+        metavar="GLOB",
+        help="topics that clients may publish (all)",
+        completer="topics",
     )
-    parser.add_argument("--cert", default="", metavar="FILE", help="serve wss with this certificate (PEM)")
-    parser.add_argument("--key", default="", metavar="FILE", help="its key (PEM)")
+    parser.add_argument(
+        "--cert",
+        default="",
+        metavar="FILE",
+        help="serve wss with this certificate (PEM)",
+        completer="files",
+    )
+    parser.add_argument(
+        "--key",
+        default="",
+        metavar="FILE",
+        help="its key (PEM)",
+        completer="files",
+    )
     parser.add_argument(
         "--buffer",
         type=int,
@@ -95,7 +125,12 @@ def _parser() -> Parser:
     parser.add_argument(
         "--connections", type=int, default=256, metavar="COUNT", help="how many may be open (256)"
     )
-    parser.add_argument("--name", default="minirospy_bridge", help="the node's name")
+    parser.add_argument(
+        "--name",
+        default="minirospy_bridge",
+        help="the node's name",
+        completer="nothing",
+    )
     parser.add_argument(
         "--status", action="store_true", help="print what a running bridge serves, and to whom"
     )
