@@ -143,7 +143,7 @@ class SerialClient:
         self._writer.join(self.timeout)
 
     def close(self) -> None:
-        """Take the device's topics and services back, and close the port."""
+        """Unregister the device's topics and services, and close the port."""
         self._to_write.put(None)
         for each in (*self.publishers.values(), *self.subscribers.values(), *self.services.values()):
             each.unregister()
@@ -295,7 +295,7 @@ class SerialClient:
                 known.id = info.topic_id
 
     def setupServiceServerPublisher(self, data: bytes) -> None:  # noqa: N802
-        """Take the responses of a service of the device."""
+        """Receive the responses of a service of the device."""
         self._set_up_half(data, ServiceServer, "server", from_device=True)
 
     def setupServiceServerSubscriber(self, data: bytes) -> None:  # noqa: N802
@@ -303,7 +303,7 @@ class SerialClient:
         self._set_up_half(data, ServiceServer, "server", from_device=False)
 
     def setupServiceClientPublisher(self, data: bytes) -> None:  # noqa: N802
-        """Take the requests of calls by the device."""
+        """Receive the requests of calls by the device."""
         self._set_up_half(data, ServiceClient, "client", from_device=True)
 
     def setupServiceClientSubscriber(self, data: bytes) -> None:  # noqa: N802

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 from minirospy.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.errors import MinirospyError, NotFoundError
-from minirospy.workspace.elsewhere import advice
 
 __all__ = [
     "CrawlTime",
@@ -82,6 +81,8 @@ class Packages:
         hint = "ROS_PACKAGE_PATH names the folders that are searched"
         if self.roots == built_in_roots():
             hint = "no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`"
+        from minirospy.workspace.elsewhere import advice
+
         if known := advice(name):
             raise NotFoundError("package", name, hint=known)
         raise NotFoundError("package", name, self.folders(), hint)
