@@ -44,50 +44,42 @@ def say() -> int:
 
 def play() -> int:
     """Play a file; return the exit status."""
-    words = rospy.myargv()[1:]
-    if not 1 <= len(words) <= 2 or words[0] == "--help":
-        return _usage("play.py sound_to_play.(ogg|wav) [volume]", "Plays a file, by its absolute path.")
-    volume = _volume(words[1:])
-    if volume is None:
-        return 1
 
-    def request(client: SoundClient) -> None:
+    def request(client: SoundClient, words: list[str], volume: float) -> None:
         rospy.loginfo(f'Playing "{words[0]}".')
         client.playWave(words[0], volume)
 
-    return _request("play", request)
+    return _play(
+        "play.py sound_to_play.(ogg|wav) [volume]", "Plays a file, by its absolute path.", 1, request
+    )
 
 
 def playbuiltin() -> int:
     """Play a sound of the package, by its number; return the exit status."""
-    words = rospy.myargv()[1:]
-    if not 1 <= len(words) <= 2 or not words[0].isdecimal():
-        return _usage("playbuiltin.py <sound_id> [volume]", "Plays a sound of sound_play/SoundRequest.")
-    volume = _volume(words[1:])
-    if volume is None:
-        return 1
 
-    def request(client: SoundClient) -> None:
+    def request(client: SoundClient, words: list[str], volume: float) -> None:
         rospy.loginfo(f"Playing sound {words[0]}.")
         client.play(int(words[0]), volume)
 
-    return _request("play", request)
+    return _play(
+        "playbuiltin.py <sound_id> [volume]",
+        "Plays a sound of sound_play/SoundRequest.",
+        1,
+        request,
+        str.isdecimal,
+    )
 
 
 def playpackage() -> int:
     """Play a file of a package; return the exit status."""
-    words = rospy.myargv()[1:]
-    if not 2 <= len(words) <= 3:
-        return _usage("playpackage.py package sound_to_play.(ogg|wav) [volume]", "Plays a file of a package.")
-    volume = _volume(words[2:])
-    if volume is None:
-        return 1
 
-    def request(client: SoundClient) -> None:
+    def request(client: SoundClient, words: list[str], volume: float) -> None:
         rospy.loginfo(f'Playing "{words[1]}" from pkg "{words[0]}".')
         client.playWaveFromPkg(words[0], words[1], volume)
 
-    return _request("play", request)
+    return _play(
+        "playpackage.py package sound_to_play.(ogg|wav) [volume]", "Plays a file of a package.", 2, request
+    )
 
 
 def shutup() -> int:
@@ -121,6 +113,23 @@ def is_speaking() -> int:
     rospy.spin()
     del subscriber, timer
     return 0
+
+
+def _play(
+    usage: str,
+    text: str,
+    count: int,
+    request: Callable[[SoundClient, list[str], float], object],
+    is_right: Callable[[str], bool] = lambda word: word != "--help",
+) -> int:
+    """Send a request with the words of the command line, ``count`` and a volume; return the exit status."""
+    words = rospy.myargv()[1:]
+    if not count <= len(words) <= count + 1 or not is_right(words[0]):
+        return _usage(usage, text)
+    volume = _volume(words[count:])
+    if volume is None:
+        return 1
+    return _request("play", lambda client: request(client, words, volume))
 
 
 def _request(name: str, request: Callable[[SoundClient], object]) -> int:
