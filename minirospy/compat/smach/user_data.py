@@ -76,7 +76,7 @@ def get_const(obj: Any) -> Any:
 class Const:
     """An object whose attributes can be read; those that are set are set here alone, and logged as an error."""
 
-    def __init__(self, obj: Any) -> None:
+    def __init__(self, obj: object) -> None:
         object.__setattr__(self, "_obj", obj)
 
     def __getattr__(self, name: str) -> Any:

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/sound_play.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from sound_play.msg import SoundRequest, SoundRequestAction, SoundRequestGoal
@@ -16,7 +16,19 @@ from minirospy import times
 from minirospy.actionlib.simple_client import SimpleActionClient
 from minirospy.compat.rospkg.rospack import RosPack
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 __all__ = ["Sound", "SoundClient"]
+
+
+class Options(TypedDict, total=False):
+    """What each method that plays takes in addition."""
+
+    blocking: bool
+    replace: bool
+    server_timeout: times.Duration | None
+    result_timeout: times.Duration | None
 
 
 class Sound:
@@ -28,11 +40,11 @@ class Sound:
         self.arg = arg
         self.vol = volume
 
-    def play(self, **kwargs: Any) -> None:
+    def play(self, **kwargs: Unpack[Options]) -> None:
         """Play it once."""
         self.client.sendMsg(self.snd, SoundRequest.PLAY_ONCE, self.arg, vol=self.vol, **kwargs)
 
-    def repeat(self, **kwargs: Any) -> None:
+    def repeat(self, **kwargs: Unpack[Options]) -> None:
         """Play it again and again."""
         self.client.sendMsg(self.snd, SoundRequest.PLAY_START, self.arg, vol=self.vol, **kwargs)
 
@@ -70,11 +82,11 @@ class SoundClient:
         """Return a sound of the package."""
         return Sound(self, id, "", volume)
 
-    def say(self, text: str, voice: str = "", volume: float = 1.0, **kwargs: Any) -> None:
+    def say(self, text: str, voice: str = "", volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Say a text."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_ONCE, text, voice, volume, **kwargs)
 
-    def repeat(self, text: str, volume: float = 1.0, **kwargs: Any) -> None:
+    def repeat(self, text: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Say a text again and again."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_START, text, vol=volume, **kwargs)
 
@@ -82,11 +94,11 @@ class SoundClient:
         """Stop saying a text."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_STOP, text)
 
-    def playWave(self, sound: str, volume: float = 1.0, **kwargs: Any) -> None:
+    def playWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Play a file."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, _place(sound), vol=volume, **kwargs)
 
-    def startWave(self, sound: str, volume: float = 1.0, **kwargs: Any) -> None:
+    def startWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Play a file again and again."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, _place(sound), vol=volume, **kwargs)
 
@@ -94,11 +106,15 @@ class SoundClient:
         """Stop a file."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, _place(sound))
 
-    def playWaveFromPkg(self, package: str, sound: str, volume: float = 1.0, **kwargs: Any) -> None:
+    def playWaveFromPkg(
+        self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
+    ) -> None:
         """Play a file of a package."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, sound, package, volume, **kwargs)
 
-    def startWaveFromPkg(self, package: str, sound: str, volume: float = 1.0, **kwargs: Any) -> None:
+    def startWaveFromPkg(
+        self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
+    ) -> None:
         """Play a file of a package again and again."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, sound, package, volume, **kwargs)
 
@@ -106,11 +122,11 @@ class SoundClient:
         """Stop a file of a package."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, sound, package)
 
-    def play(self, sound: int, volume: float = 1.0, **kwargs: Any) -> None:
+    def play(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Play a sound of the package, such as SoundRequest.BACKINGUP."""
         self.sendMsg(sound, SoundRequest.PLAY_ONCE, "", vol=volume, **kwargs)
 
-    def start(self, sound: int, volume: float = 1.0, **kwargs: Any) -> None:
+    def start(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
         """Play a sound of the package again and again."""
         self.sendMsg(sound, SoundRequest.PLAY_START, "", vol=volume, **kwargs)
 
@@ -132,11 +148,12 @@ class SoundClient:
         replace: bool = True,
         server_timeout: times.Duration | None = None,
         result_timeout: times.Duration | None = None,
-        **kwargs: Any,
+        blocking: bool | None = None,
+        **kwargs: object,
     ) -> None:
         """Send a request. A timeout of None waits until the server is there, or the sound has ended."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
-        if not kwargs.get("blocking", self._blocking):
+        if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)
             if self.pub.get_num_connections() < 1:
                 rospy.logwarn(
