@@ -13,6 +13,7 @@ from rosserial_msgs.msg import TopicInfo
 from minirospy import client as rospy
 from minirospy.errors import MinirospyError
 from minirospy.idl.load import get_message_class, get_service_class
+from minirospy.idl.protocols import Message
 
 __all__ = ["EndpointError", "Publisher", "ServiceClient", "ServiceServer", "Subscriber", "to_bytes"]
 
@@ -25,14 +26,14 @@ class EndpointError(MinirospyError):
     """A topic or service cannot be had as a device describes it."""
 
 
-def to_bytes(message: Any) -> bytes:
+def to_bytes(message: Message) -> bytes:
     """Return a message as it goes over the line."""
     buffer = BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
 
 
-def _message_class(info: TopicInfo) -> Any:
+def _message_class(info: TopicInfo) -> type[Message]:
     found = get_message_class(info.message_type)
     if found is None:
         raise EndpointError(
@@ -53,7 +54,7 @@ class Publisher:
     def __init__(self, info: TopicInfo) -> None:
         self.topic = info.topic_name
         self.message = _message_class(info)
-        self.publisher: rospy.Publisher[Any] = rospy.Publisher(self.topic, self.message, queue_size=10)
+        self.publisher: rospy.Publisher[Message] = rospy.Publisher(self.topic, self.message, queue_size=10)
 
     def handle(self, data: bytes) -> None:
         """Publish a message."""
@@ -74,9 +75,11 @@ class Subscriber:
         self.id = info.topic_id
         self.message = _message_class(info)
         self._send = send
-        self._subscriber: rospy.Subscriber[Any] = rospy.Subscriber(self.topic, self.message, self._receive)
+        self._subscriber: rospy.Subscriber[Message] = rospy.Subscriber(
+            self.topic, self.message, self._receive
+        )
 
-    def _receive(self, message: Any) -> None:
+    def _receive(self, message: Message) -> None:
         self._send(self.id, to_bytes(message))
 
     def unregister(self) -> None:
@@ -98,8 +101,8 @@ class _Service:
                 f"Cannot import package of service type [{info.message_type}]: build or install it on this side, too"
             )
         self.service_class: Any = found
-        self.request: Any = self.service_class._request_class
-        self.response: Any = self.service_class._response_class
+        self.request: type[Message] = self.service_class._request_class
+        self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
         """Raise EndpointError where the device's request is another."""
@@ -115,12 +118,12 @@ class ServiceServer(_Service):
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
-        self._responses: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._responses: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._turn = threading.Lock()
         self._is_closed = False
         self._service = rospy.Service(self.topic, self.service_class, self._call)
 
-    def _call(self, request: Any) -> Any:
+    def _call(self, request: Message) -> Message:
         with self._turn:
             if self.id < 0:
                 raise rospy.ServiceException("the device has not finished to describe this service")
@@ -153,7 +156,7 @@ class ServiceClient(_Service):
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
-        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         rospy.loginfo("Starting service client, waiting for service '%s'", self.topic)
         threading.Thread(target=self._run, daemon=True).start()
 

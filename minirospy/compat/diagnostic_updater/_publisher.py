@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from minirospy import client as rospy
+from minirospy import times
 from minirospy.compat.diagnostic_updater._diagnostic_updater import (
     CompositeDiagnosticTask,
     DiagnosticTaskVector,
@@ -18,6 +19,7 @@ from minirospy.compat.diagnostic_updater._update_functions import (
     TimeStampStatus,
     TimeStampStatusParam,
 )
+from minirospy.idl.protocols import Stamped
 
 __all__ = ["DiagnosedPublisher", "HeaderlessTopicDiagnostic", "TopicDiagnostic"]
 
@@ -52,7 +54,7 @@ class TopicDiagnostic(HeaderlessTopicDiagnostic):
         self.stamp = TimeStampStatus(stamp)
         self.addTask(self.stamp)
 
-    def tick(self, stamp: rospy.Time | float) -> None:
+    def tick(self, stamp: times.Time | float) -> None:
         """Count a message with its stamp."""
         self.stamp.tick(stamp)
         self.freq.tick()
@@ -63,7 +65,7 @@ class DiagnosedPublisher(TopicDiagnostic):
 
     def __init__(
         self,
-        pub: rospy.Publisher[Any],
+        pub: rospy.Publisher[Stamped],
         diag: DiagnosticTaskVector,
         freq: FrequencyStatusParam,
         stamp: TimeStampStatusParam,
@@ -71,7 +73,7 @@ class DiagnosedPublisher(TopicDiagnostic):
         super().__init__(pub.name, diag, freq, stamp)
         self.publisher = pub
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: Stamped) -> None:
         """Count a message with its header's stamp, and publish it."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Mapping
 
 from minirospy import client as rospy
+from minirospy import times
 from minirospy.compat.diagnostic_updater._diagnostic_status_wrapper import ERROR, OK, WARN
 from minirospy.compat.diagnostic_updater._diagnostic_updater import DiagnosticTask, Status
 
@@ -125,7 +126,7 @@ class TimeStampStatus(DiagnosticTask):
         self.min_delta: float = 0
         self.deltas_valid = False
 
-    def tick(self, stamp: rospy.Time | float) -> None:
+    def tick(self, stamp: times.Time | float) -> None:
         """Count an event with its stamp: a Time, or seconds as a float."""
         seconds = stamp if isinstance(stamp, (int, float)) else stamp.to_sec()
         with self.lock:

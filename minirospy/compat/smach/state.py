@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 from minirospy.compat.smach.user_data import Values
 from minirospy.compat.smach.util import has_smach_interface
@@ -102,7 +101,7 @@ class CBState(State):
         return self._cb(ud, *self._cb_args, **self._cb_kwargs)
 
 
-def adopt_interface(state: State, cb: Any) -> None:
+def adopt_interface(state: State, cb: object) -> None:
     """Give a state the keys and outcomes that a callback of it declares with ``cb_interface``."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())

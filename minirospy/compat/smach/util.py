@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import TypeGuard
 
 __all__ = ["CBInterface", "cb_interface", "has_smach_interface", "is_shutdown", "set_shutdown_check"]
 
@@ -19,7 +20,7 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
     _checks["shutdown"] = cb
 
 
-def has_smach_interface(obj: object) -> bool:
+def has_smach_interface(obj: object) -> TypeGuard[CBInterface]:
     """Return whether an object says which outcomes, input and output keys it has."""
     return all(hasattr(obj, f"get_registered_{name}") for name in ("input_keys", "output_keys", "outcomes"))
 

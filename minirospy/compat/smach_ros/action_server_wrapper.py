@@ -134,8 +134,8 @@ class ActionServerWrapper:
         for slot, key in self._goal_slots_map.items():
             self.userdata[key] = getattr(goal, slot)
 
-    def _packed_result(self) -> Any:
-        result = self.userdata[self._result_key]
+    def _packed_result(self) -> Message:
+        result: Message = self.userdata[self._result_key]
         for slot, key in self._result_slots_map.items():
             setattr(result, slot, self.userdata[key])
         if self._pack_result_slots:

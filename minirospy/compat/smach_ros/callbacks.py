@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.smach.exceptions import InvalidStateError
@@ -42,9 +41,8 @@ class StateCallback:
         self._args, self._kwargs = args, dict(kwargs or {})
         self._input_keys, self._output_keys = input_keys, output_keys
         if has_smach_interface(callback):
-            declared: Any = callback
-            self._input_keys = declared.get_registered_input_keys()
-            self._output_keys = declared.get_registered_output_keys()
+            self._input_keys = callback.get_registered_input_keys()
+            self._output_keys = callback.get_registered_output_keys()
         self._state = state
 
     def adopt(self) -> None:

@@ -10,7 +10,6 @@ import io
 import pickle
 import re
 from collections.abc import Mapping
-from typing import Any
 
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
@@ -65,7 +64,7 @@ def _encoded(data: dict[str, object]) -> str:
 
 
 class _Unpickler(pickle.Unpickler):
-    def find_class(self, module: str, name: str) -> Any:
+    def find_class(self, module: str, name: str) -> object:
         module = _RENAMED.get(module, module)
         if name in _PLAIN.get(module, ()):
             return super().find_class(module, name)

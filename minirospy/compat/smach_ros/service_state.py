@@ -21,7 +21,7 @@ class ServiceState(State):
         self,
         service_name: str,
         service_spec: Any,
-        request: Any = None,
+        request: object = None,
         request_cb: Callable[..., object] | None = None,
         request_cb_args: Sequence[object] = (),
         request_cb_kwargs: Mapping[str, object] | None = None,

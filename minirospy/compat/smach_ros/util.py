@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 from minirospy import client as rospy
 from minirospy.compat.rospy.core import add_client_shutdown_hook
+from minirospy.compat.smach.concurrence import Concurrence
+from minirospy.compat.smach.iterator import Iterator
+from minirospy.compat.smach.state_machine import StateMachine
 
 __all__ = ["set_preempt_handler"]
 
 
-def set_preempt_handler(sc: Any) -> None:
+def set_preempt_handler(sc: StateMachine | Concurrence | Iterator) -> None:
     """Request a container to end when the node shuts down, and wait until it has.
 
     One that executes in the thread that handles the shutdown cannot end meanwhile: it is not waited for.
