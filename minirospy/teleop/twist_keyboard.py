@@ -84,7 +84,7 @@ _SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": 
 
 
 class Motion(NamedTuple):
-    """What is published: metres a second along x, y, z, and radians a second about z."""
+    """The published motion: metres a second along x, y, z, and radians a second about z."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""What the sessions of a protocol and the handlers of pages send through: one WebSocket client, one HTTP request."""
+"""The peers that sessions of a protocol and handlers of pages send to: one WebSocket client, one HTTP request."""
 
 from __future__ import annotations
 

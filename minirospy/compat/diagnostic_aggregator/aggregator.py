@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Iterable
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from diagnostic_msgs.srv import AddDiagnostics, AddDiagnosticsRequest, AddDiagnosticsResponse
@@ -169,7 +168,7 @@ class Aggregator:
         with self._lock:
             self._tree.add(group)
 
-    def _break(self, namespace: str, group: Any) -> None:
+    def _break(self, namespace: str, group: AnalyzerGroup) -> None:
         rospy.logwarn(f"Bond for namespace {namespace} was broken")
         with self._lock:
             bond = self._bonds.pop(namespace, None)

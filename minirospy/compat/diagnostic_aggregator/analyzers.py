@@ -342,7 +342,7 @@ class AnalyzerGroup:
         return statuses + [item.status(self.path, True) for item in self._failed]
 
 
-_TYPES: dict[str, Callable[[str, Params, str, float, Log], Any]] = {
+_TYPES: dict[str, Callable[[str, Params, str, float, Log], Analyzer]] = {
     "AnalyzerGroup": AnalyzerGroup,
     "DiscardAnalyzer": DiscardAnalyzer,
     "GenericAnalyzer": GenericAnalyzer,

@@ -26,7 +26,7 @@ __all__ = [
 
 
 class Dependencies(TypedDict):
-    """What a definition needs."""
+    """The needs of a definition."""
 
     files: dict[str, str]
     deps: list[str]

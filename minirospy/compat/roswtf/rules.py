@@ -14,7 +14,7 @@ __all__ = ["error_rule", "warning_rule"]
 
 
 class Context(Protocol):
-    """What the rules of roswtf work on."""
+    """The subject of the rules of roswtf."""
 
     errors: list[WtfError]
     warnings: list[WtfError]
