@@ -190,10 +190,9 @@ def _bridge(
     from minirospy.bridge.web.connection import Limits
 
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
-    beyond = not is_loopback(address)
-    if beyond and not listen:
+    if not is_loopback(address) and not listen:
         raise Misuse(f"--address {address} lets other machines connect: add --listen")
-    tokens = _tokens(token, read_token, beyond=beyond, renews=new_tokens)
+    tokens = _tokens(token, read_token, beyond=listen, renews=new_tokens)
     options = BridgeOptions(
         address=address,
         foxglove_port=port,
@@ -202,7 +201,7 @@ def _bridge(
             origins=tuple(origin),
             read_token=tokens.read,
             write_token="" if read_only else tokens.write,
-            requires_token=beyond or bool(token or read_token),
+            requires_token=listen or bool(token or read_token),
             default_is_read=read_only,
         ),
         limits=Limits(queue=buffer, connections=connections),
