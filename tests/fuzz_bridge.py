@@ -85,6 +85,7 @@ class Target:
 
     async def _take(self, data: bytes) -> None:
         from minirospy.bridge.web.connection import Connection
+        from minirospy.bridge.web.listener import Relay
         from minirospy.bridge.web.pipe import PlainPipe
 
         if self._count % INPUTS_PER_BRIDGE == 0:
@@ -99,9 +100,9 @@ class Target:
 
         with theirs:
             theirs.setblocking(False)
-            events = _Events()
-            pipe = PlainPipe(ours, self._loop, events)
-            connection = events.connection = Connection(listener, pipe, "fuzz", self._loop)
+            relay = Relay()
+            pipe = PlainPipe(ours, self._loop, relay)
+            connection = relay.target = Connection(listener, pipe, "fuzz", self._loop)
             listener.connections.add(connection)
             for piece in data.split(CUT):
                 if piece and connection in listener.connections:
@@ -167,21 +168,6 @@ class Steady:
 
     def send_message(self, *_: object, **__: object) -> None:
         """Take it."""
-
-
-class _Events:
-    """The events of a pipe, for the connection that is made with it."""
-
-    connection: Any
-
-    def received(self, data: bytes) -> None:
-        self.connection.received(data)
-
-    def writable(self) -> None:
-        self.connection.writable()
-
-    def ended(self) -> None:
-        self.connection.ended()
 
 
 def an_input(rng: random.Random) -> bytes:

@@ -17,7 +17,7 @@ from minirospy.errors import BridgeError
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import is_file_limit
 
-__all__ = ["Listener"]
+__all__ = ["Listener", "Relay"]
 
 _log = logging.getLogger(__name__)
 
@@ -158,7 +158,7 @@ class Listener:
 
     def _connected(self, sock: socket.socket, peer: str) -> None:
         loop = asyncio.get_running_loop()
-        relay = _Relay()
+        relay = Relay()
         pipe = PlainPipe(sock, loop, relay)
         relay.target = self._add(Connection(self, pipe, peer, loop))
         pipe.resume()
@@ -175,16 +175,19 @@ class Listener:
         return connection
 
 
-class _Relay:
+class Relay:
     """The events of a pipe, for the connection that is made with the pipe."""
 
     target: Connection
 
     def received(self, data: bytes) -> None:
+        """Pass on bytes."""
         self.target.received(data)
 
     def writable(self) -> None:
+        """Let the connection write more."""
         self.target.writable()
 
     def ended(self) -> None:
+        """Let the connection end."""
         self.target.ended()
