@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypeVar
 
 from minirospy.aio.node import Node
 from minirospy.bridge.access import Access, NameFilter, is_loopback
@@ -26,6 +26,7 @@ from minirospy.errors import BridgeError, MinirospyError
 
 __all__ = ["main", "options_of"]
 
+_T = TypeVar("_T", str, int, bool)
 _WITHOUT_EFFECT = ("use_compression",)
 
 
@@ -97,7 +98,7 @@ def _capabilities(names: Sequence[str]) -> list[str]:
     return [name for name in names if name != "time"]
 
 
-def _value(private: Mapping[str, object], name: str, kind: type, default: Any) -> Any:
+def _value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
     value = private.get(name, default)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise BridgeError(f"parameter ~{name} is {value!r}: it has to be of type {kind.__name__}")
