@@ -126,6 +126,16 @@ class Publication:
         self._graph = graph
         self._shared: _SharedPublisher | None = shared
 
+    @property
+    def has_joined(self) -> bool:
+        """Return whether the subscribers that the master knew when the topic was advertised are connected."""
+        return self._shared is None or self._shared.joining is None or self._shared.joining.done()
+
+    async def joined(self) -> None:
+        """Wait for those subscribers, for a second at most: a message that is published before does not reach them."""
+        if self._shared and self._shared.joining:
+            await asyncio.wait([self._shared.joining])
+
     def publish(self, body: bytes) -> None:
         """Publish a serialized message. Does not wait."""
         if self._shared:
@@ -143,6 +153,7 @@ class _SharedPublisher:
     type: InterfaceType
     latch: bool
     publisher: Publisher[Message]
+    joining: asyncio.Task[None] | None = None
     clients: int = 0
 
 
@@ -287,6 +298,8 @@ class SharedGraph:
                 self.spawn(self._end_topic(shared))
 
     async def _end_topic(self, shared: SharedTopic) -> None:
+        if shared.is_wanted:
+            return  # again
         await shared.close()
         if not shared.is_wanted and self.topics.get(shared.topic) is shared:
             del self.topics[shared.topic]
@@ -301,7 +314,8 @@ class SharedGraph:
             if known not in (None, ANY, type_.name):
                 raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
-            shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher)
+            joining = self.spawn(publisher._wait_for_expected())
+            shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
             self.look_soon()
         elif shared.type.md5sum != type_.md5sum:
             raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")

@@ -426,3 +426,30 @@ def test_read_only_client_may_look_and_nothing_else(run_bridge: Callable[..., Ru
     assert "read-only" in client.next("status")["message"]
     assert "read-only" in client.next("serviceCallFailure")["message"]
     assert "clientPublish" in bridge.client(path=f"/?token={'w' * 20}").next("serverInfo")["capabilities"]
+
+
+def test_topic_subscribed_again_in_the_same_turn_goes_on(bridge: Running) -> None:
+    publisher = bridge.publisher(bridge.node("talker"), "/again", String)
+    graph = bridge.bridge.graph
+    arrived = asyncio.Event()
+
+    def first(_: object) -> None:
+        """Take nothing."""
+
+    def second(_: object) -> None:
+        arrived.set()
+
+    def exchange() -> None:
+        graph.unsubscribe("/again", first)
+        graph.subscribe("/again", second)
+
+    async def wait() -> None:
+        graph.subscribe("/again", first)
+        await publisher.wait_for_subscribers()
+        exchange()
+        while not arrived.is_set():
+            await publisher.publish(String("x"))
+            await asyncio.sleep(0.01)
+        graph.unsubscribe("/again", second)
+
+    bridge.run(asyncio.wait_for(wait(), 30))
