@@ -42,7 +42,17 @@ BYTES_ONLY = {"runtime", "wire"}
 PURE = {"graph", "wire", "idl", "tf2", "urdf"}
 PURE_FILES = {
     PACKAGE / "bridge" / name
-    for name in ("access.py", "foxglove/protocol.py", "foxglove/channels.py", "web/queue.py")
+    for name in (
+        "access.py",
+        "foxglove/protocol.py",
+        "foxglove/channels.py",
+        "rosbridge/cbor.py",
+        "rosbridge/conversion.py",
+        "rosbridge/png.py",
+        "rosbridge/protocol.py",
+        "rosbridge/subscription.py",
+        "web/queue.py",
+    )
 }
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 

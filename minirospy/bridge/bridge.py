@@ -15,7 +15,8 @@ from minirospy.bridge.access import Access
 from minirospy.bridge.foxglove.assets import ALLOWED, Assets
 from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
 from minirospy.bridge.graph import Filters, SharedGraph
-from minirospy.bridge.web.connection import Exchange, Limits
+from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
+from minirospy.bridge.web.connection import Door, Exchange, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
 from minirospy.errors import BridgeError
@@ -24,18 +25,24 @@ from minirospy.workspace.packages import Packages
 if TYPE_CHECKING:
     import ssl
 
-__all__ = ["FOXGLOVE_PORT", "Bridge", "BridgeOptions"]
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "Bridge", "BridgeOptions"]
 
 FOXGLOVE_PORT = 8765
+ROSBRIDGE_PORT = 9090
 _DIAGNOSTICS_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
 class BridgeOptions:
-    """``address`` is where the listeners are; ``certificate`` and ``key`` are PEM files. ``slowest_look``: in seconds."""
+    """``address`` is where the listeners are, at a port for each protocol, None: not served.
+
+    ``certificate`` and ``key`` are PEM files. In seconds: ``slowest_look``; ``retry_delay`` after which a port that is in use
+    is tried again, None: never.
+    """
 
     address: str = "127.0.0.1"
-    foxglove_port: int = FOXGLOVE_PORT
+    foxglove_port: int | None = FOXGLOVE_PORT
+    rosbridge_port: int | None = None
     access: Access = field(default_factory=Access)
     limits: Limits = field(default_factory=Limits)
     filters: Filters = field(default_factory=Filters)
@@ -45,6 +52,8 @@ class BridgeOptions:
     key: str = ""
     slowest_look: float = 1.0
     diagnostics: bool = True
+    rosbridge: RosbridgeOptions = field(default_factory=RosbridgeOptions)
+    retry_delay: float | None = None
 
 
 class Bridge:
@@ -69,6 +78,7 @@ class Bridge:
             ),
             playback,
         )
+        self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge)
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -76,17 +86,36 @@ class Bridge:
     async def start(self) -> None:
         """Listen. Raises BridgeError."""
         tls = self._tls()
+        served: list[tuple[str, Door, int | None]] = [
+            ("foxglove", self.foxglove, self.options.foxglove_port),
+            ("rosbridge", self.rosbridge, self.options.rosbridge_port),
+        ]
+        for name, door, port in served:
+            if port is not None:
+                self.listeners[name] = await self._listen(door, port, tls)
+        if self.options.diagnostics:
+            self._reporting = asyncio.ensure_future(self._report())
+
+    async def _listen(self, door: Door, port: int, tls: ssl.SSLContext | None) -> Listener:
+        """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
         listener = Listener(
-            [self.foxglove],
+            [door],
             self.options.access,
             limits=self.options.limits,
             pages={"/status": self._status_page},
             tls=tls,
         )
-        await listener.open(self.options.address, self.options.foxglove_port)
-        self.listeners["foxglove"] = listener
-        if self.options.diagnostics:
-            self._reporting = asyncio.ensure_future(self._report())
+        while True:
+            try:
+                await listener.open(self.options.address, port)
+            except BridgeError as error:
+                if self.options.retry_delay is None:
+                    raise
+                delay = self.options.retry_delay
+                self.node.log.warning("Unable to start server: %s. Retrying in %gs.", error, delay)
+                await asyncio.sleep(delay)
+            else:
+                return listener
 
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""

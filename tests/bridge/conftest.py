@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, TypeVar
 
+import cbor2
 import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
@@ -29,7 +30,7 @@ class Running:
         self._options = options
         self._parts = parts
         self._nodes: list[Node] = []
-        self._clients: list[Client] = []
+        self._clients: list[Client | RosbridgeClient] = []
         try:
             self.bridge: Bridge = self.run(self._start())
         except BaseException:
@@ -68,6 +69,11 @@ class Running:
 
     def client(self, **options: Any) -> Client:
         client = Client(self.port, **options)
+        self._clients.append(client)
+        return client
+
+    def rosbridge(self, **options: Any) -> RosbridgeClient:
+        client = RosbridgeClient(self.bridge.listeners["rosbridge"].port, **options)
         self._clients.append(client)
         return client
 
@@ -174,13 +180,56 @@ class Client:
                 del self.channels[topic]
 
 
+class RosbridgeClient:
+    """A client of rosbridge; what came is kept until it is wanted. CBOR becomes what its library makes of it."""
+
+    def __init__(self, port: int, *, path: str = "/", **options: Any) -> None:
+        self._stack = contextlib.ExitStack()
+        opening = connect(f"ws://127.0.0.1:{port}{path}", compression=None, max_size=None, **options)
+        self.socket: ClientConnection = self._stack.enter_context(opening)
+        self._kept: list[dict[str, Any]] = []
+
+    def send(self, **fields: Any) -> None:
+        self.socket.send(json.dumps(fields))
+
+    def next(self, op: str, **fields: Any) -> dict[str, Any]:
+        """Return the next message of an op with these fields."""
+        for number, each in enumerate(self._kept):
+            if _has(each, op, fields):
+                return self._kept.pop(number)
+        while True:
+            data = self.socket.recv(timeout=30)
+            found: dict[str, Any] = json.loads(data) if isinstance(data, str) else cbor2.loads(data)
+            if _has(found, op, fields):
+                return found
+            self._kept.append(found)
+
+    def call(self, service: str, args: object = None, **options: Any) -> dict[str, Any]:
+        """Return the answer to a call."""
+        id_ = f"call:{service}"
+        self.send(op="call_service", id=id_, service=service, args=args, **options)
+        return self.next("service_response", id=id_)
+
+    def synchronize(self) -> None:
+        """Return when everything that was sent has been handled."""
+        self.send(op="jump", id="synchronize")
+        assert "Unknown operation" in self.next("status", id="synchronize")["msg"]
+
+    def close(self) -> None:
+        self._stack.close()
+
+
+def _has(message: dict[str, Any], op: str, fields: dict[str, Any]) -> bool:
+    return message.get("op") == op and all(message.get(name) == value for name, value in fields.items())
+
+
 @pytest.fixture
 def run_bridge(master: str) -> Iterator[Callable[..., Running]]:
     """Return a function that starts a bridge with these options at a free port."""
     running: list[Running] = []
 
     def start(playback: Any = None, **options: Any) -> Running:
-        options = {"foxglove_port": 0, "diagnostics": False, **options}
+        options = {"foxglove_port": 0, "rosbridge_port": 0, "diagnostics": False, **options}
         running.append(Running(BridgeOptions(**options), playback=playback))
         return running[-1]
 

@@ -148,6 +148,14 @@ class WebClient:
         """Do the same as a text message; ``text`` is UTF-8."""
         self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
 
+    def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
+        """Send one message of a stream as several text messages, of which all wait or none."""
+        pieces: list[Piece] = []
+        for text in texts:
+            data = text.encode()
+            pieces += (frame_head(_TEXT, len(data)), data)
+        self._connection.stream(key, tuple(pieces), newest_only=newest_only)
+
     def discard(self, key: Hashable) -> None:
         """Drop what waits under a key."""
         self._connection.queue.discard(key)

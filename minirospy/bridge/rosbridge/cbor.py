@@ -1,0 +1,87 @@
+"""CBOR: what a client sends, and messages with typed arrays by tag. Pure; needs the library cbor2.
+
+Source: RFC 8949, RFC 8746 (typed arrays), and rosbridge's choice of tags: little-endian ones.
+"""
+
+from __future__ import annotations
+
+import sys
+from array import array
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+from minirospy.errors import BridgeProtocolError
+
+__all__ = ["TYPED_ARRAYS", "decode_cbor", "encode_cbor", "typed_array"]
+
+TYPED_ARRAYS = {
+    "uint16": (69, "H"),
+    "uint32": (70, "I"),
+    "uint64": (71, "Q"),
+    "byte": (72, "b"),
+    "int8": (72, "b"),
+    "int16": (77, "h"),
+    "int32": (78, "i"),
+    "int64": (79, "q"),
+    "float32": (85, "f"),
+    "float64": (86, "d"),
+}
+"""Tag and format character of an array of each type."""
+
+_FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
+
+
+def encode_cbor(value: object) -> bytes:
+    """Return a value as CBOR. Raises BridgeProtocolError without cbor2."""
+    data: bytes = _library().dumps(value)
+    return data
+
+
+def decode_cbor(data: bytes) -> object:
+    """Return the value of CBOR; typed arrays become lists. Raises ValueError, BridgeProtocolError without cbor2."""
+    library = _library()
+    stream = BytesIO(data)
+    try:
+        value: object = library.load(stream, tag_hook=_from_tag)
+    except BridgeProtocolError:
+        raise
+    except (library.CBORError, ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise ValueError(str(error) or type(error).__name__) from error
+    if stream.tell() != len(data):
+        raise ValueError(f"{len(data) - stream.tell()} bytes follow the value")
+    return value
+
+
+def typed_array(type_: str, values: Sequence[Any]) -> object:
+    """Return the tagged bytes of an array of numbers."""
+    tag, format_ = TYPED_ARRAYS[type_]
+    packed = array(format_, values)
+    if sys.byteorder == "big":
+        packed.byteswap()
+    return _library().CBORTag(tag, packed.tobytes())
+
+
+def _from_tag(first: Any, second: Any = None, *_: object) -> object:
+    """Return the list of a typed array. cbor2 passes its decoder first in older releases."""
+    tag = first if hasattr(first, "tag") else second
+    format_ = _FORMATS.get(tag.tag)
+    if format_ is None or not isinstance(tag.value, bytes):
+        raise ValueError(f"CBOR tag {tag.tag} is not one of a message's")
+    if format_ == "B":
+        return tag.value
+    values = array(format_)
+    values.frombytes(tag.value)
+    if sys.byteorder == "big":
+        values.byteswap()
+    return values.tolist()
+
+
+def _library() -> Any:
+    try:
+        import cbor2
+    except ImportError as error:
+        raise BridgeProtocolError(
+            "compression cbor needs the library cbor2 on the server: pip install 'minirospy[web]'"
+        ) from error
+    return cbor2

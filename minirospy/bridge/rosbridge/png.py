@@ -1,0 +1,53 @@
+"""PNG as a compression of texts: the UTF-8 bytes are the pixels of an RGB image. Pure; needs Pillow.
+
+Source: ROSBRIDGE_PROTOCOL.md, section 3.1.2.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+from io import BytesIO
+from typing import Any
+
+from minirospy.errors import BridgeProtocolError
+
+__all__ = ["decode", "encode"]
+
+_MOST_PIXELS = 25_000_000
+"""Of a client's image: 75 MB of text."""
+
+
+def encode(text: str) -> str:
+    """Return a text as PNG in base64: about as wide as high, newlines at its end. Raises BridgeProtocolError without Pillow."""
+    data = text.encode()
+    width = max(1, math.isqrt(len(data) // 3))
+    height = max(1, -(-len(data) // (3 * width)))
+    buffer = BytesIO()
+    picture = _pillow().frombytes("RGB", (width, height), data.ljust(3 * width * height, b"\n"))
+    picture.save(buffer, "png", compress_level=1)
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def decode(data: str) -> str:
+    """Return the text of a PNG in base64. Raises BridgeProtocolError."""
+    pillow = _pillow()
+    try:
+        picture = pillow.open(BytesIO(base64.b64decode(data, validate=True)), formats=("PNG",))
+        if picture.width * picture.height > _MOST_PIXELS:
+            raise BridgeProtocolError(f"a PNG of {picture.width}x{picture.height} pixels is too large")
+        text: str = picture.tobytes().decode().rstrip("\n")
+    except (binascii.Error, OSError, ValueError, SyntaxError, pillow.DecompressionBombError) as error:
+        raise BridgeProtocolError(f"the data is not a PNG of text: {error}") from error
+    return text
+
+
+def _pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise BridgeProtocolError(
+            "compression png needs Pillow on the server: pip install 'minirospy[images]'"
+        ) from error
+    return Image

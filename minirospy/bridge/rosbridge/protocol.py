@@ -1,0 +1,424 @@
+"""The rosbridge protocol, version 2: a client's operations in, events out; the fields of messages out, frames out.
+
+Pure. Texts of errors are those of rosbridge_library. Source: ROSBRIDGE_PROTOCOL.md of
+https://github.com/RobotWebTools/rosbridge_suite, branch ros1.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from minirospy.bridge.rosbridge import png
+from minirospy.bridge.rosbridge.cbor import decode_cbor, encode_cbor
+from minirospy.errors import BridgeProtocolError
+
+__all__ = [
+    "OPERATIONS",
+    "Advertise",
+    "AdvertiseService",
+    "Auth",
+    "CallService",
+    "Event",
+    "Fragment",
+    "OperationError",
+    "Publish",
+    "ServiceResponse",
+    "SetLevel",
+    "StatusLevel",
+    "Subscribe",
+    "Unadvertise",
+    "UnadvertiseService",
+    "Unsubscribe",
+    "decode",
+    "encode",
+    "fragments",
+    "parse",
+    "service_call",
+    "service_response",
+    "status",
+]
+
+Id = str | int | float | None
+Compression = str
+COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+
+_SHOWN = 200
+"""Characters of a client's message that an error repeats."""
+
+
+class StatusLevel(IntEnum):
+    """The severity of a status message; a client gets those up to its level."""
+
+    NONE = 0
+    ERROR = 1
+    WARNING = 2
+    INFO = 3
+
+
+class OperationError(BridgeProtocolError):
+    """An operation that is refused; ``id`` is that of the client's message."""
+
+    def __init__(self, text: str, id_: Id = None) -> None:
+        super().__init__(text)
+        self.id = id_
+
+
+@dataclass(frozen=True)
+class Event:
+    """An operation of a client."""
+
+    id: Id
+
+
+@dataclass(frozen=True)
+class Advertise(Event):
+    topic: str
+    type: str
+    latch: bool
+    queue_size: int
+
+
+@dataclass(frozen=True)
+class Unadvertise(Event):
+    topic: str
+
+
+@dataclass(frozen=True)
+class Publish(Event):
+    topic: str
+    message: object
+    latch: bool
+
+
+@dataclass(frozen=True)
+class Subscribe(Event):
+    """``throttle_rate`` in milliseconds."""
+
+    topic: str
+    type: str | None
+    throttle_rate: int
+    queue_length: int
+    fragment_size: int | None
+    compression: Compression
+
+
+@dataclass(frozen=True)
+class Unsubscribe(Event):
+    topic: str
+
+
+@dataclass(frozen=True)
+class CallService(Event):
+    """``arguments``: the fields of the request, a list of their values, or anything else for none."""
+
+    service: str
+    arguments: object
+    fragment_size: int | None
+    compression: Compression
+
+
+@dataclass(frozen=True)
+class ServiceResponse(Event):
+    service: str
+    values: object
+    result: bool
+
+
+@dataclass(frozen=True)
+class AdvertiseService(Event):
+    service: str
+    type: str
+
+
+@dataclass(frozen=True)
+class UnadvertiseService(Event):
+    service: str
+
+
+@dataclass(frozen=True)
+class Fragment(Event):
+    data: str
+    number: int
+    total: int
+
+
+@dataclass(frozen=True)
+class SetLevel(Event):
+    level: StatusLevel
+
+
+@dataclass(frozen=True)
+class Auth(Event):
+    """A request of http://wiki.ros.org/rosauth; times in seconds."""
+
+    mac: str
+    client: str
+    dest: str
+    rand: str
+    time: float
+    level: str
+    end: float
+
+
+Fields = Mapping[str, Any]
+
+
+# --- in
+
+
+def decode(data: str | bytes) -> Fields:
+    """Return the object that a message is: JSON as text, CBOR as bytes. Raises OperationError."""
+    try:
+        found = json.loads(data) if isinstance(data, str) else decode_cbor(data)
+    except (ValueError, RecursionError) as error:
+        shown = data[:_SHOWN] if isinstance(data, str) else f"{len(data)} bytes of CBOR ({error})"
+        raise OperationError(f"Unable to deserialize message from client: {shown}") from error
+    if not isinstance(found, dict):
+        shown = str(found)[:_SHOWN]
+        raise OperationError(f"Unable to deserialize message from client: {shown}")
+    return found
+
+
+def parse(fields: Fields) -> Event:
+    """Return the event of an operation; a PNG's content is that of the operation in it. Raises OperationError."""
+    id_ = _id(fields)
+    op = fields.get("op")
+    if op is None:
+        raise _without_op(fields, id_)
+    reader = _READERS.get(op) if isinstance(op, str) else None
+    if reader is None:
+        raise OperationError(
+            f"Unknown operation: {str(op)[:_SHOWN]}.  Allowed operations: {list(OPERATIONS)}", id_
+        )
+    try:
+        return reader(fields, id_)
+    except OperationError:
+        raise
+    except BridgeProtocolError as error:
+        raise OperationError(f"{op}: {error}", id_) from error
+
+
+def _without_op(fields: Fields, id_: Id) -> OperationError:
+    shown = str(dict(fields))[:_SHOWN]
+    if "receiver" in fields:
+        return OperationError(
+            "Received a rosbridge v1.0 message.  Please refer to rosbridge.org for the correct format of rosbridge "
+            f"v2.0 messages.  Original message was: {shown}"
+        )
+    return OperationError(
+        "Received a message without an op.  All messages require 'op' field with value one of: "
+        f"{list(OPERATIONS)}.  Original message was: {shown}",
+        id_,
+    )
+
+
+def _id(fields: Fields) -> Id:
+    found = fields.get("id")
+    return found if isinstance(found, str | int | float) or found is None else str(found)
+
+
+def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
+    """Return a field, ``default`` where it is absent. Raises BridgeProtocolError, with rosbridge's texts."""
+    found = fields.get(name)
+    if found is None:
+        if default is ...:
+            raise BridgeProtocolError(f"Expected a {name} field but none was found.")
+        return default
+    if not isinstance(found, types) or (isinstance(found, bool) and bool not in types):
+        raise BridgeProtocolError(
+            f"Expected field {name} to be one of {types}. Invalid value: {str(found)[:_SHOWN]}"
+        )
+    return found
+
+
+def _text(fields: Fields, name: str, default: Any = ...) -> Any:
+    return _value(fields, name, (str,), default)
+
+
+def _compression(fields: Fields) -> Compression:
+    found: str = _text(fields, "compression", "none")
+    if found not in COMPRESSIONS:
+        raise BridgeProtocolError(
+            f"compression {found[:_SHOWN]!r} is unknown: there is {', '.join(COMPRESSIONS)}"
+        )
+    return found
+
+
+def _fragment_size(fields: Fields) -> int | None:
+    found: int | None = _value(fields, "fragment_size", (int,), None)
+    if found is not None and found < 1:
+        raise BridgeProtocolError(f"fragment_size is {found}: it is a number of characters")
+    return found
+
+
+def _advertise(fields: Fields, id_: Id) -> Event:
+    return Advertise(
+        id_,
+        _text(fields, "topic"),
+        _text(fields, "type"),
+        bool(fields.get("latch")),
+        _value(fields, "queue_size", (int,), 100),
+    )
+
+
+def _unadvertise(fields: Fields, id_: Id) -> Event:
+    return Unadvertise(id_, _text(fields, "topic"))
+
+
+def _publish(fields: Fields, id_: Id) -> Event:
+    return Publish(id_, _text(fields, "topic"), fields.get("msg", {}), bool(fields.get("latch")))
+
+
+def _subscribe(fields: Fields, id_: Id) -> Event:
+    return Subscribe(
+        id_,
+        _text(fields, "topic"),
+        _text(fields, "type", None) or None,
+        max(0, int(_value(fields, "throttle_rate", (int, float), 0))),
+        max(0, _value(fields, "queue_length", (int,), 0)),
+        _fragment_size(fields),
+        _compression(fields),
+    )
+
+
+def _unsubscribe(fields: Fields, id_: Id) -> Event:
+    return Unsubscribe(id_, _text(fields, "topic"))
+
+
+def _call_service(fields: Fields, id_: Id) -> Event:
+    service: str = _text(fields, "service")
+    name, _, old_id = service.partition("#")  # an id of old clients: /rosapi/topics#33
+    return CallService(
+        id_ if id_ is not None or not old_id else old_id,
+        name,
+        fields.get("args", []),
+        _fragment_size(fields),
+        _compression(fields),
+    )
+
+
+def _service_response(fields: Fields, id_: Id) -> Event:
+    result = _value(fields, "result", (bool,))
+    return ServiceResponse(id_, _text(fields, "service"), fields.get("values", {}), result)
+
+
+def _advertise_service(fields: Fields, id_: Id) -> Event:
+    return AdvertiseService(id_, _text(fields, "service"), _text(fields, "type"))
+
+
+def _unadvertise_service(fields: Fields, id_: Id) -> Event:
+    return UnadvertiseService(id_, _text(fields, "service"))
+
+
+def _fragment(fields: Fields, id_: Id) -> Event:
+    number, total, data = (fields.get(name) for name in ("num", "total", "data"))
+    if (
+        id_ is None
+        or type(number) is not int
+        or type(total) is not int
+        or not isinstance(data, str)
+        or not 0 <= number < total
+    ):
+        raise OperationError("received invalid fragment!", id_)
+    return Fragment(id_, data, number, total)
+
+
+def _png(fields: Fields, _: Id) -> Event:
+    text = png.decode(_text(fields, "data"))
+    inner = decode(text)
+    if inner.get("op") == "png":
+        raise BridgeProtocolError("a PNG in a PNG")
+    return parse(inner)
+
+
+def _set_level(fields: Fields, id_: Id) -> Event:
+    level: str = _text(fields, "level")
+    try:
+        return SetLevel(id_, StatusLevel[level.upper()])
+    except KeyError:
+        names = ", ".join(each.name.lower() for each in reversed(StatusLevel))
+        raise BridgeProtocolError(f"Invalid status level {level[:_SHOWN]}; must be one of {names}") from None
+
+
+def _auth(fields: Fields, id_: Id) -> Event:
+    mac, client, dest, rand = (_text(fields, name) for name in ("mac", "client", "dest", "rand"))
+    time, end = (_value(fields, name, (int, float)) for name in ("t", "end"))
+    return Auth(id_, mac, client, dest, rand, float(time), _text(fields, "level"), float(end))
+
+
+_READERS: Mapping[str, Callable[[Fields, Id], Event]] = {
+    "call_service": _call_service,
+    "advertise": _advertise,
+    "unadvertise": _unadvertise,
+    "publish": _publish,
+    "subscribe": _subscribe,
+    "unsubscribe": _unsubscribe,
+    "fragment": _fragment,
+    "advertise_service": _advertise_service,
+    "service_response": _service_response,
+    "unadvertise_service": _unadvertise_service,
+    "png": _png,
+    "set_level": _set_level,
+    "auth": _auth,
+}
+OPERATIONS = tuple(_READERS)
+"""The operations that clients may send."""
+
+
+# --- out
+
+
+def encode(fields: Fields, compression: Compression = "none") -> str | bytes:
+    """Return a message as text, with CBOR as bytes."""
+    if compression in ("cbor", "cbor-raw"):
+        return encode_cbor(fields)
+    text = json.dumps(fields, separators=(",", ":"), allow_nan=False)
+    if compression == "png":
+        return json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+    return text
+
+
+def fragments(text: str, size: int, id_: Id) -> list[str]:
+    """Return the messages that carry a text in pieces of ``size`` characters; the text itself where it is not longer."""
+    if len(text) <= size:
+        return [text]
+    total = -(-len(text) // size)
+    return [
+        json.dumps(
+            {
+                "op": "fragment",
+                "id": id_,
+                "data": text[at * size : (at + 1) * size],
+                "num": at,
+                "total": total,
+            },
+            separators=(",", ":"),
+        )
+        for at in range(total)
+    ]
+
+
+def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
+    """Return a status message."""
+    fields: dict[str, object] = {"op": "status", "level": level.name.lower(), "msg": text}
+    return fields if id_ is None else {**fields, "id": id_}
+
+
+def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
+    """Return the answer to a call; ``values`` is a text where ``result`` is false."""
+    fields: dict[str, object] = {
+        "op": "service_response",
+        "service": service,
+        "values": values,
+        "result": result,
+    }
+    return fields if id_ is None else {**fields, "id": id_}
+
+
+def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
+    """Return the call of a service that the client offers."""
+    return {"op": "call_service", "id": id_, "service": service, "args": arguments}

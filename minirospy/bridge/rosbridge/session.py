@@ -1,0 +1,473 @@
+"""One client of the rosbridge protocol: its subscriptions, publications, calls and services."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+from collections import deque
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from minirospy.aio.handle import serialized
+from minirospy.bridge.graph import Publication
+from minirospy.bridge.rosbridge import conversion, protocol
+from minirospy.bridge.rosbridge.authentication import authenticate
+from minirospy.bridge.rosbridge.protocol import Event, OperationError, StatusLevel
+from minirospy.bridge.rosbridge.services import ClientService, call
+from minirospy.bridge.rosbridge.subscription import Fragments
+from minirospy.bridge.rosbridge.topic import ClientTopic
+from minirospy.bridge.rosbridge.types import message_class
+from minirospy.errors import (
+    BridgeError,
+    MessageException,
+    MinirospyError,
+    ROSSerializationException,
+    ServiceException,
+)
+from minirospy.idl.protocols import Message, is_stamped
+from minirospy.introspect.graph import why_illegal
+from minirospy.wire.tcpros import ANY, InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.bridge.rosbridge.door import RosbridgeDoor
+    from minirospy.bridge.web.connection import WebClient
+
+__all__ = ["RosbridgeSession"]
+
+_log = logging.getLogger(__name__)
+
+_MOST_CALLS = 200
+_MOST_TOPICS = 1000
+_MOST_WAITING = 64_000_000
+"""Calls under way, topics published or subscribed, and bytes of messages that wait for an earlier one: of one client."""
+
+_POLICY = 1008
+_FAILED = 1011
+
+_REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
+"""What is reported to the client."""
+
+_Work = Coroutine[object, object, None]
+
+
+@dataclass
+class _Published:
+    """A topic that a client publishes: the ids of its advertisements, and the numbers of headers."""
+
+    publication: Publication
+    message_class: type[Message]
+    ids: set[object] = field(default_factory=set)
+    numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
+
+
+class RosbridgeSession:
+    """The state of one client; called by its connection, on the loop.
+
+    Operations are carried out in the order in which they came: where one has to wait (for the graph, for the subscribers of a
+    new topic), those behind it wait, except for calls of services.
+    """
+
+    def __init__(self, door: RosbridgeDoor, client: WebClient) -> None:
+        self.client = client
+        self.connected = door.graph.node.now()
+        self._door = door
+        self._graph = door.graph
+        self._level = StatusLevel.ERROR
+        self._is_authenticated = not door.options.authenticate
+        self._fragments = Fragments(door.options.fragment_timeout)
+
+        self._subscribed: dict[str, ClientTopic] = {}
+        self._published: dict[str, _Published] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._calls = 0
+        self._inbox: deque[str | bytes] = deque()
+        self._inbox_size = 0
+        self._is_working = False
+        self._handlers: Mapping[type[Event], Callable[[Any], _Work | None]] = {
+            protocol.Advertise: self._advertise,
+            protocol.Unadvertise: self._unadvertise,
+            protocol.Publish: self._publish,
+            protocol.Subscribe: self._subscribe,
+            protocol.Unsubscribe: self._unsubscribe,
+            protocol.CallService: self._call_service,
+            protocol.ServiceResponse: self._service_response,
+            protocol.AdvertiseService: self._advertise_service,
+            protocol.UnadvertiseService: self._unadvertise_service,
+            protocol.Fragment: self._fragment,
+            protocol.SetLevel: self._set_level,
+            protocol.Auth: self._auth,
+        }
+
+    # --- from the connection
+
+    def received_text(self, text: str) -> None:
+        """Take over a JSON message."""
+        self._received(text)
+
+    def received_binary(self, data: bytes) -> None:
+        """Take over a CBOR message."""
+        self._received(data)
+
+    def ended(self) -> None:
+        """End everything that the client has."""
+        for topic in self._subscribed.values():
+            topic.close()
+        self._subscribed.clear()
+        for published in self._published.values():
+            self._door.release(published.publication)
+        self._published.clear()
+        for name, service in list(self._door.services.items()):
+            if service.session is self:
+                del self._door.services[name]
+                self._graph.spawn(service.close(f"the client that offers {name} has disconnected"))
+        self._inbox.clear()
+        for task in list(self._tasks):
+            task.cancel()
+        self._door.left(self)
+
+    # --- for services and topics
+
+    def send(
+        self, fields: Mapping[str, object], compression: str = "none", fragment_size: int | None = None
+    ) -> None:
+        """Send a message that is not one of a topic."""
+        data = protocol.encode(fields, compression)
+        if isinstance(data, bytes):
+            self.client.send_binary(data)
+            return
+        size = fragment_size or self._door.options.fragment_size
+        id_ = fields.get("id")
+        for text in protocol.fragments(data, size, id_) if size else (data,):  # type: ignore[arg-type]
+            self.client.send_text(text)
+
+    def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
+        """Send a status, where the client has asked for this level."""
+        if level <= self._level:
+            self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
+        if level is not StatusLevel.INFO:
+            shown = text if id_ is None else f"[id: {id_}] {text}"
+            self._door.log.warning("[Client %s] %s", self.client.name, shown)
+
+    # --- one operation after the other
+
+    def _received(self, data: str | bytes) -> None:
+        if not self._is_working:
+            self._start(self._begin(data))
+            return
+        self._inbox.append(data)
+        self._inbox_size += len(data)
+        if self._inbox_size > _MOST_WAITING:
+            self.client.close(_POLICY, "too much waits for an earlier operation")
+
+    def _start(self, first: _Work | None) -> None:
+        if first is not None:
+            self._is_working = True
+            self._spawn(self._work(first))
+
+    async def _work(self, first: _Work) -> None:
+        """Finish an operation, then those that have come meanwhile."""
+        try:
+            await first
+            while self._inbox:
+                data = self._inbox.popleft()
+                self._inbox_size -= len(data)
+                pending = self._begin(data)
+                if pending is not None:
+                    await pending
+        except Exception:  # noqa: BLE001 whatever an operation raises ends this client alone, as in its connection
+            _log.exception("an operation of %s could not be carried out", self.client.name)
+            self.client.close(_FAILED, "the bridge failed on this message")
+        self._is_working = False
+
+    def _begin(self, data: str | bytes) -> _Work | None:
+        """Carry out an operation; return what is left to be waited for."""
+        try:
+            event = protocol.parse(protocol.decode(data))
+        except OperationError as error:
+            self.status(StatusLevel.ERROR, str(error), error.id)
+            return None
+        except BridgeError as error:
+            self.status(StatusLevel.ERROR, str(error))
+            return None
+        return self._carry_out(event)
+
+    def _carry_out(self, event: Event) -> _Work | None:
+        if not self._is_authenticated and not isinstance(event, protocol.Auth):
+            self._door.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+            self.client.close(_POLICY, "authentication is required first")
+            return None
+        try:
+            pending = self._handlers[type(event)](event)
+        except _REFUSALS as error:
+            self._failed(event, error)
+            return None
+        return self._finish(event, pending) if pending is not None else None
+
+    async def _finish(self, event: Event, pending: _Work) -> None:
+        try:
+            await pending
+        except _REFUSALS as error:
+            self._failed(event, error)
+
+    def _failed(self, event: Event, error: Exception) -> None:
+        self.status(StatusLevel.ERROR, f"{_OPERATIONS[type(event)]}: {error}", event.id)
+
+    def _spawn(self, work: _Work) -> asyncio.Task[None]:
+        task = self._graph.spawn(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    # --- topics that the client publishes
+
+    def _advertise(self, event: protocol.Advertise) -> None:
+        if not self._is_allowed("topics", event.topic, "topic, cancelling advertisement of"):
+            return
+        published = self._published.get(event.topic) or self._open(event.topic, event.type, event.latch)
+        if published.message_class is not message_class(event.type):
+            raise _conflict(event.topic, event.type, published.message_class._type)
+        published.ids.add(event.id)
+
+    def _unadvertise(self, event: protocol.Unadvertise) -> None:
+        published = self._published.get(event.topic)
+        if published is None:
+            return
+        if event.id is None:
+            published.ids.clear()
+        published.ids.discard(event.id)
+        if not published.ids:
+            del self._published[event.topic]
+            self._door.release(published.publication)
+
+    def _publish(self, event: protocol.Publish) -> _Work | None:
+        if not self._is_allowed("topics", event.topic, "topic, cancelling publish to"):
+            return None
+        published = self._published.get(event.topic)
+        if published is None:
+            return self._publish_established(event)
+        return self._publish_to(published, event)
+
+    async def _publish_established(self, event: protocol.Publish) -> None:
+        """Publish on a topic that the client has not advertised: its type is that of the graph."""
+        type_ = await self._type_of(event.topic)
+        published = self._open(event.topic, type_, event.latch)
+        published.ids.add(None)
+        pending = self._publish_to(published, event)
+        if pending is not None:
+            await pending
+
+    def _publish_to(self, published: _Published, event: protocol.Publish) -> _Work | None:
+        message = published.message_class()
+        conversion.fill(message, event.message, self._graph.node.now)
+        if is_stamped(message):
+            message.header.seq = next(published.numbers)
+        body = serialized(message)
+        if published.publication.has_joined:
+            published.publication.publish(body)
+            return None
+        return self._publish_when_joined(published.publication, body)
+
+    async def _publish_when_joined(self, publication: Publication, body: bytes) -> None:
+        await publication.joined()
+        publication.publish(body)
+
+    def _open(self, topic: str, type_: str, latch: bool) -> _Published:
+        self._require_write("publishing")
+        _check_name("topic", topic)
+        if len(self._published) >= _MOST_TOPICS:
+            raise BridgeError(f"a client may publish {_MOST_TOPICS} topics")
+        found = message_class(type_)
+        resolved = self._graph.node.resolve(topic)
+        known = self._graph.snapshot.types.get(resolved, ANY)
+        if known not in (ANY, found._type):
+            raise _conflict(topic, found._type, known)
+        publication = self._graph.advertise(resolved, InterfaceType.of(found), latch=latch)
+        published = self._published[topic] = _Published(publication, found)
+        return published
+
+    # --- topics that the client subscribes to
+
+    def _subscribe(self, event: protocol.Subscribe) -> _Work | None:
+        if not self._is_allowed("topics", event.topic, "topic, cancelling subscription to"):
+            return None
+        _check_name("topic", event.topic)
+        is_known = event.topic in self._subscribed
+        if event.compression == "cbor-raw" or (is_known and event.type is None):
+            self._add_subscription(event)
+            return None
+        if event.type is None:
+            return self._subscribe_established(event)
+        try:
+            declared = message_class(event.type)._type
+        except BridgeError as error:
+            return self._subscribe_unknown(event, error)
+        known = self._graph.snapshot.types.get(self._graph.node.resolve(event.topic), ANY)
+        if known not in (ANY, declared):
+            raise _conflict(event.topic, declared, known)
+        self._add_subscription(event)
+        return None
+
+    async def _subscribe_established(self, event: protocol.Subscribe) -> None:
+        await self._type_of(event.topic)
+        self._add_subscription(event)
+
+    async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
+        """Subscribe by a type that is not installed here, where the topic has it: its publishers know the definition."""
+        with contextlib.suppress(BridgeError):
+            if await self._type_of(event.topic) == event.type:
+                self._add_subscription(event)
+                return
+        raise error
+
+    def _add_subscription(self, event: protocol.Subscribe) -> None:
+        topic = self._subscribed.get(event.topic)
+        if topic is None:
+            if len(self._subscribed) >= _MOST_TOPICS:
+                raise BridgeError(f"a client may subscribe to {_MOST_TOPICS} topics")
+            topic = self._subscribed[event.topic] = ClientTopic(self, self._door, event.topic)
+        topic.add(event)
+        self.status(StatusLevel.INFO, f"Subscribed to {event.topic}", event.id)
+
+    def _unsubscribe(self, event: protocol.Unsubscribe) -> None:
+        topic = self._subscribed.get(event.topic)
+        if topic is None:
+            return
+        topic.remove(event.id)
+        if not topic.is_wanted:
+            del self._subscribed[event.topic]
+            topic.close()
+        self.status(StatusLevel.INFO, f"Unsubscribed from {event.topic}", event.id)
+
+    async def _type_of(self, topic: str) -> str:
+        """Return the type that a topic has in the graph. Raises BridgeError where it has none."""
+        resolved = self._graph.node.resolve(topic)
+        if self._graph.snapshot.types.get(resolved, ANY) == ANY:
+            await self._graph.look()
+        found = self._graph.snapshot.types.get(resolved, ANY)
+        if found == ANY:
+            raise BridgeError(f"Cannot infer topic type for topic {topic} as it is not yet advertised")
+        return found
+
+    # --- services
+
+    def _call_service(self, event: protocol.CallService) -> None:
+        if not self._is_allowed("services", event.service, "service, cancelling service call for"):
+            return
+        if self._calls >= _MOST_CALLS:
+            raise BridgeError(f"{_MOST_CALLS} calls are under way: wait for an answer")
+        self._calls += 1
+
+        def ended(_: object) -> None:
+            self._calls -= 1
+
+        self._spawn(self._call(event)).add_done_callback(ended)
+
+    async def _call(self, event: protocol.CallService) -> None:
+        try:
+            self._require_write("calling services")
+            _check_name("service", event.service)
+            values: object = conversion.values(await call(self._graph, event.service, event.arguments))
+            result = True
+        except _REFUSALS as error:
+            values, result = str(error), False
+            self._door.log.warning("[Client %s] call_service %s: %s", self.client.name, event.service, error)
+        fields = protocol.service_response(event.service, values, event.id, result=result)
+        self.send(fields, event.compression, event.fragment_size)
+
+    def _advertise_service(self, event: protocol.AdvertiseService) -> _Work | None:
+        if not self._is_allowed("services", event.service, "service, cancelling service advertisement for"):
+            return None
+        self._require_write("offering services")
+        _check_name("service", event.service)
+        return self._offer(event)
+
+    async def _offer(self, event: protocol.AdvertiseService) -> None:
+        old = self._door.services.pop(event.service, None)
+        if old:
+            self.status(
+                StatusLevel.WARNING, f"Duplicate service advertised. Overwriting {event.service}.", event.id
+            )
+            await old.close("Duplicate advertiser.")
+        self._door.services[event.service] = ClientService(self, self._graph, event.service, event.type)
+        self.status(StatusLevel.INFO, f"Advertised service {event.service}.", event.id)
+
+    def _unadvertise_service(self, event: protocol.UnadvertiseService) -> _Work:
+        service = self._own_service(event.service)
+        if service is None:
+            raise BridgeError(
+                f"Service {event.service} has not been advertised via rosbridge, can't unadvertise."
+            )
+        del self._door.services[event.service]
+        self.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
+        return service.close(f"Service {event.service} was unadvertised with a service call in progress")
+
+    def _service_response(self, event: protocol.ServiceResponse) -> None:
+        service = self._own_service(event.service)
+        if service is None:
+            raise BridgeError(f"Service {event.service} has not been advertised via rosbridge.")
+        service.answered(event)
+
+    def _own_service(self, name: str) -> ClientService | None:
+        service = self._door.services.get(name)
+        return service if service and service.session is self else None
+
+    # --- the others
+
+    def _fragment(self, event: protocol.Fragment) -> _Work | None:
+        text = self._fragments.add(event, asyncio.get_running_loop().time())
+        return self._begin(text) if text is not None else None
+
+    def _set_level(self, event: protocol.SetLevel) -> None:
+        self._level = event.level
+
+    async def _auth(self, event: protocol.Auth) -> None:
+        if self._is_authenticated:
+            return
+        if await authenticate(self._graph.node, event):
+            self._is_authenticated = True
+            return
+        self._door.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+        self.client.close(_POLICY, "not authenticated")
+
+    def _is_allowed(self, kind: str, name: str, what: str) -> bool:
+        """Return whether a name passes the globs; else warn, with rosbridge's text."""
+        filters = self._graph.filters
+        if (filters.topics if kind == "topics" else filters.services)(name):
+            return True
+        self.status(StatusLevel.WARNING, f"No match found for {what}: {name}")
+        return False
+
+    def _require_write(self, what: str) -> None:
+        if not self.client.may_write:
+            raise BridgeError(f"{what} is not allowed: this token is read-only")
+
+
+def _check_name(kind: str, name: str) -> None:
+    why = why_illegal(name)
+    if why:
+        raise BridgeError(f"{kind} [{name[:200]}]: {why}")
+
+
+def _conflict(topic: str, wanted: str, known: str) -> BridgeError:
+    return BridgeError(
+        f"Tried to register topic {topic} with type {wanted} but it is already established with type {known}"
+    )
+
+
+_OPERATIONS: Mapping[type[Event], str] = {
+    protocol.Advertise: "advertise",
+    protocol.Unadvertise: "unadvertise",
+    protocol.Publish: "publish",
+    protocol.Subscribe: "subscribe",
+    protocol.Unsubscribe: "unsubscribe",
+    protocol.CallService: "call_service",
+    protocol.ServiceResponse: "service_response",
+    protocol.AdvertiseService: "advertise_service",
+    protocol.UnadvertiseService: "unadvertise_service",
+    protocol.Fragment: "fragment",
+    protocol.SetLevel: "set_level",
+    protocol.Auth: "auth",
+}

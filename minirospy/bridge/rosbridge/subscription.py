@@ -1,0 +1,136 @@
+"""A client's subscriptions to one topic as one, and when its messages are sent; fragments that come in. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from minirospy.bridge.rosbridge.protocol import Fragment, OperationError, Subscribe
+
+__all__ = ["Fragments", "Merged", "Pacer", "merge"]
+
+_T = TypeVar("_T")
+_STRENGTH = ("none", "png", "cbor", "cbor-raw")
+
+MOST_FRAGMENT_BYTES = 64_000_000
+"""Of the incomplete messages of one client."""
+_MOST_FRAGMENTS = 100_000
+
+
+@dataclass(frozen=True)
+class Merged:
+    """How the messages of a topic are sent; ``throttle`` in seconds."""
+
+    throttle: float
+    queue_length: int
+    fragment_size: int | None
+    compression: str
+
+
+def merge(subscriptions: Iterable[Subscribe]) -> Merged:
+    """Return what satisfies all subscriptions: the shortest interval, queue and fragments, the strongest compression."""
+    each = tuple(subscriptions)
+    sizes = [one.fragment_size for one in each if one.fragment_size is not None]
+    return Merged(
+        min(one.throttle_rate for one in each) / 1000,
+        min(one.queue_length for one in each),
+        min(sizes, default=None),
+        max((one.compression for one in each), key=_STRENGTH.index),
+    )
+
+
+class Pacer(Generic[_T]):
+    """The messages of a topic in time: one in ``throttle`` seconds; the newest ``queue_length`` wait, others are dropped."""
+
+    def __init__(self) -> None:
+        self.throttle = 0.0
+        self.dropped = 0
+        self._last = float("-inf")
+        self._length = 0
+        self._waiting: deque[_T] = deque()
+
+    def set(self, throttle: float, queue_length: int) -> None:
+        """Change the interval and the length of the queue; the newest stay."""
+        self.throttle, self._length = throttle, queue_length
+        self._trim()
+
+    def arrived(self, message: _T, now: float) -> bool:
+        """Return whether a message is to be sent now; else it waits, or is dropped."""
+        if not self._waiting and now >= self._last + self.throttle:
+            self._last = now
+            return True
+        if self._length:
+            self._waiting.append(message)
+            self._trim()
+        else:
+            self.dropped += 1
+        return False
+
+    @property
+    def due(self) -> float | None:
+        """Return when the next message that waits is to be sent."""
+        return self._last + self.throttle if self._waiting else None
+
+    def next(self, now: float) -> _T | None:
+        """Return a message that is due."""
+        if not self._waiting or now < self._last + self.throttle:
+            return None
+        self._last = now
+        return self._waiting.popleft()
+
+    def _trim(self) -> None:
+        while len(self._waiting) > self._length:
+            self._waiting.popleft()
+            self.dropped += 1
+
+
+class _Parts(NamedTuple):
+    total: int
+    parts: dict[int, str]
+    since: list[float]
+
+
+class Fragments:
+    """The fragments of one client that wait for others of their message."""
+
+    def __init__(self, timeout: float = 600.0) -> None:
+        """``timeout``: seconds after which an incomplete message is forgotten."""
+        self._timeout = timeout
+        self._messages: dict[Hashable, _Parts] = {}
+        self._size = 0
+
+    def add(self, fragment: Fragment, now: float) -> str | None:
+        """Return the message that a fragment completes. Raises OperationError."""
+        self._forget_old(now)
+        known = self._messages.setdefault(fragment.id, _Parts(fragment.total, {}, [now]))
+        if fragment.total != known.total or fragment.number in known.parts:
+            raise OperationError(f"error while trying to append fragment {fragment.number}", fragment.id)
+        self._size += len(fragment.data)
+        known.parts[fragment.number] = fragment.data
+        known.since[0] = now
+        if self._size > MOST_FRAGMENT_BYTES or known.total > _MOST_FRAGMENTS:
+            self._forget(fragment.id)
+            raise OperationError(
+                f"the fragments of message {fragment.id} are too many: {MOST_FRAGMENT_BYTES} bytes and "
+                f"{_MOST_FRAGMENTS} fragments may wait",
+                fragment.id,
+            )
+
+        if len(known.parts) < known.total:
+            return None
+        text = "".join(known.parts[number] for number in range(known.total))
+        self._forget(fragment.id)
+        return text
+
+    def _forget_old(self, now: float) -> None:
+        old: Sequence[Hashable] = [
+            id_ for id_, known in self._messages.items() if now - known.since[0] > self._timeout
+        ]
+        for id_ in old:
+            self._forget(id_)
+
+    def _forget(self, id_: Hashable) -> None:
+        known = self._messages.pop(id_)
+        self._size -= sum(map(len, known.parts.values()))

@@ -1,0 +1,74 @@
+"""Classes of messages and services by the names that clients give, with rosbridge's texts, and of what publishers send."""
+
+from __future__ import annotations
+
+from minirospy.errors import BridgeError, MinirospyError
+from minirospy.idl.load import class_from_text, get_message_class, get_service_class
+from minirospy.idl.protocols import Message, ServiceClass
+from minirospy.wire.header import Header
+
+__all__ = ["ArrivingTypes", "UnknownTypeError", "message_class", "service_class"]
+
+
+class UnknownTypeError(BridgeError):
+    """A type that is not installed."""
+
+
+def message_class(name: str) -> type[Message]:
+    """Return a message's class. Raises UnknownTypeError."""
+    try:
+        found = get_message_class(name)
+    except (MinirospyError, ImportError, SyntaxError) as error:
+        raise _unknown(name, "msg", str(error)) from error
+    if found is None:
+        raise _unknown(name, "msg", "no such definition is installed here")
+    return found
+
+
+def service_class(name: str) -> ServiceClass:
+    """Return a service's class. Raises UnknownTypeError."""
+    try:
+        found = get_service_class(name)
+    except (MinirospyError, ImportError, SyntaxError) as error:
+        raise _unknown(name, "srv", str(error)) from error
+    if found is None:
+        raise _unknown(name, "srv", "no such definition is installed here")
+    return found
+
+
+def _unknown(name: str, kind: str, why: str) -> UnknownTypeError:
+    package, _, short = name.partition("/")
+    if not package or not short or "/" in short:
+        return UnknownTypeError(f"{name[:200]} is not a valid type string")
+    return UnknownTypeError(
+        f"Unable to import {kind} class {short[:200]} from package {package[:200]}. Caused by {why}"
+    )
+
+
+class ArrivingTypes:
+    """The classes of what publishers send: the installed one where it has their definition, else one of their text."""
+
+    def __init__(self) -> None:
+        self._classes: dict[tuple[str, str], type[Message] | None] = {}
+
+    def of(self, header: Header) -> type[Message] | None:
+        """Return the class of a publisher's messages, None where nobody knows it."""
+        key = header.get("type", ""), header.get("md5sum", "")
+        if key not in self._classes:
+            if len(self._classes) > 1000:
+                self._classes.clear()
+            self._classes[key] = self._find(*key, header.get("message_definition", ""))
+        return self._classes[key]
+
+    def _find(self, name: str, md5sum: str, text: str) -> type[Message] | None:
+        try:
+            installed = get_message_class(name)
+        except (MinirospyError, ImportError, SyntaxError):
+            installed = None
+        if installed is not None and installed._md5sum == md5sum:
+            return installed
+        try:
+            made = class_from_text(name, text)
+        except MinirospyError:
+            return None
+        return made if made._md5sum == md5sum else None

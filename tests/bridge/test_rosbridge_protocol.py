@@ -1,0 +1,399 @@
+"""The pure half of rosbridge: conversations of its protocol document, conversions, fragments, and refusals."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import math
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import cbor2
+import pytest
+from geometry_msgs.msg import PoseStamped
+from hypothesis import given, strategies
+from sensor_msgs.msg import CompressedImage, LaserScan
+from std_msgs.msg import Float32, Header, Int32, Int64MultiArray, String, UInt8MultiArray
+from std_srvs.srv import SetBool
+
+from minirospy.bridge.rosbridge import conversion, png, protocol
+from minirospy.bridge.rosbridge.protocol import OperationError, StatusLevel, Subscribe
+from minirospy.bridge.rosbridge.subscription import Fragments, Merged, Pacer, merge
+from minirospy.errors import BridgeProtocolError
+from minirospy.times import Time
+
+
+def parse(**fields: Any) -> protocol.Event:
+    return protocol.parse(protocol.decode(json.dumps(fields)))
+
+
+def now() -> Time:
+    return Time(7, 8)
+
+
+def refused(**fields: Any) -> str:
+    with pytest.raises(OperationError) as error:
+        parse(**fields)
+    return str(error.value)
+
+
+# --- conversations of ROSBRIDGE_PROTOCOL.md
+
+EVENTS = [
+    (
+        {"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/Twist"},
+        protocol.Advertise(None, "/cmd_vel", "geometry_msgs/Twist", False, 100),
+    ),
+    (
+        {
+            "op": "advertise",
+            "id": "a",
+            "topic": "/x",
+            "type": "std_msgs/String",
+            "latch": True,
+            "queue_size": 1,
+        },
+        protocol.Advertise("a", "/x", "std_msgs/String", True, 1),
+    ),
+    ({"op": "unadvertise", "id": "a", "topic": "/x"}, protocol.Unadvertise("a", "/x")),
+    (
+        {"op": "publish", "topic": "/x", "msg": {"data": "hello"}},
+        protocol.Publish(None, "/x", {"data": "hello"}, False),
+    ),
+    ({"op": "publish", "topic": "/x"}, protocol.Publish(None, "/x", {}, False)),
+    (
+        {"op": "subscribe", "topic": "/x"},
+        Subscribe(None, "/x", None, 0, 0, None, "none"),
+    ),
+    (
+        {
+            "op": "subscribe",
+            "id": "s",
+            "topic": "/x",
+            "type": "std_msgs/String",
+            "throttle_rate": 500,
+            "queue_length": 3,
+            "fragment_size": 1000,
+            "compression": "cbor",
+        },
+        Subscribe("s", "/x", "std_msgs/String", 500, 3, 1000, "cbor"),
+    ),
+    ({"op": "unsubscribe", "id": "s", "topic": "/x"}, protocol.Unsubscribe("s", "/x")),
+    (
+        {"op": "call_service", "id": 3, "service": "/add", "args": [1, 2]},
+        protocol.CallService(3, "/add", [1, 2], None, "none"),
+    ),
+    (
+        {"op": "call_service", "service": "/rosapi/topics#33"},
+        protocol.CallService("33", "/rosapi/topics", [], None, "none"),
+    ),
+    (
+        {"op": "service_response", "id": "i", "service": "/s", "values": {"sum": 3}, "result": True},
+        protocol.ServiceResponse("i", "/s", {"sum": 3}, True),
+    ),
+    (
+        {"op": "advertise_service", "type": "std_srvs/SetBool", "service": "/s"},
+        protocol.AdvertiseService(None, "/s", "std_srvs/SetBool"),
+    ),
+    ({"op": "unadvertise_service", "service": "/s"}, protocol.UnadvertiseService(None, "/s")),
+    (
+        {"op": "fragment", "id": "f", "data": "{", "num": 0, "total": 2},
+        protocol.Fragment("f", "{", 0, 2),
+    ),
+    ({"op": "set_level", "level": "warning"}, protocol.SetLevel(None, StatusLevel.WARNING)),
+    (
+        {
+            "op": "auth",
+            "mac": "00",
+            "client": "10.0.0.2",
+            "dest": "10.0.0.1",
+            "rand": "r",
+            "t": 5,
+            "level": "admin",
+            "end": 6.5,
+        },
+        protocol.Auth(None, "00", "10.0.0.2", "10.0.0.1", "r", 5.0, "admin", 6.5),
+    ),
+]
+
+
+@pytest.mark.parametrize(("fields", "event"), EVENTS, ids=lambda each: str(each)[:40])
+def test_operation_becomes_its_event(fields: dict[str, Any], event: protocol.Event) -> None:
+    assert parse(**fields) == event
+    assert protocol.parse(protocol.decode(cbor2.dumps(fields))) == event
+    wrapped = {"op": "png", "data": png.encode(json.dumps(fields))}
+    assert parse(**wrapped) == event
+
+
+def test_server_messages_are_those_of_the_document() -> None:
+    assert protocol.status(StatusLevel.ERROR, "no", "i") == {
+        "op": "status",
+        "level": "error",
+        "msg": "no",
+        "id": "i",
+    }
+    assert protocol.service_response("/s", {"sum": 3}, "i", result=True) == {
+        "op": "service_response",
+        "service": "/s",
+        "values": {"sum": 3},
+        "result": True,
+        "id": "i",
+    }
+    assert protocol.service_call("/s", {"data": True}, "i") == {
+        "op": "call_service",
+        "id": "i",
+        "service": "/s",
+        "args": {"data": True},
+    }
+    assert (
+        protocol.encode({"op": "publish", "topic": "/x", "msg": {}})
+        == '{"op":"publish","topic":"/x","msg":{}}'
+    )
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        (
+            {"op": "jump", "id": "i"},
+            "Unknown operation: jump.  Allowed operations: ['call_service', 'advertise'",
+        ),
+        (
+            {"topic": "/x"},
+            "Received a message without an op.  All messages require 'op' field with value one of",
+        ),
+        ({"receiver": "/x", "msg": {}}, "Received a rosbridge v1.0 message.  Please refer to rosbridge.org"),
+        ({"op": "subscribe"}, "subscribe: Expected a topic field but none was found."),
+        (
+            {"op": "subscribe", "topic": 3},
+            "subscribe: Expected field topic to be one of (<class 'str'>,). Invalid value: 3",
+        ),
+        ({"op": "subscribe", "topic": "/x", "compression": "zip"}, "subscribe: compression 'zip' is unknown"),
+        ({"op": "subscribe", "topic": "/x", "fragment_size": 0}, "subscribe: fragment_size is 0"),
+        ({"op": "service_response", "service": "/x"}, "service_response: Expected a result field"),
+        ({"op": "fragment", "id": "f", "data": "x", "num": 2, "total": 2}, "received invalid fragment!"),
+        ({"op": "png", "data": "bm8="}, "png: the data is not a PNG of text"),
+        (
+            {"op": "set_level", "level": "loud"},
+            "set_level: Invalid status level loud; must be one of info, warning",
+        ),
+        ({"op": ["x"]}, "Unknown operation: ['x']"),
+    ],
+)
+def test_wrong_operation_is_refused_with_rosbridges_text(fields: dict[str, Any], text: str) -> None:
+    assert refused(**fields).startswith(text)
+
+
+@pytest.mark.parametrize(
+    "data", ["", "{", "[]", "[" * 100_000, "3", b"", b"\xff", b"\x81\x01", b"\xa1\x61a\x01\x00"]
+)
+def test_malformed_message_is_refused(data: str | bytes) -> None:
+    with pytest.raises(OperationError, match="Unable to deserialize message from client"):
+        protocol.decode(data)
+
+
+@given(strategies.dictionaries(strategies.sampled_from(["op", "id", "topic", "num", "total", "data", "level"]),
+                               strategies.one_of(strategies.sampled_from(protocol.OPERATIONS), strategies.integers(),
+                                                 strategies.none(), strategies.lists(strategies.text()))))  # fmt: skip
+def test_any_fields_are_accepted_or_refused(fields: dict[str, Any]) -> None:
+    with contextlib.suppress(OperationError):
+        assert isinstance(protocol.parse(fields), protocol.Event)
+
+
+@given(strategies.binary(max_size=200))
+def test_any_bytes_are_accepted_or_refused(data: bytes) -> None:
+    with contextlib.suppress(OperationError):
+        assert isinstance(protocol.parse(protocol.decode(data)), protocol.Event)
+
+
+# --- messages as dictionaries
+
+
+def test_message_becomes_json_values() -> None:
+    scan = LaserScan(ranges=[1.5, math.nan, math.inf], intensities=(2.0,), angle_min=-math.inf)
+    scan.header = Header(3, Time(4, 5), "laser")
+    found = conversion.values(scan)
+    assert found["header"] == {"seq": 3, "stamp": {"secs": 4, "nsecs": 5}, "frame_id": "laser"}
+    assert (found["ranges"], found["intensities"], found["angle_min"]) == ([1.5, None, None], [2.0], None)
+    assert conversion.values(CompressedImage(data=b"\0\xff"))["data"] == "AP8="
+
+
+def test_message_becomes_cbor_with_typed_arrays() -> None:
+    data = cbor2.dumps(conversion.cbor_values(Int64MultiArray(data=[1, -2])))
+    found = cbor2.loads(data)["data"]
+    assert (found.tag, found.value) == (79, struct.pack("<2q", 1, -2))
+    assert conversion.cbor_values(UInt8MultiArray(data=b"\1\2"))["data"] == b"\1\2"
+    ranges = conversion.cbor_values(LaserScan(ranges=[math.nan]))["ranges"]
+    assert (ranges.tag, len(ranges.value)) == (85, 4)  # type: ignore[attr-defined]
+
+
+def filled(class_: Callable[[], Any], values: object) -> Any:
+    message = class_()
+    conversion.fill(message, values, now)
+    return message
+
+
+def test_values_become_a_message() -> None:
+    pose = filled(PoseStamped, {"header": {"frame_id": "map"}, "pose": {"position": {"x": 1, "y": 2.5}}})
+    assert (pose.header.stamp, pose.header.frame_id) == (Time(7, 8), "map")
+    assert (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) == (1, 2.5, 0.0)
+    assert filled(PoseStamped, {}).header.stamp == Time(0, 0)
+    given_time = filled(PoseStamped, {"header": {"stamp": {"secs": 1, "nsecs": 2}}})
+    assert given_time.header.stamp == Time(1, 2)
+    assert filled(Header, {"stamp": "now"}).stamp == Time(7, 8)
+    for data in ("AQI=", [1, 2], b"\1\2"):
+        assert filled(UInt8MultiArray, {"data": data}).data == b"\1\2"
+
+
+@pytest.mark.parametrize(
+    ("class_", "values", "text"),
+    [
+        (
+            String,
+            {"data": 3},
+            "std_msgs/String message requires a string for field data, but got a <class 'int'>",
+        ),
+        (
+            Int32,
+            {"data": 3.5},
+            "std_msgs/Int32 message requires a int32 for field data, but got a <class 'float'>",
+        ),
+        (
+            Int32,
+            {"data": True},
+            "std_msgs/Int32 message requires a int32 for field data, but got a <class 'bool'>",
+        ),
+        (Float32, {"data": None}, "requires a float32 for field data, but got a <class 'NoneType'>"),
+        (String, {"text": "x"}, "Message type std_msgs/String does not have a field text"),
+        (
+            PoseStamped,
+            {"pose": {"position": {"w": 1}}},
+            "Message type geometry_msgs/PoseStamped does not have a field pose.position.w",
+        ),
+        (String, [1], "Expected a JSON object for type std_msgs/String but received a <class 'list'>"),
+        (LaserScan, {"ranges": 3}, "message requires a float32[] for field ranges, but got a <class 'int'>"),
+        (
+            LaserScan,
+            {"ranges": ["x"]},
+            "message requires a float32 for field ranges, but got a <class 'str'>",
+        ),
+        (UInt8MultiArray, {"data": [256]}, "field data is not base64, or not bytes"),
+        (Header, {"stamp": {"secs": "x"}}, "requires a int32 for field stamp.secs, but got a <class 'str'>"),
+        (Header, {"stamp": 5}, "requires a time for field stamp, but got a <class 'int'>"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(class_: Callable[[], Any], values: object, text: str) -> None:
+    with pytest.raises(conversion.ConversionError) as error:
+        filled(class_, values)
+    assert text in str(error.value)
+
+
+def test_arguments_of_a_call_may_be_a_list() -> None:
+    request = SetBool._request_class()
+    assert conversion.request_values(request, [True]) == {"data": True}
+    assert conversion.request_values(request, {"data": True}) == {"data": True}
+    assert conversion.request_values(request, None) == {}
+
+
+# --- png
+
+
+def test_png_is_a_picture_of_the_text() -> None:
+    from io import BytesIO
+
+    from PIL import Image
+
+    text = '{"op":"publish","topic":"/ä"}' * 10
+    picture = Image.open(BytesIO(base64.b64decode(png.encode(text))))
+    length = len(text.encode())
+    width = math.floor(math.sqrt(length / 3))
+    assert (picture.mode, picture.size) == ("RGB", (width, math.ceil(length / 3 / width)))
+    assert picture.tobytes().rstrip(b"\n") == text.encode()
+    for each in ("x", text, "y" * 1000):
+        assert png.decode(png.encode(each)) == each
+
+
+def test_png_of_other_things_is_refused() -> None:
+    for data in ("%%%", base64.b64encode(b"\x89PNG\r\n\x1a\nrest").decode(), png.encode("x")[:40]):
+        with pytest.raises(BridgeProtocolError, match="not a PNG of text"):
+            png.decode(data)
+
+
+# --- subscriptions
+
+
+def subscription(**fields: Any) -> Subscribe:
+    event = parse(op="subscribe", topic="/x", **fields)
+    assert isinstance(event, Subscribe)
+    return event
+
+
+def test_subscriptions_merge_to_what_satisfies_all() -> None:
+    assert merge([subscription()]) == Merged(0.0, 0, None, "none")
+    assert merge(
+        [
+            subscription(throttle_rate=500, queue_length=5, fragment_size=100, compression="png"),
+            subscription(throttle_rate=200, queue_length=2, compression="cbor"),
+        ]
+    ) == Merged(0.2, 2, 100, "cbor")
+    assert (
+        merge([subscription(compression="cbor-raw"), subscription(compression="cbor")]).compression
+        == "cbor-raw"
+    )
+
+
+def test_throttled_messages_are_dropped_without_a_queue() -> None:
+    pacer: Pacer[int] = Pacer()
+    pacer.set(0.5, 0)
+    assert [pacer.arrived(number, number * 0.2) for number in range(6)] == [
+        True,
+        False,
+        False,
+        True,
+        False,
+        False,
+    ]
+    assert (pacer.due, pacer.dropped) == (None, 4)
+
+
+def test_throttled_messages_wait_in_a_queue_of_the_newest() -> None:
+    pacer: Pacer[int] = Pacer()
+    pacer.set(1.0, 2)
+    assert [pacer.arrived(number, 0.0) for number in range(4)] == [True, False, False, False]
+    assert (pacer.due, pacer.next(0.5), pacer.dropped) == (1.0, None, 1)
+    assert [pacer.next(1.0), pacer.next(1.0), pacer.next(2.0), pacer.due] == [2, None, 3, None]
+
+
+# --- fragments
+
+
+def test_fragments_join_to_the_text() -> None:
+    text = json.dumps({"op": "publish", "topic": "/x", "msg": {"data": "ä" * 50}})
+    pieces = protocol.fragments(text, 20, "i")
+    assert len(pieces) == math.ceil(len(text) / 20)
+    waiting = Fragments()
+    events = [protocol.parse(protocol.decode(piece)) for piece in pieces]
+    found = [waiting.add(event, 0.0) for event in reversed(events)]  # type: ignore[arg-type]
+    assert found == [None] * (len(pieces) - 1) + [text]
+    assert protocol.fragments("short", 20, "i") == ["short"]
+
+
+def test_fragments_that_wait_are_bounded() -> None:
+    waiting = Fragments(timeout=10.0)
+    first = protocol.Fragment("i", "x", 0, 2)
+    assert waiting.add(first, 0.0) is None
+    with pytest.raises(OperationError, match="error while trying to append fragment 0"):
+        waiting.add(first, 1.0)
+    # The old message is forgotten: its first fragment is one of another message.
+    assert waiting.add(first, 20.0) is None
+    assert waiting.add(protocol.Fragment("i", "y", 1, 2), 21.0) == "xy"
+    for number in range(6):
+        piece = protocol.Fragment("big", "x" * 10_000_000, number, 9)
+        assert waiting.add(piece, 30.0) is None
+    with pytest.raises(OperationError, match="too many"):
+        waiting.add(protocol.Fragment("big", "x" * 10_000_000, 6, 9), 30.0)

@@ -1,0 +1,433 @@
+"""Clients of rosbridge against a bridge, with real sockets and nodes."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import struct
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import cbor2
+import pytest
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import Image, LaserScan
+from std_msgs.msg import Int32, String
+from std_srvs.srv import SetBool, SetBoolResponse
+from websockets.exceptions import ConnectionClosed
+
+from minirospy import Node
+from minirospy.aio.raw import raw_class
+from minirospy.bridge.access import Access, NameFilter
+from minirospy.bridge.graph import Filters
+from minirospy.bridge.rosbridge import png, protocol
+from minirospy.bridge.rosbridge.door import RosbridgeOptions
+from minirospy.errors import ServiceException
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from tests.bridge.conftest import Running
+
+
+def latched(bridge: Running, topic: str, message: Any) -> Node:
+    node = bridge.node(f"node{topic.replace('/', '_')}")
+    publisher = bridge.publisher(node, topic, type(message), latch=True)
+    bridge.run(publisher.publish(message))
+    return node
+
+
+def received(
+    bridge: Running, node: Node, topic: str, class_: type, count: int = 1
+) -> Callable[[], list[Any]]:
+    """Subscribe; return a function that waits for the messages."""
+
+    async def subscribe() -> Any:
+        return await node.subscribe(topic, class_, queue_size=100)
+
+    subscription = bridge.run(subscribe())
+
+    async def gather() -> list[Any]:
+        return [await subscription.next(30.0) for _ in range(count)]
+
+    return lambda: bridge.run(gather())
+
+
+# --- topics
+
+
+def test_latched_message_reaches_a_late_client(bridge: Running) -> None:
+    latched(bridge, "/late", String("hello"))
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/late", type="std_msgs/String")
+    assert client.next("publish") == {"op": "publish", "topic": "/late", "msg": {"data": "hello"}}
+    other = bridge.rosbridge()
+    other.send(op="subscribe", topic="/late")
+    assert other.next("publish")["msg"] == {"data": "hello"}
+
+
+def test_first_published_message_reaches_a_known_subscriber(bridge: Running) -> None:
+    node = bridge.node("listener")
+    messages = received(bridge, node, "/pose", PoseStamped, 2)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/pose", type="geometry_msgs/PoseStamped")
+    for x in (1, 2.5):
+        client.send(
+            op="publish", topic="/pose", msg={"header": {"frame_id": "map"}, "pose": {"position": {"x": x}}}
+        )
+    first, second = messages()
+    assert (first.pose.position.x, second.pose.position.x) == (1.0, 2.5)
+    assert (first.header.seq, second.header.seq, first.header.frame_id) == (1, 2, "map")
+    assert first.header.stamp.secs > 0
+
+
+def test_publish_without_advertise_uses_the_topics_type(bridge: Running) -> None:
+    node = bridge.node("listener")
+    messages = received(bridge, node, "/known", String)
+    bridge.publisher(bridge.node("other"), "/known", String)
+    client = bridge.rosbridge()
+    client.send(op="publish", topic="/known", msg={"data": "x"})
+    assert messages() == [String("x")]
+    client.send(op="publish", topic="/unknown", msg={}, id="p")
+    assert client.next("status", id="p")["msg"] == (
+        "publish: Cannot infer topic type for topic /unknown as it is not yet advertised"
+    )
+
+
+def test_compressions_carry_the_same_message(bridge: Running) -> None:
+    scan = LaserScan(ranges=[1.5, float("nan")])
+    latched(bridge, "/scan", scan)
+    plain = bridge.rosbridge()
+    plain.send(op="subscribe", topic="/scan", compression="none")
+    fields = plain.next("publish")
+    assert fields["msg"]["ranges"] == [1.5, None]
+
+    picture = bridge.rosbridge()
+    picture.send(op="subscribe", topic="/scan", compression="png")
+    assert json.loads(png.decode(picture.next("png")["data"])) == fields
+
+    typed = bridge.rosbridge()
+    typed.send(op="subscribe", topic="/scan", compression="cbor")
+    ranges = typed.next("publish")["msg"]["ranges"]
+    assert (ranges.tag, ranges.value[:4]) == (85, struct.pack("<f", 1.5))
+
+    raw = bridge.rosbridge()
+    raw.send(op="subscribe", topic="/scan", compression="cbor-raw")
+    message = raw.next("publish")["msg"]
+    assert sorted(message) == ["bytes", "nsecs", "secs"]
+    assert LaserScan().deserialize(message["bytes"]).ranges[0] == 1.5
+
+
+def test_large_message_comes_in_fragments_and_goes_in_fragments(bridge: Running) -> None:
+    data = bytes(range(256)) * 1200
+    latched(bridge, "/image", Image(height=480, width=640, step=640, encoding="mono8", data=data))
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/image", fragment_size=100_000)
+    pieces = [client.next("fragment") for _ in range(5)]
+    assert [piece["num"] for piece in pieces] == [0, 1, 2, 3, 4]
+    assert {piece["total"] for piece in pieces} == {5}
+    fields = json.loads("".join(piece["data"] for piece in pieces))
+    assert base64.b64decode(fields["msg"]["data"]) == data
+
+    messages = received(bridge, bridge.node("listener"), "/copy", Image)
+    client.send(op="advertise", topic="/copy", type="sensor_msgs/Image")
+    fields["topic"] = "/copy"
+    for piece in protocol.fragments(json.dumps(fields), 50_000, "copy"):
+        client.socket.send(piece)
+    assert messages()[0].data == data
+
+
+def test_cbor_operations_are_taken(bridge: Running) -> None:
+    messages = received(bridge, bridge.node("listener"), "/bytes", Image)
+    client = bridge.rosbridge()
+    client.socket.send(cbor2.dumps({"op": "advertise", "topic": "/bytes", "type": "sensor_msgs/Image"}))
+    client.socket.send(cbor2.dumps({"op": "publish", "topic": "/bytes", "msg": {"data": b"\0\1"}}))
+    assert messages()[0].data == b"\0\1"
+
+
+def test_throttled_client_gets_the_newest_message(bridge: Running) -> None:
+    node = bridge.node("talker")
+    publisher = bridge.publisher(node, "/count", Int32)
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/count", throttle_rate=300, queue_length=1)
+    bridge.run(asyncio.wait_for(publisher.wait_for_subscribers(), 30))
+    for number in range(20):
+        bridge.run(publisher.publish(Int32(number)))
+    assert [client.next("publish")["msg"]["data"] for _ in range(2)] == [0, 19]
+
+
+def test_unsubscribe_ends_with_the_last_id(bridge: Running) -> None:
+    publisher = bridge.publisher(bridge.node("talker"), "/x", String)
+    client = bridge.rosbridge()
+    for id_ in ("a", "b"):
+        client.send(op="subscribe", topic="/x", id=id_)
+    client.send(op="unsubscribe", topic="/x", id="a")
+    bridge.run(asyncio.wait_for(publisher.wait_for_subscribers(), 30))
+    bridge.run(publisher.publish(String("still")))
+    assert client.next("publish")["msg"]["data"] == "still"
+    client.send(op="unsubscribe", topic="/x", id="b")
+    client.synchronize()
+    assert "/x" not in bridge.call(
+        lambda: [topic for topic, shared in bridge.bridge.graph.topics.items() if shared.is_wanted]
+    )
+
+
+def test_topic_of_an_uninstalled_type_is_decoded_by_its_text(bridge: Running) -> None:
+    type_ = InterfaceType("elsewhere_msgs/Pair", "cd60a26494a087f577976f0329fa120e", "int32 a\nint32 b\n")
+    from minirospy.idl.load import class_from_text
+
+    made = class_from_text(type_.name, type_.definition)
+    node = bridge.node("foreign")
+
+    async def publish() -> None:
+        publisher = await node.advertise("/pair", raw_class(InterfaceType.of(made)), latch=True)
+        publisher.publish_raw(struct.pack("<2i", 1, 2))
+
+    bridge.run(publish())
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/pair", type="elsewhere_msgs/Pair")
+    assert client.next("publish")["msg"] == {"a": 1, "b": 2}
+
+
+def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(rosbridge=RosbridgeOptions(unregister_timeout=0.0))
+    messages = received(bridge, bridge.node("listener"), "/x", String)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/x", type="std_msgs/String", id="a")
+    client.send(op="publish", topic="/x", msg={"data": "x"})
+    assert messages() == [String("x")]
+    client.send(op="unadvertise", topic="/x", id="a")
+    client.synchronize()
+
+    async def unadvertised() -> None:
+        while "/x" in bridge.bridge.graph._publishers:
+            await asyncio.sleep(0.01)
+
+    bridge.run(asyncio.wait_for(unadvertised(), 30))
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        (
+            {"op": "subscribe", "topic": "/x", "type": "nowhere_msgs/Thing"},
+            "subscribe: Unable to import msg class Thing from package nowhere_msgs. Caused by",
+        ),
+        ({"op": "subscribe", "topic": "/x", "type": "Thing"}, "subscribe: Thing is not a valid type string"),
+        (
+            {"op": "subscribe", "topic": "/nothing"},
+            "subscribe: Cannot infer topic type for topic /nothing as it is not yet advertised",
+        ),
+        (
+            {"op": "subscribe", "topic": "/taken", "type": "std_msgs/Int32"},
+            "subscribe: Tried to register topic /taken with type std_msgs/Int32 but it is already established with "
+            "type std_msgs/String",
+        ),
+        (
+            {"op": "advertise", "topic": "/taken", "type": "std_msgs/Int32"},
+            "advertise: Tried to register topic /taken with type std_msgs/Int32 but it is already established",
+        ),
+        (
+            {"op": "advertise", "topic": "/x", "type": "nowhere_msgs/Thing"},
+            "advertise: Unable to import msg class",
+        ),
+        ({"op": "advertise", "topic": "/x y", "type": "std_msgs/String"}, "advertise: topic [/x y]: "),
+        (
+            {"op": "publish", "topic": "/taken", "msg": {"data": 3}},
+            "publish: std_msgs/String message requires a string for field data, but got a <class 'int'>",
+        ),
+        (
+            {"op": "service_response", "service": "/s", "id": "i", "values": {}, "result": True},
+            "service_response: Service /s has not been advertised via rosbridge.",
+        ),
+        (
+            {"op": "unadvertise_service", "service": "/s"},
+            "unadvertise_service: Service /s has not been advertised via rosbridge, can't unadvertise.",
+        ),
+        ({"op": "jump"}, "Unknown operation: jump.  Allowed operations: "),
+        (
+            {"op": "advertise_service", "service": "/s", "type": "std_srvs/No"},
+            "advertise_service: Unable to import srv",
+        ),
+    ],
+)
+def test_refused_operation_gets_one_status(bridge: Running, fields: dict[str, Any], text: str) -> None:
+    latched(bridge, "/taken", String("x"))
+    client = bridge.rosbridge()
+    # The server has looked at the graph.
+    client.send(op="subscribe", topic="/taken")
+    client.next("publish")
+    client.send(**{"id": "it", **fields})
+    found = client.next("status")
+    assert (found["level"], found.get("id")) == ("error", fields.get("id", "it"))
+    assert found["msg"].startswith(text)
+    client.synchronize()
+
+
+def test_value_out_of_range_is_refused(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/x", type="std_msgs/Int32")
+    client.send(op="publish", topic="/x", msg={"data": 1 << 40})
+    assert client.next("status")["msg"].startswith("publish: ")
+    client.synchronize()
+
+
+def test_malformed_message_leaves_the_client_connected(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    client.socket.send('{"op": ')
+    assert client.next("status")["msg"] == 'Unable to deserialize message from client: {"op": '
+    client.socket.send(b"\xff")
+    assert "of CBOR" in client.next("status")["msg"]
+    client.synchronize()
+
+
+def test_status_level_selects_what_is_sent(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    client.send(op="set_level", level="info")
+    client.send(op="subscribe", topic="/x", type="std_msgs/String", id="s")
+    assert client.next("status") == {"op": "status", "level": "info", "msg": "Subscribed to /x", "id": "s"}
+    client.send(op="set_level", level="none")
+    client.send(op="jump")
+    client.send(op="set_level", level="error")
+    client.synchronize()
+    assert not [each for each in client._kept if each["op"] == "status"]
+
+
+def test_globs_hide_topics_and_services(run_bridge: Callable[..., Running]) -> None:
+    only = NameFilter.of(["/allowed*"])
+    bridge = run_bridge(filters=Filters(topics=only, publishable=only, services=only))
+    client = bridge.rosbridge()
+    client.send(op="set_level", level="warning")
+    for fields, text in (
+        ({"op": "subscribe", "topic": "/x"}, "No match found for topic, cancelling subscription to: /x"),
+        (
+            {"op": "advertise", "topic": "/x", "type": "std_msgs/String"},
+            "No match found for topic, cancelling advertisement of: /x",
+        ),
+        ({"op": "publish", "topic": "/x"}, "No match found for topic, cancelling publish to: /x"),
+        (
+            {"op": "call_service", "service": "/x"},
+            "No match found for service, cancelling service call for: /x",
+        ),
+    ):
+        client.send(**fields)
+        assert client.next("status")["msg"] == text
+
+
+def test_read_only_client_only_reads(run_bridge: Callable[..., Running]) -> None:
+    access = Access(read_token="read-token", write_token="write-token", requires_token=True)
+    bridge = run_bridge(access=access)
+    latched(bridge, "/x", String("hello"))
+    client = bridge.rosbridge(path="/?token=read-token")
+    client.send(op="subscribe", topic="/x")
+    assert client.next("publish")["msg"]["data"] == "hello"
+    client.send(op="advertise", topic="/y", type="std_msgs/String")
+    assert "this token is read-only" in client.next("status")["msg"]
+    assert "this token is read-only" in client.call("/bridge/get_loggers")["values"]
+
+
+# --- services
+
+
+def test_service_is_called_with_a_dict_or_a_list(bridge: Running) -> None:
+    async def serve() -> None:
+        await node.serve("/set", SetBool, lambda request: SetBoolResponse(True, f"data is {request.data}"))
+
+    node = bridge.node("server")
+    bridge.run(serve())
+    client = bridge.rosbridge()
+    for args in ({"data": True}, [True]):
+        assert client.call("/set", args) == {
+            "op": "service_response",
+            "service": "/set",
+            "result": True,
+            "id": "call:/set",
+            "values": {"success": True, "message": "data is True"},
+        }
+    assert client.call("/set", compression="cbor")["values"]["message"] == "data is False"
+    failed = client.call("/nothing")
+    assert (failed["result"], failed["values"]) == (False, "Service /nothing does not exist")
+    wrong = client.call("/set", {"data": 3})
+    assert wrong["values"] == (
+        "std_srvs/SetBoolRequest message requires a bool for field data, but got a <class 'int'>"
+    )
+
+
+def test_client_offers_a_service(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    client.send(op="set_level", level="info")
+    client.send(op="advertise_service", service="/ours", type="std_srvs/SetBool")
+    assert client.next("status")["msg"] == "Advertised service /ours."
+    node = bridge.node("caller")
+
+    def answer(fields: dict[str, Any]) -> Any:
+        async def call() -> asyncio.Task[Any]:
+            await node.wait_for_service("/ours", 30)
+            return asyncio.ensure_future(node.call("/ours", SetBool, True))
+
+        task = bridge.run(call())
+        request = client.next("call_service")
+        assert (request["service"], request["args"]) == ("/ours", {"data": True})
+        client.send(op="service_response", service="/ours", id=request["id"], **fields)
+
+        async def wait() -> Any:
+            return await task
+
+        return bridge.run(wait())
+
+    response = answer({"values": {"success": True, "message": "done"}, "result": True})
+    assert (response.success, response.message) == (True, "done")
+    with pytest.raises(ServiceException, match="it is broken"):
+        answer({"values": "it is broken", "result": False})
+    with pytest.raises(ServiceException, match="does not have a field nothing"):
+        answer({"values": {"nothing": 1}, "result": True})
+
+    client.send(op="unadvertise_service", service="/ours")
+    assert client.next("status", level="info")["msg"] == "Unadvertised service /ours."
+
+
+def test_call_fails_when_the_offering_client_leaves(bridge: Running) -> None:
+    client = bridge.rosbridge()
+    client.send(op="advertise_service", service="/ours", type="std_srvs/SetBool")
+    node = bridge.node("caller")
+
+    async def call() -> asyncio.Task[Any]:
+        await node.wait_for_service("/ours", 30)
+        return asyncio.ensure_future(node.call("/ours", SetBool, True))
+
+    task = bridge.run(call())
+    client.next("call_service")
+    client.close()
+
+    async def wait() -> Any:
+        return await task
+
+    with pytest.raises(ServiceException, match="has disconnected"):
+        bridge.run(wait())
+
+
+# --- authentication
+
+
+def test_client_has_to_authenticate_first(run_bridge: Callable[..., Running]) -> None:
+    from rosauth.srv import Authentication
+
+    bridge = run_bridge(rosbridge=RosbridgeOptions(authenticate=True))
+    node = bridge.node("auth")
+
+    async def serve() -> None:
+        await node.serve("/authenticate", Authentication, lambda request: request.mac == "right")
+
+    bridge.run(serve())
+    fields = {"client": "c", "dest": "d", "rand": "r", "t": 1, "level": "l", "end": 2}
+    client = bridge.rosbridge()
+    client.send(op="auth", mac="right", **fields)
+    client.synchronize()
+    for first in ({"op": "auth", "mac": "wrong", **fields}, {"op": "subscribe", "topic": "/x"}):
+        refused = bridge.rosbridge()
+        refused.send(**first)
+        with pytest.raises(ConnectionClosed):
+            refused.next("publish")
