@@ -17,7 +17,7 @@ import contextlib
 import time as clocks
 from collections.abc import AsyncIterator, Callable, Coroutine
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Literal, TypeVar
 
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
@@ -232,7 +232,7 @@ class Broadcaster:
 async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
     """Return when the event is set, or the future is done."""
     arrival = asyncio.ensure_future(changed.wait())
-    waits: list[asyncio.Future[Any]] = [arrival, end]
+    waits: list[asyncio.Future[Literal[True]] | asyncio.Future[None]] = [arrival, end]
     try:
         await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
     finally:

@@ -110,14 +110,14 @@ def read_settings(text: str) -> MapSettings:
     )
 
 
-def _number(fields: dict[str, object], name: str, article: str) -> float:
+def _number(fields: dict[str, str], name: str, article: str) -> float:
     try:
         return _finite(fields[name])
     except (KeyError, TypeError, ValueError):
         raise MapError(f"The map does not contain {article} {name} tag or it is invalid.") from None
 
 
-def _finite(text: Any) -> float:
+def _finite(text: str) -> float:
     number = float(text)
     if not math.isfinite(number) or "_" in text:
         raise ValueError(text)

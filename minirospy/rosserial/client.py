@@ -10,7 +10,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rosserial_msgs.msg import Log, TopicInfo
@@ -28,7 +28,7 @@ from minirospy.rosserial.endpoints import (
     to_bytes,
 )
 from minirospy.rosserial.packets import LONGEST, Decoder, Fault, Packet, WrongVersion, encode
-from minirospy.rosserial.ports import FilePort, Port, PortError, SerialPort
+from minirospy.rosserial.ports import File, FilePort, Port, PortError, SerialPort
 
 __all__ = [
     "ERROR_MISMATCHED_PROTOCOL",
@@ -42,6 +42,8 @@ ERROR_MISMATCHED_PROTOCOL = "Mismatched protocol version in packet: " + (
 )
 ERROR_NO_SYNC = "no sync with device"
 ERROR_PACKET_FAILED = "Packet Failed : Failed to read msg data"
+
+_Service = TypeVar("_Service", ServiceServer, ServiceClient)
 
 _VERSIONS = {
     0xFF: "Rev 0 (rosserial 0.4 and earlier)",
@@ -63,7 +65,11 @@ class SerialClient:
     protocol_ver = protocol_ver2
 
     def __init__(
-        self, port: Any = None, baud: int = 57600, timeout: float = 5.0, fix_pyserial_for_test: bool = False
+        self,
+        port: str | Port | File | None = None,
+        baud: int = 57600,
+        timeout: float = 5.0,
+        fix_pyserial_for_test: bool = False,
     ) -> None:
         """Open the port, again where that fails, and request the device's topics. ``timeout``: seconds for a packet."""
         self.timeout = timeout
@@ -101,11 +107,11 @@ class SerialClient:
         self.requestTopics()
         self._synced_at = time.monotonic()
 
-    def _opened(self, port: Any, baud: int, uses_handshake: bool) -> Port | None:
+    def _opened(self, port: str | Port | File | None, baud: int, uses_handshake: bool) -> Port | None:
         if port is None or (isinstance(port, str) and rospy.is_shutdown()):
             return None
         if not isinstance(port, str):
-            return port if hasattr(port, "flush_input") else FilePort(port)
+            return FilePort(port) if isinstance(port, File) else port
         while not self._ended.is_set():
             try:
                 return SerialPort(port, baud, uses_handshake=uses_handshake)
@@ -310,7 +316,7 @@ class SerialClient:
         """Send the responses of calls by the device."""
         self._set_up_half(data, ServiceClient, "client", from_device=False)
 
-    def _set_up_half(self, data: bytes, kind: type[Any], name: str, *, from_device: bool) -> None:
+    def _set_up_half(self, data: bytes, kind: type[_Service], name: str, *, from_device: bool) -> None:
         """Set up one half of a service's calls: the one that the device sends, or the one that it gets."""
         with _Creation(f"service {name}"):
             info = _info(data)
@@ -325,7 +331,7 @@ class SerialClient:
             else:
                 service.id = info.topic_id
 
-    def _service(self, info: TopicInfo, kind: type[Any], name: str) -> Any:
+    def _service(self, info: TopicInfo, kind: type[_Service], name: str) -> _Service:
         known = self.services.get(info.topic_name)
         if not isinstance(known, kind):
             if known is not None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import select
 import socket
 import time
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from minirospy.errors import MinirospyError
 
-__all__ = ["FilePort", "Port", "PortError", "SerialPort", "SocketPort"]
+__all__ = ["File", "FilePort", "Port", "PortError", "SerialPort", "SocketPort"]
 
 _LOOK_SECONDS = 0.1
 _WRITE_SECONDS = 10
@@ -34,6 +34,20 @@ class Port(Protocol):
 
     def close(self) -> None:
         """Close it."""
+
+
+@runtime_checkable
+class File(Protocol):
+    """A program's own line: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is called where there is one."""
+
+    def read(self, count: int, /) -> bytes:
+        """Return bytes of the device."""
+
+    def write(self, data: bytes, /) -> object:
+        """Write bytes to the device."""
+
+    def inWaiting(self) -> int:  # noqa: N802
+        """Return how many bytes have come."""
 
 
 class SerialPort:
@@ -121,7 +135,7 @@ class SocketPort:
 class FilePort:
     """An object of a program's own with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient takes it."""
 
-    def __init__(self, file: Any) -> None:
+    def __init__(self, file: File) -> None:
         self._file = file
 
     def read(self) -> bytes:

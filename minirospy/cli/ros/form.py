@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from minirospy.errors import MessageException, ValueTextError
 from minirospy.idl.protocols import Message, is_message
@@ -64,7 +64,7 @@ def ask_for(
     return message
 
 
-def flow(value: Any) -> str:
+def flow(value: object) -> str:
     """Return a value on one line, as YAML."""
     if isinstance(value, bool):
         return str(value)
@@ -73,7 +73,7 @@ def flow(value: Any) -> str:
     if is_message(value):
         inner = (f"{name}: {flow(getattr(value, name))}" for name in value.__slots__)
         return "{" + ", ".join(inner) + "}"
-    if hasattr(value, "nsecs"):
+    if hasattr(value, "secs") and hasattr(value, "nsecs"):
         return f"{{secs: {value.secs}, nsecs: {value.nsecs}}}"
     return str(value) if value != "" else "''"
 

@@ -6,7 +6,7 @@ Arrays of more dimensions become arrays of messages.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
@@ -115,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
     return position(*matrix[:3, 3].tolist()), Quaternion(*rotation.tolist())
 
 
-def _each(arr: Array, dimensions: int, make: Callable[[Array], Any]) -> object:
+def _each(arr: Array, dimensions: int, make: Callable[[Array], object]) -> object:
     """Return a message of the last dimensions; an array of messages where there are more."""
     if arr.ndim == dimensions:
         return make(arr)

@@ -65,7 +65,7 @@ class UserData:
             self._data[name] = value
 
 
-def get_const(obj: Any) -> Any:
+def get_const(obj: object) -> object:
     """Return an object that has attributes of its own as read-only, any other as it is."""
     if not hasattr(obj, "__dict__"):
         return obj
@@ -84,7 +84,7 @@ class Const:
             raise AttributeError(name)
         return get_const(getattr(self._obj, name))
 
-    def __getitem__(self, name: Any) -> Any:
+    def __getitem__(self, name: object) -> object:
         return get_const(self._obj[name])
 
     def __setattr__(self, name: str, value: object) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import numpy
@@ -163,10 +163,10 @@ def _angles(m: list[list[float]], axes: Axes) -> tuple[float, float, float]:
     return (az, middle, ax) if frame else (ax, middle, az)
 
 
-def _tuple(axes: Any) -> tuple[int, int, int, int]:
+def _tuple(axes: str | tuple[int, int, int, int]) -> tuple[int, int, int, int]:
     if isinstance(axes, str) and axes.lower() in AXES_TO_TUPLE:
         return AXES_TO_TUPLE[axes.lower()]
-    return AXES_TO_TUPLE[TUPLE_TO_AXES[axes]]
+    return AXES_TO_TUPLE[TUPLE_TO_AXES[axes]]  # type: ignore[index]  # another text raises KeyError
 
 
 def _order(first: int, parity: int) -> tuple[int, int, int]:
