@@ -240,7 +240,9 @@ class SharedGraph:
         pause = FASTEST_LOOK
         is_reported = False
 
-        while True:
+        # asyncio.wait_for before Python 3.12 may lose the cancelling that came with the event.
+        task = asyncio.current_task()
+        while self._watching is task:
             self._look_soon.clear()
             before = self.snapshot
             try:
