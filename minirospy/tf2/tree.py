@@ -78,8 +78,11 @@ class FrameTree:
         is_regular = not is_static
         for parent, child, stamp, translation, rotation in read_transforms(data):
             self._insert(parent, child, stamp, translation, rotation, authority, is_static)
-            # A layout is for frames that exist from its first message on.
-            is_regular = is_regular and child in self._frames and parent in self._frames
+            # A layout is for frames that exist, with samples, from its first message on.
+            frame = self._frames.get(child)
+            is_regular = (
+                is_regular and frame is not None and frame.cache is not None and parent in self._frames
+            )
         if is_regular:
             self._add_layout(data)
 

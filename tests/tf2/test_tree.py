@@ -143,6 +143,15 @@ transforms = st.tuples(
 )
 
 
+def test_a_frame_whose_first_transform_was_refused_has_its_next_one() -> None:
+    buffer = TransformBuffer()
+    sound = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    buffer.insert_message(tf_message(("a", "b", SECOND, sound)), "/me")
+    buffer.insert_message(tf_message(("b", "a", 2 * SECOND, [math.nan, *sound[1:]])), "/me")
+    buffer.insert_message(tf_message(("b", "a", 3 * SECOND, sound)), "/me")
+    assert buffer.lookup("a", "a", 0).stamp == 3 * SECOND
+
+
 @given(
     st.lists(
         st.tuples(st.lists(transforms, min_size=1, max_size=3), st.sampled_from(["/one", "/two"]))
