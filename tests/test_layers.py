@@ -21,7 +21,7 @@ LAYERS = [
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
-    {"graph", "wire", "idl", "tf2", "gpio", "bag", "urdf"},
+    {"graph", "wire", "idl", "images", "tf2", "gpio", "bag", "urdf"},
     {
         "clock",
         "environment",
@@ -39,18 +39,22 @@ LAYERS = [
 ]
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = {"runtime", "wire"}
-PURE = {"graph", "wire", "idl", "tf2", "urdf"}
+PURE = {"graph", "wire", "idl", "images", "tf2", "urdf"}
 PURE_FILES = {
     PACKAGE / "bridge" / name
     for name in (
         "access.py",
         "foxglove/protocol.py",
         "foxglove/channels.py",
+        "rosapi/typedefs.py",
         "rosbridge/cbor.py",
         "rosbridge/conversion.py",
         "rosbridge/png.py",
         "rosbridge/protocol.py",
         "rosbridge/subscription.py",
+        "tf_republisher/pairs.py",
+        "video/options.py",
+        "video/pictures.py",
         "web/queue.py",
     )
 }

@@ -10,7 +10,6 @@ import pytest
 OVERLAY = Path(__file__).parents[2] / "minirospy" / "overlay"
 COMPAT = OVERLAY.with_name("compat")
 SHARED = {
-    "cv_bridge/compressed.py",
     "elsewhere.py",
     "camera_calibration_parsers/convert.py",
     "camera_calibration_parsers/texts.py",
@@ -18,7 +17,6 @@ SHARED = {
     "image_transport/__init__.py",
     "image_transport/codecs.py",
     "image_transport/republish.py",
-    "cv_bridge/encodings.py",
     "dynamic_reconfigure/dynparam.py",
     "dynamic_reconfigure/generated.py",
     "dynamic_reconfigure/header.py",

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from minirospy.compat.cv_bridge.compressed import decode, encode, opencv
-from minirospy.compat.cv_bridge.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
+from minirospy.images.compressed import decode, encode, opencv
+from minirospy.images.encodings import DEPTHS, converted, is_converted_by_opencv, type_of_encoding
+from minirospy.images.view import pixels
 
 if TYPE_CHECKING:
     import numpy
 
-    from minirospy.compat.cv_bridge.encodings import Pixels
+    from minirospy.images.encodings import Pixels
 
 __all__ = ["CvBridge", "CvBridgeError"]
 
@@ -68,33 +69,10 @@ class CvBridge:
         change. Bytes between the rows (``step``) are left out. Raises CvBridgeError (an unknown encoding, no such
         conversion, less data than the size needs).
         """
-        import numpy as np
-
-        name, channels = self.encoding_to_dtype_with_channels(img_msg.encoding)
-        dtype = np.dtype(name).newbyteorder(">" if img_msg.is_bigendian else "<")
-        row = img_msg.width * channels * dtype.itemsize
-        # Some drivers leave the step empty.
-        step = img_msg.step if img_msg.step >= row else row
-        needed = max(img_msg.height - 1, 0) * step + (row if img_msg.height else 0)
-        data = img_msg.data
-        if isinstance(data, str):
-            data = data.encode()
-        if len(data) < needed:
-            raise CvBridgeError(
-                f"the image of {img_msg.width}x{img_msg.height} [{img_msg.encoding}] needs {needed} bytes, "
-                f"its data has {len(data)}"
-            )
-
-        shape, strides = (
-            (img_msg.height, img_msg.width, channels),
-            (step, channels * dtype.itemsize, dtype.itemsize),
-        )
-        dimensions = 2 if channels == 1 else 3
-        image: Pixels = np.ndarray(
-            shape[:dimensions], dtype, data if needed else bytes(1), 0, strides[:dimensions]
-        )
-        if dtype.itemsize > 1 and bool(img_msg.is_bigendian) == (sys.byteorder == "little"):
-            image = image.astype(dtype.newbyteorder("="))
+        try:
+            image = pixels(img_msg)
+        except ValueError as error:
+            raise CvBridgeError(error) from error
         if desired_encoding == "passthrough":
             return image
         return _converted(image, img_msg.encoding, desired_encoding)

@@ -6,7 +6,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from minirospy.compat.cv_bridge.encodings import Pixels
+    from minirospy.images.encodings import Pixels
 
 __all__ = ["Options", "decode", "encode", "opencv"]
 
