@@ -5,13 +5,24 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import Awaitable, Callable, Sequence
+from typing import Protocol, TypeVar
 
 from minirospy.aio.node import Node
-from minirospy.bridge.bridge import Bridge
 from minirospy.errors import BridgeError, ROSInterruptException
 from minirospy.runtime.transport.loop import new_event_loop
 
-__all__ = ["require_libraries", "run"]
+__all__ = ["Part", "require_libraries", "run"]
+
+
+class Part(Protocol):
+    """What a node does: a bridge, or services."""
+
+    async def start(self) -> None: ...
+
+    async def close(self) -> None: ...
+
+
+_P = TypeVar("_P", bound=Part)
 
 
 def require_libraries() -> None:
@@ -27,8 +38,8 @@ def require_libraries() -> None:
 def run(
     name: str,
     argv: Sequence[str],
-    start: Callable[[Node], Awaitable[Bridge]],
-    on_started: Callable[[Bridge], None],
+    start: Callable[[Node], Awaitable[_P]],
+    on_started: Callable[[_P], None],
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
@@ -44,8 +55,8 @@ def run(
 async def _run(
     name: str,
     argv: Sequence[str],
-    start: Callable[[Node], Awaitable[Bridge]],
-    on_started: Callable[[Bridge], None],
+    start: Callable[[Node], Awaitable[_P]],
+    on_started: Callable[[_P], None],
 ) -> int:
     loop = asyncio.get_running_loop()
     node = Node(name, argv=argv)
