@@ -1,0 +1,57 @@
+"""Pairs of frames, and when a client is to be sent their transform. Pure. Source: http://wiki.ros.org/tf2_web_republisher."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+__all__ = ["FramePair", "pairs_of"]
+
+
+class FramePair:
+    """A source frame seen from a target frame: sent where it moved by more than a threshold (meters, radians)."""
+
+    def __init__(self, source: str, target: str, angle: float, distance: float) -> None:
+        self.source = source
+        self.target = target
+        self.is_okay = True
+        """False from the first lookup that fails to the next one that does not."""
+
+        self._angle = angle
+        self._distance = distance
+        self._sent: Any = None
+
+    def is_to_be_sent(self, transform: Any) -> bool:
+        """Return whether a transform (geometry_msgs/Transform) differs enough from the last that was sent, and is then."""
+        if not (
+            self._sent is None
+            or not self._angle
+            or not self._distance
+            or _distance(self._sent.translation, transform.translation) > self._distance
+            or _angle(self._sent.rotation, transform.rotation) > self._angle
+        ):
+            return False
+        self._sent = transform
+        return True
+
+
+def pairs_of(request: Any) -> list[FramePair]:
+    """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres."""
+    target = request.target_frame.removeprefix("/")
+    return [
+        FramePair(source.removeprefix("/"), target, request.angular_thres, request.trans_thres)
+        for source in request.source_frames
+    ]
+
+
+def _distance(one: Any, other: Any) -> float:
+    return math.dist((one.x, one.y, one.z), (other.x, other.y, other.z))
+
+
+def _angle(one: Any, other: Any) -> float:
+    """Return the angle between two rotations as quaternions: half of that by which things turn, as the real node has it."""
+    first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
+    norm = math.hypot(*first) * math.hypot(*second)
+    if not norm:
+        return 0.0
+    return math.acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(first, second, strict=True)) / norm)))
