@@ -16,19 +16,25 @@ from minirospy.bridge.foxglove.assets import ALLOWED, Assets
 from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
 from minirospy.bridge.graph import Filters, SharedGraph
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
+from minirospy.bridge.video.pages import VideoPages
 from minirospy.bridge.web.connection import Door, Exchange, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
 from minirospy.errors import BridgeError
+from minirospy.introspect.snapshot import fetch
 from minirospy.workspace.packages import Packages
 
 if TYPE_CHECKING:
     import ssl
 
-__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "Bridge", "BridgeOptions"]
+    from minirospy.bridge.rosapi.services import Rosapi
+    from minirospy.bridge.tf_republisher.republisher import Republisher
+
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOptions"]
 
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
+VIDEO_PORT = 8080
 _DIAGNOSTICS_SECONDS = 1.0
 
 
@@ -43,6 +49,7 @@ class BridgeOptions:
     address: str = "127.0.0.1"
     foxglove_port: int | None = FOXGLOVE_PORT
     rosbridge_port: int | None = None
+    video_port: int | None = None
     access: Access = field(default_factory=Access)
     limits: Limits = field(default_factory=Limits)
     filters: Filters = field(default_factory=Filters)
@@ -54,6 +61,9 @@ class BridgeOptions:
     diagnostics: bool = True
     rosbridge: RosbridgeOptions = field(default_factory=RosbridgeOptions)
     retry_delay: float | None = None
+    rosapi: bool = False
+    transforms: bool = False
+    """What clients of rosbridge want beside it: the services of rosapi, tf2_web_republisher."""
 
 
 class Bridge:
@@ -79,6 +89,8 @@ class Bridge:
             playback,
         )
         self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge)
+        self._video = VideoPages(self.graph)
+        self._beside: list[Rosapi | Republisher] = []
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -86,23 +98,25 @@ class Bridge:
     async def start(self) -> None:
         """Listen. Raises BridgeError."""
         tls = self._tls()
-        served: list[tuple[str, Door, int | None]] = [
-            ("foxglove", self.foxglove, self.options.foxglove_port),
-            ("rosbridge", self.rosbridge, self.options.rosbridge_port),
+        served: list[tuple[str, list[Door], int | None]] = [
+            ("foxglove", [self.foxglove], self.options.foxglove_port),
+            ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
+            ("video", [], self.options.video_port),
         ]
-        for name, door, port in served:
+        for name, doors, port in served:
             if port is not None:
-                self.listeners[name] = await self._listen(door, port, tls)
+                self.listeners[name] = await self._listen(doors, port, tls)
+        await self._start_beside()
         if self.options.diagnostics:
             self._reporting = asyncio.ensure_future(self._report())
 
-    async def _listen(self, door: Door, port: int, tls: ssl.SSLContext | None) -> Listener:
+    async def _listen(self, doors: list[Door], port: int, tls: ssl.SSLContext | None) -> Listener:
         """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
         listener = Listener(
-            [door],
+            doors,
             self.options.access,
             limits=self.options.limits,
-            pages={"/status": self._status_page},
+            pages={**self._video.handlers, "/status": self._status_page},
             tls=tls,
         )
         while True:
@@ -117,6 +131,20 @@ class Bridge:
             else:
                 return listener
 
+    async def _start_beside(self) -> None:
+        """Offer what clients of rosbridge want beside it, unless another node does."""
+        graph = await fetch(self.node._node.master)
+        if self.options.rosapi and "/rosapi/topics" not in graph.services:
+            from minirospy.bridge.rosapi.services import Rosapi
+
+            self._beside.append(Rosapi(self.node, self.options.filters))
+        if self.options.transforms and "/republish_tfs" not in graph.services:
+            from minirospy.bridge.tf_republisher.republisher import Republisher
+
+            self._beside.append(Republisher(self.node))
+        for part in self._beside:
+            await part.start()
+
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""
         if self._reporting:
@@ -124,6 +152,8 @@ class Bridge:
             await asyncio.gather(self._reporting, return_exceptions=True)
         for listener in self.listeners.values():
             await listener.close()
+        for part in self._beside:
+            await part.close()
         await self.graph.close()
 
     def status(self) -> dict[str, object]:

@@ -130,7 +130,10 @@ def test_what_is_not_http_gets_a_clear_status(bridge: Running, request_: bytes) 
 
 
 def test_pages_of_the_server(bridge: Running) -> None:
-    assert page(bridge.port, "/") == (404, "there is no such page; WebSocket clients are served here\n")
+    assert page(bridge.port, "/nothing") == (
+        404,
+        "there is no such page; WebSocket clients are served here\n",
+    )
     status, body = page(bridge.port, "/status")
     assert status == 200
     assert json.loads(body)["node"] == "/bridge"

@@ -435,7 +435,7 @@ class RosbridgeSession:
     def _is_allowed(self, kind: str, name: str, what: str) -> bool:
         """Return whether a name passes the globs; else warn, with rosbridge's text."""
         filters = self._graph.filters
-        if (filters.topics if kind == "topics" else filters.services)(name):
+        if (filters.topics if kind == "topics" else filters.services)(self._graph.node.resolve(name)):
             return True
         self.status(StatusLevel.WARNING, f"No match found for {what}: {name}")
         return False

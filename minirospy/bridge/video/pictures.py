@@ -1,0 +1,147 @@
+"""Image messages -> JPEG and PNG. Pure; by OpenCV, simplejpeg or Pillow, whichever is installed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from minirospy.bridge.video.options import Picture
+from minirospy.errors import BridgeError
+from minirospy.images.compressed import Options, decode, encode, opencv
+from minirospy.images.encodings import converted, is_converted_by_opencv
+from minirospy.images.view import pixels
+
+if TYPE_CHECKING:
+    from minirospy.images.encodings import Pixels
+
+__all__ = ["COMPRESSED", "IMAGE", "encoded"]
+
+IMAGE = "sensor_msgs/Image"
+COMPRESSED = "sensor_msgs/CompressedImage"
+
+_FASTEST_PNG = 1
+_MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
+
+
+def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
+    """Return a serialized message's image as a file and its content type. Raises BridgeError."""
+    from sensor_msgs.msg import CompressedImage, Image
+
+    try:
+        if type_ == COMPRESSED:
+            message = CompressedImage()
+            message.deserialize(body)
+            data = bytes(message.data)
+            if _is_as_wanted(data, picture):
+                return data, _content_type(data)
+            image = decode(data)
+        elif type_ == IMAGE:
+            raw = Image()
+            raw.deserialize(body)
+            image = _colors(pixels(raw), raw.encoding)
+        else:
+            raise BridgeError(f"messages of [{type_}] are not images: {IMAGE} and {COMPRESSED} are")
+        image = _changed(image, picture)
+        return _file(image, picture), f"image/{picture.format or 'jpeg'}"
+    except BridgeError:
+        raise
+    except Exception as error:  # the libraries for images raise errors of many kinds on bad data
+        raise BridgeError(f"the image cannot be shown: {error}") from error
+
+
+def _content_type(data: bytes) -> str:
+    return _MAGIC.get(data[:3], "")
+
+
+def _is_as_wanted(data: bytes, picture: Picture) -> bool:
+    """Return whether a compressed image needs no change."""
+    is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
+    found = _content_type(data)
+    return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
+
+
+def _colors(image: Pixels, encoding: str) -> Pixels:
+    """Return an image as gray or BGR of 8 bits; numbers that are not colors are scaled to their largest."""
+    import numpy as np
+
+    if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
+        return image
+    if encoding.startswith(("32F", "64F", "16S", "32S")) or encoding in ("16UC1", "8S", "8SC1"):
+        values = np.nan_to_num(image.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+        if values.ndim == 3:
+            values = values[..., 0]
+        largest = float(values.max(initial=0.0))
+        return (np.clip(values, 0, None) * (255 / largest if largest > 0 else 0)).astype(np.uint8)
+    if encoding.startswith("bayer") and opencv() is None:
+        return _debayered(image, encoding)
+    if encoding in ("mono16",):
+        return converted(image, encoding, "mono8")
+    if is_converted_by_opencv(encoding, "bgr8"):
+        return _by_opencv(image, encoding)
+    return converted(image, encoding, "bgr8")
+
+
+def _by_opencv(image: Pixels, encoding: str) -> Pixels:
+    """Return an image of YUV, or of a Bayer pattern with OpenCV, in colors; without OpenCV YUV is gray."""
+    cv2 = opencv()
+    if cv2 is None:
+        return converted(image, encoding, "mono8")
+    if encoding == "yuv422":
+        return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
+    # OpenCV names a pattern by the pixels of its second row and column.
+    name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
+    found: Any = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
+    return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
+
+
+def _debayered(image: Pixels, encoding: str) -> Pixels:
+    """Return the colors of a Bayer pattern, each cell of four pixels as one."""
+    import numpy as np
+
+    eight = converted(image, "mono16", "mono8") if encoding.endswith("16") else image
+    height, width = (size // 2 * 2 for size in eight.shape[:2])
+    cells = [eight[at // 2 : height : 2, at % 2 : width : 2].astype(np.uint16) for at in range(4)]
+    colors = {
+        color: [cell for cell, name in zip(cells, encoding[6:10], strict=True) if name == color]
+        for color in "bgr"
+    }
+    planes = [sum(found[1:], found[0]) // len(found) for found in colors.values()]
+    return np.stack(planes, axis=-1).astype(np.uint8)
+
+
+def _changed(image: Pixels, picture: Picture) -> Pixels:
+    """Return an image in the wanted size, turned upside down where wanted."""
+    if image.dtype != "uint8":
+        # Of a compressed image with 16 bits.
+        image = (image >> 8).astype("uint8")
+    if picture.is_inverted:
+        image = image[::-1, ::-1]
+    height, width = image.shape[:2]
+    wanted = (picture.width or width, picture.height or height)
+    return image if wanted == (width, height) else _resized(image, wanted)
+
+
+def _resized(image: Pixels, size: tuple[int, int]) -> Pixels:
+    import numpy as np
+
+    cv2 = opencv()
+    if cv2:
+        return cv2.resize(np.ascontiguousarray(image), size)  # type: ignore[no-any-return]
+    from PIL import Image
+
+    found = Image.fromarray(np.ascontiguousarray(image)).resize(size, Image.Resampling.BILINEAR)
+    return np.asarray(found)
+
+
+def _file(image: Pixels, picture: Picture) -> bytes:
+    import numpy as np
+
+    if picture.format == "png":
+        return encode(image, "png", Options(level=_FASTEST_PNG))
+    try:
+        import simplejpeg  # type: ignore[import-not-found]
+    except ImportError:
+        return encode(image, "jpg", Options(quality=picture.quality))
+    colors = np.ascontiguousarray(image if image.ndim == 3 else image[..., None])
+    space = {1: "GRAY", 3: "BGR", 4: "BGRA"}[colors.shape[2]]
+    data: bytes = simplejpeg.encode_jpeg(colors, picture.quality, space, "420")
+    return data

@@ -1,0 +1,130 @@
+"""roslibpy, rosbridge's client in Python, with the bridge: topics, services, parameters, actions, transforms, images.
+
+It brings twisted and autobahn: it is installed once into an environment of its own, in the user's cache folder.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from actionlib_tutorials.msg import FibonacciAction
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import Image
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+from tf2_msgs.msg import TFMessage
+
+from minirospy import Node
+from minirospy.actionlib.aio import ActionServer
+from minirospy.bridge.bridge import Bridge, BridgeOptions
+
+PEER = Path(__file__).parent / "roslibpy_peer.py"
+RELEASE = "roslibpy==2.1.0"
+DATA = bytes(range(256)) * 3600
+
+
+@pytest.fixture(scope="session")
+def roslibpy_python() -> str:
+    """Return the Python of an environment with roslibpy."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "minirospy-tests"
+    place = cache / f"{RELEASE.replace('==', '-')}-{sys.version_info.major}{sys.version_info.minor}"
+    python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    if not python.exists():
+        cache.mkdir(parents=True, exist_ok=True)
+        # Others may make it at the same time: each makes its own, and the first to finish leaves it in its place.
+        made = Path(tempfile.mkdtemp(dir=cache))
+        subprocess.run([sys.executable, "-m", "venv", made], check=True, timeout=120)
+        inner = made / python.relative_to(place)
+        words = [inner, "-m", "pip", "install", "-q", RELEASE]
+        done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=300)
+        if done.returncode:
+            shutil.rmtree(made)
+            pytest.skip(f"{RELEASE} cannot be installed: {done.stderr[-300:]}")
+        try:
+            made.rename(place)
+        except OSError:
+            shutil.rmtree(made)
+    return str(python)
+
+
+async def serve(node: Node) -> list[Any]:
+    """Offer what the peer wants."""
+
+    async def execute(goal: Any) -> dict[str, Any]:
+        return {"sequence": list(range(goal.request.order))}
+
+    latched = await node.advertise("/latched", String, latch=True)
+    await latched.publish(String("hello"))
+    images = await node.advertise("/image", Image, latch=True)
+    await images.publish(Image(height=480, width=640, encoding="rgb8", step=1920, data=DATA))
+    static = await node.advertise("/tf_static", TFMessage, latch=True)
+    transform = TransformStamped(child_frame_id="camera")
+    transform.header.frame_id = "world"
+    transform.transform.translation.x = 1.5
+    transform.transform.rotation.w = 1.0
+    await static.publish(TFMessage([transform]))
+    service = await node.serve("/set", SetBool, lambda request: (request.data, "from minirospy"))
+    action: Any = ActionServer(node, "/fibonacci", FibonacciAction, execute)
+    await action
+    return [latched, images, static, service, action]
+
+
+def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: str) -> None:
+    async def run() -> tuple[dict[str, Any], list[Any]]:
+        async with Node("peer", rosout=False) as node, Node("bridge", rosout=False) as inner:
+            offers = await serve(node)
+            options = BridgeOptions(
+                foxglove_port=None, rosbridge_port=0, diagnostics=False, rosapi=True, transforms=True
+            )
+            bridge = Bridge(inner, options)
+            await bridge.start()
+            published = node.subscribe("/from_roslibpy", String)
+            copies = node.subscribe("/image_copy", Image)
+            peer = await asyncio.create_subprocess_exec(
+                roslibpy_python,
+                str(PEER),
+                str(bridge.listeners["rosbridge"].port),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            try:
+                assert peer.stdout
+                line = await asyncio.wait_for(peer.stdout.readline(), 90)
+                if not line:
+                    assert peer.stderr
+                    raise AssertionError((await peer.stderr.read()).decode())
+                found = json.loads(line)
+                text, copy = await published.next(30), await copies.next(30)
+                response = await node.call("/ours", SetBool, True)
+            finally:
+                peer.kill()
+                await peer.wait()
+                await bridge.close()
+            await offers[-1].close()
+            return found, [text.data, bytes(copy.data) == DATA, response.success, response.message]
+
+    found, ours = asyncio.run(run())
+    assert found == {
+        "latched": {"data": "hello"},
+        "image": [640, len(DATA)],
+        "service": {"success": True, "message": "from minirospy"},
+        "parameter": 1.5,
+        "topics": True,
+        "type": "std_msgs/String",
+        "time": True,
+        "details": ["data"],
+        "nodes": True,
+        "action": [0, 1, 2],
+        "tf": 1.5,
+    }
+    assert ours == ["hello", True, True, "from roslibpy"]
