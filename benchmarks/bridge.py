@@ -265,7 +265,7 @@ class Run:
         self._children: list[subprocess.Popen[str]] = []
         self.start([str(BIN / "rosmaster"), "-p", str(master_port)])
         time.sleep(1.5)
-        bridge = [str(BIN / "minirospy"), "bridge", "--port", str(self.port)]
+        bridge = [str(BIN / "minirospy"), "bridge", "--port", str(self.port), "--no-rosbridge"]
         self.server = self.start(bridge if server == "minirospy" else self.role("relay", port=self.port))
         self.process = psutil.Process(self.server.pid)
         end = time.monotonic() + 30

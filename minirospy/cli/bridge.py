@@ -25,12 +25,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> Parser:
     parser = Parser(
         "minirospy bridge",
-        "Opens the graph to browsers and programs without ROS, by the Foxglove WebSocket protocol: Foxglove, Lichtblick. "
+        "Opens the graph to browsers and programs without ROS: by the Foxglove WebSocket protocol (Foxglove, Lichtblick), by "
+        "rosbridge (roslib.js, roslibpy), and images over HTTP. "
         "Only programs of this machine may connect, unless --listen is given.",
     )
     parser.add_argument(
         "--port", type=int, default=8765, help="port of the Foxglove protocol (8765); 0 takes a free one"
     )
+    parser.add_argument(
+        "--rosbridge-port",
+        type=int,
+        metavar="PORT",
+        completer="nothing",
+        help="port of rosbridge (9090; a free one where --port is 0)",
+    )
+    parser.add_argument("--no-rosbridge", action="store_true", help="do not serve rosbridge, nor rosapi")
     parser.add_argument(
         "--listen",
         action="store_true",
@@ -140,6 +149,8 @@ def _parser() -> Parser:
 
 def _bridge(
     port: int,
+    rosbridge_port: int | None,
+    no_rosbridge: bool,
     listen: bool,
     address: str,
     token: str,
@@ -167,6 +178,9 @@ def _bridge(
     from minirospy.bridge.serve import require_libraries
 
     _check_range("port", port, 0, 65535)
+    if rosbridge_port is None:
+        rosbridge_port = 9090 if port else 0
+    _check_range("rosbridge-port", rosbridge_port, 0, 65535)
     if status:
         from minirospy.cli.bridge_status import show_status
 
@@ -196,6 +210,9 @@ def _bridge(
     options = BridgeOptions(
         address=address,
         foxglove_port=port,
+        rosbridge_port=None if no_rosbridge else rosbridge_port,
+        rosapi=not no_rosbridge,
+        transforms=not no_rosbridge,
         access=Access(
             hosts=(*host_name, *host_names()),
             origins=tuple(origin),
@@ -247,6 +264,10 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)
+    rosbridge = bridge.listeners.get("rosbridge")
+    if rosbridge:
+        found_too = links(addresses, rosbridge.port, encrypted=rosbridge.is_encrypted)
+        print(f"rosbridge at {found_too.websocket[0]}", flush=True)
     if not options.access.requires_token:
         print(f"open in Foxglove:   {found.foxglove}")
         print(f"open in Lichtblick: {found.lichtblick}", flush=True)

@@ -306,7 +306,7 @@ def test_faults_at_the_start_are_one_clear_error(run_bridge: Callable[..., Runni
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(BridgeError, match=rf"cannot listen at 127\.0\.0\.1:{port}: .* give --port"):
+        with pytest.raises(BridgeError, match=rf"cannot listen at 127\.0\.0\.1:{port}: .* give another port"):
             run_bridge(foxglove_port=port)
 
 

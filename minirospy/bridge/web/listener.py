@@ -68,7 +68,11 @@ class Listener:
         try:
             sock = tcp.bind(host, port)
         except OSError as error:
-            hint = " (another bridge may be running: give --port)" if error.errno == errno.EADDRINUSE else ""
+            hint = (
+                " (another bridge may be running: give another port)"
+                if error.errno == errno.EADDRINUSE
+                else ""
+            )
             raise BridgeError(f"cannot listen at {host}:{port}: {error.strerror or error}{hint}") from error
 
         sock.setblocking(False)
