@@ -47,7 +47,7 @@ class Arrival(NamedTuple):
     data: bytes
 
 
-class _Place(NamedTuple):
+class _Offsets(NamedTuple):
     """Where a transform is in a message: the offsets of its header, and of its seven numbers."""
 
     parent: str
@@ -58,27 +58,27 @@ class _Place(NamedTuple):
 
 def read_transforms(data: bytes) -> list[TransformSample]:
     """Return the transforms of a serialised tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
-    return [_sample(data, place) for place in _places(data)]
+    return [_sample(data, offsets) for offsets in _find_transforms(data)]
 
 
 class Layout:
     """The messages with the same frames in the same order."""
 
-    def __init__(self, places: list[_Place]) -> None:
-        self._places = places
-        self._index = {place.child: index for index, place in enumerate(places)}
+    def __init__(self, found: list[_Offsets]) -> None:
+        self._offsets = found
+        self._index = {offsets.child: index for index, offsets in enumerate(found)}
         self._arrivals: list[Arrival] = []
         self._dropped = 0
         """How many messages came before the first of the list."""
-        self._decoded = [0] * len(places)
+        self._decoded = [0] * len(found)
         """Of each transform: how many messages, counted from the first that ever came, have been decoded."""
-        self._newest = [0] * len(places)
+        self._newest = [0] * len(found)
         """Of each transform: the stamp when expired messages were dropped last."""
 
     @property
     def children(self) -> list[str]:
         """The child frames, in the order of the messages."""
-        return [place.child for place in self._places]
+        return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
         """Keep a message, and drop what has expired; return the frames that the caller has to decode now."""
@@ -90,9 +90,9 @@ class Layout:
         index = self._index[child]
         start = max(0, self._decoded[index] - self._dropped)
         self._decoded[index] = self._dropped + len(self._arrivals)
-        place = self._places[index]
+        offsets = self._offsets[index]
         for arrival in self._arrivals[start:]:
-            yield arrival.number, arrival.authority, _sample(arrival.data, place)
+            yield arrival.number, arrival.authority, _sample(arrival.data, offsets)
 
     def forget(self) -> None:
         """Drop all messages."""
@@ -106,7 +106,7 @@ class Layout:
         older than the newest message, if that is one that it takes: a valid one, later than those before. A frame of which it
         is not has to be decoded; then its messages can go, too.
         """
-        newest = [_sample(self._arrivals[-1].data, place) for place in self._places]
+        newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
         moves_on = [
             _is_valid(sample) and sample.stamp > before
             for sample, before in zip(newest, self._newest, strict=True)
@@ -118,9 +118,9 @@ class Layout:
             last = self._arrivals[count + _BLOCK - 1].data
             needed = self._dropped + count + _BLOCK
             if any(
-                decoded < needed and (not moves or _stamp(last, place) >= sample.stamp - span)
-                for decoded, moves, place, sample in zip(
-                    self._decoded, moves_on, self._places, newest, strict=True
+                decoded < needed and (not moves or _stamp(last, offsets) >= sample.stamp - span)
+                for decoded, moves, offsets, sample in zip(
+                    self._decoded, moves_on, self._offsets, newest, strict=True
                 )
             ):
                 break
@@ -130,7 +130,9 @@ class Layout:
 
         is_full = len(self._arrivals) >= _MOST_MESSAGES
         return [
-            place.child for place, moves in zip(self._places, moves_on, strict=True) if is_full or not moves
+            offsets.child
+            for offsets, moves in zip(self._offsets, moves_on, strict=True)
+            if is_full or not moves
         ]
 
 
@@ -165,30 +167,30 @@ class Layouts:
 
     def add(self, data: bytes) -> Layout | None:
         """Make the layout of a message; None where it has no frame, one twice, or there are too many layouts."""
-        places = _places(data)
-        children = {place.child for place in places}
-        if not places or len(children) < len(places) or self._count >= _MOST_LAYOUTS:
+        found = _find_transforms(data)
+        children = {offsets.child for offsets in found}
+        if not found or len(children) < len(found) or self._count >= _MOST_LAYOUTS:
             return None
 
-        layout = Layout(places)
-        if len(places) == 1:
+        layout = Layout(found)
+        if len(found) == 1:
             self._single[data[16:-56]] = layout
         else:
             same_length = self._several.setdefault(len(data), [])
             if len(same_length) >= _MOST_SAME_LENGTH:
                 return None
             mask = bytearray(b"\xff" * len(data))
-            for place in places:
-                mask[place.header : place.header + 12] = bytes(12)
-                mask[place.body : place.body + _BODY.size] = bytes(_BODY.size)
+            for offsets in found:
+                mask[offsets.header : offsets.header + 12] = bytes(12)
+                mask[offsets.body : offsets.body + _BODY.size] = bytes(_BODY.size)
             unchanged = int.from_bytes(mask, "little")
             same_length.append((unchanged, int.from_bytes(data, "little") & unchanged, layout))
         self._count += 1
         return layout
 
 
-def _places(data: bytes) -> list[_Place]:
-    places = []
+def _find_transforms(data: bytes) -> list[_Offsets]:
+    found = []
     try:
         (count,) = _COUNT.unpack_from(data)
         end = 4
@@ -202,14 +204,14 @@ def _places(data: bytes) -> list[_Place]:
             end += 4
             child = data[end : end + length].decode("utf-8", "replace")
             end += length
-            places.append(_Place(without_slash(parent), without_slash(child), header, end))
+            found.append(_Offsets(without_slash(parent), without_slash(child), header, end))
             end += _BODY.size
     except struct.error as error:
         raise DeserializationError(error) from error
     if end > len(data):
         raise DeserializationError("the message ends too early")
 
-    return places
+    return found
 
 
 def without_slash(name: str) -> str:
@@ -217,13 +219,13 @@ def without_slash(name: str) -> str:
     return name[1:] if name.startswith("/") else name
 
 
-def _sample(data: bytes, place: _Place) -> TransformSample:
-    x, y, z, qx, qy, qz, qw = _BODY.unpack_from(data, place.body)
-    return TransformSample(place.parent, place.child, _stamp(data, place), (x, y, z), (qx, qy, qz, qw))
+def _sample(data: bytes, offsets: _Offsets) -> TransformSample:
+    x, y, z, qx, qy, qz, qw = _BODY.unpack_from(data, offsets.body)
+    return TransformSample(offsets.parent, offsets.child, _stamp(data, offsets), (x, y, z), (qx, qy, qz, qw))
 
 
-def _stamp(data: bytes, place: _Place) -> int:
-    secs, nsecs = _STAMP.unpack_from(data, place.header + 4)
+def _stamp(data: bytes, offsets: _Offsets) -> int:
+    secs, nsecs = _STAMP.unpack_from(data, offsets.header + 4)
     return int(secs * 1_000_000_000 + nsecs)
 
 

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.cli.completion import completers
-from minirospy.cli.completion.completers import Completer, Place, Text
+from minirospy.cli.completion.completers import Completer, Cursor, Text
 from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
 from minirospy.cli.verbs import Family
@@ -92,7 +92,7 @@ def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
     if command == "minirospy":
         return _of_minirospy(before, word)
     if command in SHELL_FUNCTIONS:
-        return _completer(SHELL_FUNCTIONS[command])(Place("", tuple(before), word))
+        return _completer(SHELL_FUNCTIONS[command])(Cursor("", tuple(before), word))
     entry = find_script(command)
     return _of_entry(entry, before, word) if entry else ()
 
@@ -108,7 +108,7 @@ def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
 def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
     """Return the candidates for a command's next word, by its own parser."""
     if entry.completer:
-        return _completer(entry.completer)(Place("", tuple(before), word))
+        return _completer(entry.completer)(Cursor("", tuple(before), word))
     grammar: Command | Family | Verb | None = entry.load_grammar()
     verb = ""
     while isinstance(grammar, Family):
@@ -134,28 +134,28 @@ def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Itera
         elif (not each.startswith("-") or _NUMBER.match(each)) and ":=" not in each:
             given.append(each)
 
-    place = Place(verb, tuple(given), word)
+    cursor = Cursor(verb, tuple(given), word)
     if word.startswith("-") and not _NUMBER.match(word):
         name, assigned, value = word.partition("=")
         if assigned and name in options:
-            found = _of_action(options[name], place._replace(word=value))
+            found = _of_action(options[name], cursor._replace(word=value))
             return [f"{name}={each}" for each in found]
         return [name for name in options if name not in before]
     if pending is not None:
-        return _of_action(pending, place)
+        return _of_action(pending, cursor)
 
     positionals = [action for action in parser._actions if not action.option_strings]
     at = len(given)
     if positionals and at >= len(positionals) and positionals[-1].nargs in ("+", "*", "..."):
         at = len(positionals) - 1
-    return _of_action(positionals[at], place) if at < len(positionals) else ()
+    return _of_action(positionals[at], cursor) if at < len(positionals) else ()
 
 
-def _of_action(action: argparse.Action, place: Place) -> Iterable[str]:
+def _of_action(action: argparse.Action, cursor: Cursor) -> Iterable[str]:
     if action.choices is not None:
         return [str(choice) for choice in action.choices]
     name = completer_of(action)
-    return _completer(name)(place) if name else ()
+    return _completer(name)(cursor) if name else ()
 
 
 def _completer(name: str) -> Completer:

@@ -1,6 +1,6 @@
 """The candidates of TAB: packages, files, launch arguments, what is in the graph, types, whole messages.
 
-A :class:`Place` comes in, candidates go out, unquoted; `complete` picks those that fit. Nothing of a graph is waited
+A :class:`Cursor` comes in, candidates go out, unquoted; `complete` picks those that fit. Nothing of a graph is waited
 for longer than a person at the keyboard waits: without a master, or with one that is silent, there is nothing to offer.
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "LIVE_SECONDS", "Completer", "Place", "Text", "bag_files", "build_targets", "files", "folders", "kinds", "launch_files",
+    "LIVE_SECONDS", "Completer", "Cursor", "Text", "bag_files", "build_targets", "files", "folders", "kinds", "launch_files",
     "launch_nodes", "launch_words", "loggers", "machines", "message_text", "message_types", "nodes",
     "nothing", "on_one_line", "package_file", "package_file_and_target", "package_folders", "package_names",
     "package_path", "parameter_value", "parameters", "pins", "prototype_types", "request_text",
@@ -40,8 +40,8 @@ _MOST_LETTERS = 1000
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
-class Place(NamedTuple):
-    """The cursor's place: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
+class Cursor(NamedTuple):
+    """The cursor's position: in an argument of ``verb``, after the arguments ``given``, ``word`` so far."""
 
     verb: str
     given: tuple[str, ...]
@@ -54,10 +54,10 @@ class Text(str):
     __slots__ = ()
 
 
-Completer = Callable[[Place], Iterable[str]]
+Completer = Callable[[Cursor], Iterable[str]]
 
 
-def nothing(_: Place) -> Iterable[str]:
+def nothing(_: Cursor) -> Iterable[str]:
     """Return no candidates: for a number, an expression, a new name."""
     return ()
 
@@ -71,27 +71,27 @@ def _packages() -> Packages:
     return Packages()
 
 
-def package_names(_: Place) -> Iterable[str]:
+def package_names(_: Cursor) -> Iterable[str]:
     """Return the names of all packages."""
     return _packages().names()
 
 
-def build_targets(place: Place) -> Iterable[str]:
+def build_targets(cursor: Cursor) -> Iterable[str]:
     """Return what catkin_make makes."""
     names = _packages().names()
-    tests = [f"run_tests_{name}" for name in names] if place.word.startswith("run_tests_") else []
+    tests = [f"run_tests_{name}" for name in names] if cursor.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
 
 
-def package_folders(place: Place) -> Iterable[str]:
+def package_folders(cursor: Cursor) -> Iterable[str]:
     """Return ``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of results of tests."""
-    if any(not word.startswith("-") for word in place.given):
+    if any(not word.startswith("-") for word in cursor.given):
         return []
-    package, slash, _ = place.word.partition("/")
+    package, slash, _ = cursor.word.partition("/")
     if not slash:
         return [f"{name}/" for name in (*_packages().names(), *_OWN_FOLDERS)]
     root = _OWN_FOLDERS[package]() if package in _OWN_FOLDERS else _packages().find(package)
-    return [name for name in _below(root, package, place.word) if name.endswith("/")]
+    return [name for name in _below(root, package, cursor.word) if name.endswith("/")]
 
 
 def _logs() -> Path:
@@ -109,24 +109,24 @@ def _results() -> Path:
 _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
-def package_file(place: Place) -> Iterable[str]:
+def package_file(cursor: Cursor) -> Iterable[str]:
     """Return a package, then the name of a file anywhere in it, or its path."""
-    if not place.given:
+    if not cursor.given:
         return _packages().names()
-    if len(place.given) > 1:
+    if len(cursor.given) > 1:
         return []
-    return package_path(place) if "/" in place.word else _names_below(_packages().find(place.given[0]))
+    return package_path(cursor) if "/" in cursor.word else _names_below(_packages().find(cursor.given[0]))
 
 
-def package_path(place: Place) -> Iterable[str]:
+def package_path(cursor: Cursor) -> Iterable[str]:
     """Return the path of a file in the package that is given."""
-    root = _packages().find(place.given[0])
-    return [name.removeprefix("./") for name in _below(root, ".", "./" + place.word)]
+    root = _packages().find(cursor.given[0])
+    return [name.removeprefix("./") for name in _below(root, ".", "./" + cursor.word)]
 
 
-def package_file_and_target(place: Place) -> Iterable[str]:
+def package_file_and_target(cursor: Cursor) -> Iterable[str]:
     """Return a package, a file of it, and where to."""
-    return files(place) if len(place.given) > 1 else package_file(place)
+    return files(cursor) if len(cursor.given) > 1 else package_file(cursor)
 
 
 def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
@@ -146,21 +146,21 @@ def _below(root: Path, shown: str, word: str) -> list[str]:
     return [f"{head}/{name}" for name in _entries(folder, hidden=prefix.startswith("."))]
 
 
-def files(place: Place) -> Iterable[str]:
+def files(cursor: Cursor) -> Iterable[str]:
     """Return files and folders of this computer, as shells complete them."""
-    head, slash, prefix = place.word.rpartition("/")
+    head, slash, prefix = cursor.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=prefix.startswith("."))]
 
 
-def bag_files(place: Place) -> Iterable[str]:
+def bag_files(cursor: Cursor) -> Iterable[str]:
     """Return bags, and folders, of this computer."""
-    return [name for name in files(place) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
+    return [name for name in files(cursor) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
 
 
-def folders(place: Place) -> Iterable[str]:
+def folders(cursor: Cursor) -> Iterable[str]:
     """Return folders of this computer."""
-    return [name for name in files(place) if name.endswith("/")]
+    return [name for name in files(cursor) if name.endswith("/")]
 
 
 def _entries(folder: Path, *, hidden: bool) -> list[str]:
@@ -172,9 +172,9 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
     return sorted(entry.name + "/" if os.path.isdir(entry) else entry.name for entry in entries)
 
 
-def rosrun_words(place: Place) -> Iterable[str]:
+def rosrun_words(cursor: Cursor) -> Iterable[str]:
     """Return options of rosrun, packages, programs of one; then the program's arguments: files, remappings."""
-    given = list(place.given)
+    given = list(cursor.given)
     while given and given[0].startswith("-"):
         if given.pop(0) in ("-p", "--prefix"):
             if not given:
@@ -182,38 +182,38 @@ def rosrun_words(place: Place) -> Iterable[str]:
             given.pop(0)
     if not given:
         options = ["-h", "--help", "-p", "--prefix", "-d", "--debug"]
-        return options if place.word.startswith("-") else package_names(place)
+        return options if cursor.word.startswith("-") else package_names(cursor)
     if len(given) == 1:
         return _packages().executables(given[0])
-    name, remapped, word = place.word.partition(":=")
+    name, remapped, word = cursor.word.partition(":=")
     if remapped:
         private = name.startswith("_")
-        return [] if private else [f"{name}:={topic}" for topic in topics(Place("", (), word))]
-    return ["__name:=", "__ns:=", "__log:="] if place.word.startswith("_") else files(place)
+        return [] if private else [f"{name}:={topic}" for topic in topics(Cursor("", (), word))]
+    return ["__name:=", "__ns:=", "__log:="] if cursor.word.startswith("_") else files(cursor)
 
 
-def rospack_words(place: Place) -> Iterable[str]:
+def rospack_words(cursor: Cursor) -> Iterable[str]:
     """Return a verb of rospack, its options, a package."""
     from minirospy.cli.ros.rospack import _VERBS
 
-    return _pack_words(place, _VERBS)
+    return _pack_words(cursor, _VERBS)
 
 
-def rosstack_words(place: Place) -> Iterable[str]:
+def rosstack_words(cursor: Cursor) -> Iterable[str]:
     """Return a verb of rosstack, its options, a stack."""
     from minirospy.cli.ros.rospack import _STACK_VERBS
 
-    return _pack_words(place, _STACK_VERBS)
+    return _pack_words(cursor, _STACK_VERBS)
 
 
-def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
+def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
     from minirospy.cli.ros.rospack import _FLAGS
 
-    words = [word for word in place.given if not word.startswith("-")]
+    words = [word for word in cursor.given if not word.startswith("-")]
     verb = verbs.get(words[0]) if words else None
-    if place.word.startswith("--target="):
+    if cursor.word.startswith("--target="):
         return [f"--target={name}" for name in _packages().names()]
-    if place.word.startswith("-"):
+    if cursor.word.startswith("-"):
         own = (f"--{name}" if name in _FLAGS else f"--{name}=" for name in sorted(verb.takes if verb else ()))
         return ["-h", "--help", "-q", *own]
     if not words or words == ["help"]:
@@ -224,36 +224,36 @@ def _pack_words(place: Place, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 # --- launch files
 
 
-def launch_words(place: Place) -> Iterable[str]:
+def launch_words(cursor: Cursor) -> Iterable[str]:
     """Yield packages, launch files of one, or their paths; then ``arg:=`` for each argument that the file declares."""
-    if ":=" not in place.word:
-        if not place.given:
+    if ":=" not in cursor.word:
+        if not cursor.given:
             yield from _packages().names()
-            yield from launch_files(place)
+            yield from launch_files(cursor)
             return
-        if len(place.given) == 1 and not Path(place.given[0]).is_file():
-            yield from _names_below(_packages().find(place.given[0]), _LAUNCH)
+        if len(cursor.given) == 1 and not Path(cursor.given[0]).is_file():
+            yield from _names_below(_packages().find(cursor.given[0]), _LAUNCH)
             return
-    yield from _launch_args(place)
-    if Path(place.given[0]).is_file():
-        yield from launch_files(place)
+    yield from _launch_args(cursor)
+    if Path(cursor.given[0]).is_file():
+        yield from launch_files(cursor)
 
 
-def launch_files(place: Place) -> Iterable[str]:
+def launch_files(cursor: Cursor) -> Iterable[str]:
     """Return launch files of this computer, and the folders on the way to them."""
-    return [name for name in files(place) if name.endswith((*_LAUNCH, "/"))]
+    return [name for name in files(cursor) if name.endswith((*_LAUNCH, "/"))]
 
 
-def _launch_file(place: Place) -> str:
-    file = Path(place.given[0])
-    return str(file if file.is_file() else _packages().find_resource(*place.given[:2]))
+def _launch_file(cursor: Cursor) -> str:
+    file = Path(cursor.given[0])
+    return str(file if file.is_file() else _packages().find_resource(*cursor.given[:2]))
 
 
-def _launch_args(place: Place) -> Iterator[str]:
+def _launch_args(cursor: Cursor) -> Iterator[str]:
     from minirospy.launch.load import describe_args
 
-    name, assigned, _ = place.word.partition(":=")
-    for arg in describe_args(_launch_file(place)):
+    name, assigned, _ = cursor.word.partition(":=")
+    for arg in describe_args(_launch_file(cursor)):
         if not assigned:
             yield f"{arg.name}:="
         elif arg.name == name and arg.default and "$(" not in arg.default:
@@ -261,18 +261,17 @@ def _launch_args(place: Place) -> Iterator[str]:
             yield from (f"{name}:={value}" for value in (("true", "false") if truth else (arg.default,)))
 
 
-def launch_nodes(place: Place) -> Iterable[str]:
+def launch_nodes(cursor: Cursor) -> Iterable[str]:
     """Return the nodes of the launch file, for `roslaunch PACKAGE FILE --args NODE`."""
-    from minirospy.launch.load import Source as LaunchSource
-    from minirospy.launch.load import describe_args, load_sources
+    from minirospy.launch.load import LaunchSource, describe_args, load_sources
 
-    if not place.given:
+    if not cursor.given:
         return []
-    file = _launch_file(place)
+    file = _launch_file(cursor)
     # A value that is not typed yet is not an error, and errors (collected in the list) hide no node.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
-    return _as_typed((node.name for node in spec.runnables()), place.word)
+    return _as_typed((node.name for node in spec.runnables()), cursor.word)
 
 
 # --- the graph
@@ -302,32 +301,32 @@ def _as_typed(names: Iterable[str], word: str) -> list[str]:
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
-def topics(place: Place) -> Iterable[str]:
+def topics(cursor: Cursor) -> Iterable[str]:
     """Return the topics; for echo and type also the fields of one."""
     from minirospy.introspect.topics import find_topic, topic_names
 
-    fields = place.verb in ("echo", "type") and "/" in place.word[1:]
+    fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
 
     def ask(graph: Graph) -> list[str]:
-        found = _as_typed((name for name in topic_names(graph) if name not in place.given), place.word)
-        if not fields or any(name.startswith(place.word) for name in found):
+        found = _as_typed((name for name in topic_names(graph) if name not in cursor.given), cursor.word)
+        if not fields or any(name.startswith(cursor.word) for name in found):
             return found
-        parent = place.word.rpartition("/")[0]
+        parent = cursor.word.rpartition("/")[0]
         holder = find_topic(graph, graph.resolve(parent))
         return [f"{parent}/{name}" for name in _fields(holder.type, holder.path)] if holder else []
 
     return _live(ask)
 
 
-def nodes(place: Place) -> Iterable[str]:
+def nodes(cursor: Cursor) -> Iterable[str]:
     """Return the nodes that are not named yet."""
     from minirospy.introspect.nodes import list_nodes
 
     names = _live(list_nodes)
-    return _as_typed((name for name in names if name not in place.given), place.word)
+    return _as_typed((name for name in names if name not in cursor.given), cursor.word)
 
 
-def machines(_: Place) -> Iterable[str]:
+def machines(_: Cursor) -> Iterable[str]:
     """Return the hosts that nodes run on."""
     from minirospy.introspect.graph import node_host
     from minirospy.introspect.nodes import list_nodes
@@ -337,43 +336,43 @@ def machines(_: Place) -> Iterable[str]:
     )
 
 
-def services(place: Place) -> Iterable[str]:
+def services(cursor: Cursor) -> Iterable[str]:
     """Return the services."""
     from minirospy.introspect.services import list_services
 
-    return _as_typed(_live(lambda graph: [service.name for service in list_services(graph)]), place.word)
+    return _as_typed(_live(lambda graph: [service.name for service in list_services(graph)]), cursor.word)
 
 
-def parameters(place: Place) -> Iterable[str]:
+def parameters(cursor: Cursor) -> Iterable[str]:
     """Return the parameters."""
     from minirospy.introspect.parameters import list_parameters
 
-    return _as_typed(_live(list_parameters), place.word)
+    return _as_typed(_live(list_parameters), cursor.word)
 
 
-def parameter_value(place: Place) -> Iterable[str]:
+def parameter_value(cursor: Cursor) -> Iterable[str]:
     """Return a parameter's value, to be changed, for `rosparam set PARAMETER`."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
 
-    if len(place.given) != 1:
+    if len(cursor.given) != 1:
         return []
-    ask = place.given[0]
+    ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
     # A list or a table is read from one line as well; nobody changes a robot's whole description there.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MOST_LETTERS]
 
 
-def loggers(place: Place) -> Iterable[str]:
+def loggers(cursor: Cursor) -> Iterable[str]:
     """Return the loggers of a node, for `rosconsole get NODE`."""
     from minirospy.introspect.services import call_service, fill_request
 
-    if not place.given:
+    if not cursor.given:
         return []
     type_ = "roscpp/GetLoggers"
 
     def ask(graph: Graph) -> list[str]:
-        service = graph.resolve(place.given[0]) + "/get_loggers"
+        service = graph.resolve(cursor.given[0]) + "/get_loggers"
         response = call_service(graph, service, type_, fill_request(type_, []))
         return sorted(each.name for each in cast("GetLoggersResponse", response).loggers)
 
@@ -389,11 +388,11 @@ def _catalogue() -> Catalogue:
     return Catalogue(_packages().folders())
 
 
-def _types(place: Place, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
+def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
     """Return ``pkg/``, then ``pkg/Type``: all types would be hundreds. `rosmsg show` takes the name alone too."""
     from minirospy.introspect.interfaces import Interfaces, Kind
 
-    package, slash, _ = place.word.partition("/")
+    package, slash, _ = cursor.word.partition("/")
     packages = _packages()
     if slash:
         return Interfaces(packages, Kind(kind)).in_package(package)
@@ -402,53 +401,53 @@ def _types(place: Place, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
         for name, root in sorted(packages.folders().items())
         if name.startswith(package) and any((root / folder).is_dir() for folder in inside)
     ]
-    if found or place.verb not in ("show", "info", "md5"):
+    if found or cursor.verb not in ("show", "info", "md5"):
         return found
     return sorted({type_.partition("/")[2] for type_ in Interfaces(packages, Kind(kind)).all()})
 
 
-def message_types(place: Place) -> Iterable[str]:
+def message_types(cursor: Cursor) -> Iterable[str]:
     """Return the types of messages."""
-    return _types(place, "msg", ("msg", "action"))
+    return _types(cursor, "msg", ("msg", "action"))
 
 
-def service_types(place: Place) -> Iterable[str]:
+def service_types(cursor: Cursor) -> Iterable[str]:
     """Return the types of services."""
-    return _types(place, "srv", ("srv",))
+    return _types(cursor, "srv", ("srv",))
 
 
-def prototype_types(place: Place) -> Iterable[str]:
+def prototype_types(cursor: Cursor) -> Iterable[str]:
     """Return the types of a kind, for `rosmsg-proto msg|srv`."""
-    return service_types(place) if place.given[:1] == ("srv",) else message_types(place)
+    return service_types(cursor) if cursor.given[:1] == ("srv",) else message_types(cursor)
 
 
-def topic_type(place: Place) -> Iterable[str]:
+def topic_type(cursor: Cursor) -> Iterable[str]:
     """Return the topic's type, all types where it has none, for `rostopic pub TOPIC`."""
-    if not place.given:
-        return message_types(place)
+    if not cursor.given:
+        return message_types(cursor)
 
     def ask(graph: Graph) -> list[str]:
-        type_ = graph.master.get_topic_types().get(graph.resolve(place.given[0]), "*")
+        type_ = graph.master.get_topic_types().get(graph.resolve(cursor.given[0]), "*")
         return [] if type_ == "*" else [type_]
 
-    return _live(ask) or message_types(place)
+    return _live(ask) or message_types(cursor)
 
 
-def message_text(place: Place) -> Iterable[str]:
+def message_text(cursor: Cursor) -> Iterable[str]:
     """Return a whole message to be changed, for `rostopic pub TOPIC TYPE`."""
-    if len(place.given) != 2:
+    if len(cursor.given) != 2:
         return []
     catalogue = _catalogue()
-    return [_text(catalogue.message(place.given[1]), catalogue)]
+    return [_text(catalogue.message(cursor.given[1]), catalogue)]
 
 
-def request_text(place: Place) -> Iterable[str]:
+def request_text(cursor: Cursor) -> Iterable[str]:
     """Return a whole request to be changed, for `rosservice call SERVICE`."""
     from minirospy.introspect.services import service_type
 
-    if len(place.given) != 1:
+    if len(cursor.given) != 1:
         return []
-    found = _live(lambda graph: [service_type(graph, graph.resolve(place.given[0]))])
+    found = _live(lambda graph: [service_type(graph, graph.resolve(cursor.given[0]))])
     if not found:
         return []
     catalogue = _catalogue()
@@ -505,20 +504,20 @@ def on_one_line(text: str) -> str:
 # --- what there is to choose from
 
 
-def pins(place: Place) -> Iterable[str]:
+def pins(cursor: Cursor) -> Iterable[str]:
     """Return the pins of the virtual board that have something on them; to press, those of buttons."""
     from minirospy.gpio.model import BUTTONS, LEDS
 
-    return map(str, BUTTONS if place.verb in ("press", "release") else (*LEDS, *BUTTONS))
+    return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
-def shells(_: Place) -> Iterable[str]:
+def shells(_: Cursor) -> Iterable[str]:
     """Return what `minirospy shell` has something for."""
     from minirospy.workspace.setup_files import SHELLS
 
     return SHELLS
 
 
-def kinds(_: Place) -> Iterable[str]:
+def kinds(_: Cursor) -> Iterable[str]:
     """Return the kinds of types, for `rosmsg-proto`."""
     return ("msg", "srv")
