@@ -56,7 +56,7 @@ class Registered(NamedTuple):
     actions: Iterable[Action]
 
 
-class _Node:
+class _NodeEntry:
     """A node's name and URI, and what it has registered: name -> what it is there, as bits."""
 
     __slots__ = ("entries", "holder", "name", "size", "uri")
@@ -99,7 +99,7 @@ class Registry:
         self.changes = 0
         """Grows whenever publishers, subscribers or services may have changed."""
         self._shares = shares or registry_limits.new_shares()
-        self._nodes: dict[str, _Node] = {}
+        self._nodes: dict[str, _NodeEntry] = {}
         self._publishers: dict[str, dict[str, str]] = {}
         self._subscribers: dict[str, dict[str, str]] = {}
         self._services: dict[str, _Service] = {}
@@ -324,7 +324,7 @@ class Registry:
             return ()
 
         published = self._clear(entry) if entry else []
-        added = self._nodes[node] = _Node(node, uri)
+        added = self._nodes[node] = _NodeEntry(node, uri)
         self._count(added, node_cost(node, uri))
         if entry is None:
             return ()
@@ -338,14 +338,14 @@ class Registry:
             return text_cost(text) - (text_cost(service.uri) if service else 0)
         return 0 if kind == PARAMETER else self._types.cost(name, text)
 
-    def _count(self, entry: _Node, size: int) -> None:
+    def _count(self, entry: _NodeEntry, size: int) -> None:
         entry.size += size
         self._shares.add(entry.holder, size)
 
     def _count_for(self, node: str, size: int) -> None:
         self._count(self._nodes[node], size)
 
-    def _clear(self, entry: _Node) -> list[str]:
+    def _clear(self, entry: _NodeEntry) -> list[str]:
         """Take a node out of every table; the topics that it published."""
         self.changes += 1
         published = entry.names(PUBLISHES)
@@ -361,7 +361,7 @@ class Registry:
         self._count(entry, -entry.size)
         return published
 
-    def _enter(self, node: str, name: str, kind: int) -> _Node:
+    def _enter(self, node: str, name: str, kind: int) -> _NodeEntry:
         self.changes += 1
         entry = self._nodes[node]
         self._count(entry, name_cost(name, kind, entry.entries.get(name, 0)))
@@ -385,7 +385,7 @@ class Registry:
         _remove(table, topic, node)
         self._leave(node, topic, kind)
 
-    def _leave_type(self, topic: str, entry: _Node) -> None:
+    def _leave_type(self, topic: str, entry: _NodeEntry) -> None:
         if self._types.is_counted_for(topic, entry.name):
             others = chain(self._publishers.get(topic, ()), self._subscribers.get(topic, ()))
             self._types.leave(topic, entry.name, others)

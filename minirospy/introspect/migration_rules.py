@@ -43,7 +43,7 @@ class BagMigrationException(Exception):
     """A migration is not possible, or a rule is used wrongly."""
 
 
-class _Node(Protocol):
+class _Step(Protocol):
     """A step of a path."""
 
     @property
@@ -56,7 +56,7 @@ class Migrator(Protocol):
 
     rename_map: dict[str, set[str]]
 
-    def find_path(self, old_class: MessageClass, new_class: MessageClass) -> Sequence[_Node]:
+    def find_path(self, old_class: MessageClass, new_class: MessageClass) -> Sequence[_Step]:
         """Return the nodes of the scaffold that lead from one class to another."""
 
     def filter_rules_unique(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:

@@ -124,7 +124,7 @@ def main() -> int:
     """Run the node until it is shut down; return the exit status."""
     try:
         rospy.init_node("teleop_twist_joy_node")
-        node = _Node()
+        node = _TeleopNode()
         rospy.spin()
         del node
     except rospy.ROSInterruptException:
@@ -132,7 +132,7 @@ def main() -> int:
     return 0
 
 
-class _Node:
+class _TeleopNode:
     def __init__(self) -> None:
         found = rospy.get_param("~", {})
         options = read_options(found if isinstance(found, dict) else {})

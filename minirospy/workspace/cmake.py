@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from minirospy.errors import BuildError
 
-__all__ = ["Node", "Word", "keyword_arguments", "parse_cmake"]
+__all__ = ["Statement", "Word", "keyword_arguments", "parse_cmake"]
 
 _TOKEN = re.compile(
     r"""
@@ -37,7 +37,7 @@ class Word(NamedTuple):
     quoted: bool = False
 
 
-class Node(NamedTuple):
+class Statement(NamedTuple):
     """A command: its name in lower case, its arguments, the line where it starts, and its content.
 
     ``body`` holds what is before the ``endif()`` or ``endforeach()`` that closes it; ``else()`` is one of them.
@@ -46,10 +46,10 @@ class Node(NamedTuple):
     name: str
     words: tuple[Word, ...]
     line: int
-    body: tuple[Node, ...] = ()
+    body: tuple[Statement, ...] = ()
 
 
-def parse_cmake(text: str, where: str) -> tuple[Node, ...]:
+def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
     """Return the commands of a CMakeLists.txt; ``where`` names the file in errors.
 
     Raises BuildError where a quote, a bracket, an ``if`` or a loop does not close.
@@ -70,23 +70,29 @@ def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> d
     return found
 
 
-def _nested(commands: Iterator[Node], where: str, opener: Node | None) -> tuple[Node, ...]:
+def _nested(commands: Iterator[Statement], where: str, opener: Statement | None) -> tuple[Statement, ...]:
     """Return the commands up to the one that closes ``opener``, each with its content."""
-    nodes: list[Node] = []
-    for node in commands:
-        if opener and node.name == _ENDS[opener.name]:
-            return tuple(nodes)
-        if node.name in _OPENERS:
+    statements: list[Statement] = []
+    for statement in commands:
+        if opener and statement.name == _ENDS[opener.name]:
+            return tuple(statements)
+        if statement.name in _OPENERS:
             # Reported where it is, unless something else is open: then that is what is wrong.
-            line, missing = (opener.line, _ENDS[opener.name]) if opener else (node.line, _OPENERS[node.name])
-            raise BuildError(where, line, f"{(opener or node).name}() without {missing}()")
-        nodes.append(node._replace(body=_nested(commands, where, node)) if node.name in _ENDS else node)
+            line, missing = (
+                (opener.line, _ENDS[opener.name]) if opener else (statement.line, _OPENERS[statement.name])
+            )
+            raise BuildError(where, line, f"{(opener or statement).name}() without {missing}()")
+        statements.append(
+            statement._replace(body=_nested(commands, where, statement))
+            if statement.name in _ENDS
+            else statement
+        )
     if opener:
         raise BuildError(where, opener.line, f"{opener.name}() without {_ENDS[opener.name]}()")
-    return tuple(nodes)
+    return tuple(statements)
 
 
-def _commands(text: str, where: str) -> Iterator[Node]:
+def _commands(text: str, where: str) -> Iterator[Statement]:
     name, start = "", 0
     words: list[Word] = []
     depth = 0
@@ -109,7 +115,7 @@ def _commands(text: str, where: str) -> Iterator[Node]:
             if depth:
                 words.append(Word(")"))
             else:
-                yield Node(name.lower(), tuple(words), start)
+                yield Statement(name.lower(), tuple(words), start)
                 name, words = "", []
         elif depth:
             words.append(_word(match))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.errors import BuildError
-from minirospy.workspace.cmake import Node, Word, keyword_arguments, parse_cmake
+from minirospy.workspace.cmake import Statement, Word, keyword_arguments, parse_cmake
 
 __all__ = ["Command", "run_cmake"]
 
@@ -41,7 +41,7 @@ class _Macro(NamedTuple):
     """A definition by ``macro()`` or ``function()``, and its file."""
 
     parameters: list[str]
-    body: tuple[Node, ...]
+    body: tuple[Statement, ...]
     file: Path
 
 
@@ -70,10 +70,10 @@ class _Run:
         self._macros = macros
         self._depth = depth
 
-        self._readers: dict[str, Callable[[Node, list[str], Path], Iterator[Command]]] = {
+        self._readers: dict[str, Callable[[Statement, list[str], Path], Iterator[Command]]] = {
             "if": self._if,
             "foreach": self._foreach,
-            "while": lambda node, arguments, file: iter(()),
+            "while": lambda statement, arguments, file: iter(()),
             "macro": self._define,
             "function": self._define,
             "include": self._include,
@@ -103,32 +103,32 @@ class _Run:
             raise BuildError(str(file), 1, "is not UTF-8 text")
         yield from self._body(parse_cmake(text, str(file)), file)
 
-    def _body(self, nodes: Sequence[Node], file: Path) -> Iterator[Command]:
+    def _body(self, statements: Sequence[Statement], file: Path) -> Iterator[Command]:
         """Yield a file's or a macro's commands, up to its ``return()``."""
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise BuildError(str(file), nodes[0].line if nodes else 0, "includes or calls itself")
+            raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
         try:
-            yield from self._run(nodes, file)
+            yield from self._run(statements, file)
         except _Leave:
             pass
         finally:
             self._depth -= 1
 
-    def _run(self, nodes: Sequence[Node], file: Path) -> Iterator[Command]:
-        for node in nodes:
-            arguments = self._arguments(node.words)
-            if node.name in self._macros:
-                yield from self._call(node.name, arguments)
-            elif node.name in self._readers:
-                yield from self._readers[node.name](node, arguments, file)
+    def _run(self, statements: Sequence[Statement], file: Path) -> Iterator[Command]:
+        for statement in statements:
+            arguments = self._arguments(statement.words)
+            if statement.name in self._macros:
+                yield from self._call(statement.name, arguments)
+            elif statement.name in self._readers:
+                yield from self._readers[statement.name](statement, arguments, file)
             else:
-                if node.name in self._setters:
+                if statement.name in self._setters:
                     try:
-                        self._setters[node.name](arguments)
+                        self._setters[statement.name](arguments)
                     except (re.error, ValueError, OSError) as error:
-                        raise BuildError(str(file), node.line, f"{node.name}(): {error}") from error
-                yield Command(node.name, tuple(arguments), node.line, file, self._folder)
+                        raise BuildError(str(file), statement.line, f"{statement.name}(): {error}") from error
+                yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
         """Return words with variables expanded; a list in one without quotes becomes several words."""
@@ -152,28 +152,28 @@ class _Run:
 
     # --- what decides which commands run
 
-    def _if(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
-        holds = self._holds(node, file)
+    def _if(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
+        holds = self._holds(statement, file)
         taken = False
-        for each in node.body:
+        for each in statement.body:
             if each.name in ("else", "elseif"):
                 taken = taken or holds
                 holds = not taken and (each.name == "else" or self._holds(each, file))
             elif holds:
                 yield from self._run([each], file)
 
-    def _holds(self, node: Node, file: Path) -> bool:
-        words = [Word(text, word.quoted) for word in node.words for text in self._arguments([word])]
+    def _holds(self, statement: Statement, file: Path) -> bool:
+        words = [Word(text, word.quoted) for word in statement.words for text in self._arguments([word])]
         try:
             return _Condition(words, self._known, self._folder).value()
         except (ValueError, re.error) as error:
-            raise BuildError(str(file), node.line, f"{node.name}(): {error}") from error
+            raise BuildError(str(file), statement.line, f"{statement.name}(): {error}") from error
 
-    def _foreach(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+    def _foreach(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         for item in self._loop_items(arguments[1:]):
             self._known[arguments[0]] = item
             try:
-                yield from self._run(node.body, file)
+                yield from self._run(statement.body, file)
             except _Leave as leave:
                 if str(leave) == "return":
                     raise
@@ -192,12 +192,12 @@ class _Run:
         lists = [item for name in given.get("LISTS", []) for item in _items(self._known.get(name, ""))]
         return [*lists, *given.get("ITEMS", [])]
 
-    def _leave(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
-        raise _Leave(node.name)
+    def _leave(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
+        raise _Leave(statement.name)
 
-    def _define(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+    def _define(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         if arguments:
-            self._macros[arguments[0].lower()] = _Macro(arguments[1:], node.body, file)
+            self._macros[arguments[0].lower()] = _Macro(arguments[1:], statement.body, file)
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
@@ -214,7 +214,7 @@ class _Run:
         yield from self._body(macro.body, macro.file)
         self._known.update(before)
 
-    def _include(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+    def _include(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         """Yield a file of the package; a module of CMake's own is left out."""
         for name in arguments[:1]:
             folders = [self._folder, *map(Path, _items(self._known.get("CMAKE_MODULE_PATH", "")))]
@@ -225,13 +225,13 @@ class _Run:
                 self._known["CMAKE_CURRENT_LIST_DIR"] = file.parent.as_posix()
                 break
 
-    def _subdirectory(self, node: Node, arguments: list[str], file: Path) -> Iterator[Command]:
+    def _subdirectory(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         for name in arguments[:1]:
             folder = self._folder / name
             if not (folder / "CMakeLists.txt").is_file():
                 raise BuildError(
                     str(file),
-                    node.line,
+                    statement.line,
                     f"add_subdirectory({name}): {folder / 'CMakeLists.txt'} does not exist",
                 )
             places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())

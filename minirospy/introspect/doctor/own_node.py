@@ -57,7 +57,7 @@ class DoctorNode:
         self.told_by_master = threading.Event()
         """Set when the master has called this node."""
         self._loop = LoopThread("minirospy-doctor")
-        self.node = _Node(self.name, environment, self.told_by_master)
+        self.node = _NotifiedNode(self.name, environment, self.told_by_master)
         self._log_links = threading.Condition()
         self._listeners: set[str] = set()
 
@@ -132,7 +132,7 @@ class DoctorNode:
                 self._log_links.notify_all()
 
 
-class _Node(Node):
+class _NotifiedNode(Node):
     """A node that notes the master's calls."""
 
     def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:

@@ -62,7 +62,7 @@ class State(Protocol):
 
 
 @dataclass(eq=False, slots=True)
-class _Node:
+class _Backlog:
     """The pending notifications of one node: the newest of each topic and parameter."""
 
     uri: str
@@ -80,7 +80,7 @@ class _Line:
 
     most: int
     under_way: int = 0
-    waiting: deque[_Node] = field(default_factory=deque)
+    waiting: deque[_Backlog] = field(default_factory=deque)
 
 
 class Notifier:
@@ -100,7 +100,7 @@ class Notifier:
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """URI of a node on this loop -> what takes a topic and its publishers in place of a call."""
-        self._nodes: dict[str, _Node] = {}
+        self._nodes: dict[str, _Backlog] = {}
         # URI and topic -> until when nothing is said of it, the first to end in front.
         self._held: dict[tuple[str, str], float] = {}
 
@@ -147,7 +147,7 @@ class Notifier:
         node = self._nodes.get(notice.uri)
         is_idle = node is None or node.timer is not None
         if node is None:
-            node = self._nodes[notice.uri] = _Node(notice.uri)
+            node = self._nodes[notice.uri] = _Backlog(notice.uri)
 
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
@@ -169,7 +169,7 @@ class Notifier:
                 node.timer.cancel()
         await self._rpc.close()
 
-    def _summarize(self, node: _Node) -> None:
+    def _summarize(self, node: _Backlog) -> None:
         """Replace the notices of many parameters by one for each subscription of the node."""
         for key in [key for key, notice in node.notices.items() if isinstance(notice, ParameterUpdate)]:
             del node.notices[key]
@@ -177,7 +177,7 @@ class Notifier:
             node.notices[name,] = ParameterUpdate(node.uri, name)
         node.parameters = 0
 
-    def _line_up(self, node: _Node) -> None:
+    def _line_up(self, node: _Backlog) -> None:
         (self._suspect_line if node.uri in self._suspects else self._line).waiting.append(node)
         self._start_soon()
 
@@ -197,7 +197,7 @@ class Notifier:
                     return
                 self._call(line.waiting.popleft(), line)
 
-    def _call(self, node: _Node, line: _Line) -> None:
+    def _call(self, node: _Backlog, line: _Line) -> None:
         """Send a node the first notice that need not wait."""
         key = next((key for key in node.notices if key not in node.pauses), None)
         if key is None:
@@ -229,7 +229,7 @@ class Notifier:
         self._rpc.start(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
 
     def _call_later(
-        self, node: _Node, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
+        self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
         """Send a large notice as soon as there is memory for it."""
 
@@ -246,7 +246,7 @@ class Notifier:
             self._large.popleft()()
 
     def _call_in_steps(
-        self, node: _Node, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
+        self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> Steps[None]:
         if isinstance(notice, PublisherUpdate):
             method, name = "publisherUpdate", notice.topic
@@ -278,7 +278,7 @@ class Notifier:
         self._start_large()
 
     def _called(
-        self, node: _Node, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
+        self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
         """Go on after a call that listed ``count`` publishers, ``size`` bytes if it was large."""
 
@@ -306,7 +306,7 @@ class Notifier:
         if line.waiting:
             self._start_soon()
 
-    def _go_on(self, node: _Node) -> None:
+    def _go_on(self, node: _Backlog) -> None:
         """Line the node up where there is something to say; else wait for the end of a pause, if there is one."""
         if node.timer:
             node.timer.cancel()
