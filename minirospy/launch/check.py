@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from minirospy.errors import LaunchError
 from minirospy.launch.command import node_command
-from minirospy.launch.load import Problems, Source, load_sources
+from minirospy.launch.load import LaunchSource, Problems, load_sources
 from minirospy.launch.spec import LaunchSpec
 from minirospy.workspace.packages import Packages
 
 __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
-def find_problems(sources: Sequence[Source], packages: Packages) -> tuple[LaunchSpec, Problems]:
+def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
     """Return the spec of the files, and every fault: theirs, missing programs, undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
@@ -31,7 +31,7 @@ def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False)
 
     With ``ignore_unset_args`` there are none where an arg has no value: what else is wrong may follow from that.
     """
-    _, problems = find_problems([Source(file, None, {})], packages)
+    _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)
     return [] if is_unset and ignore_unset_args else problems
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.errors import LaunchError
-from minirospy.launch.load import Problems, Source, describe_args, load_sources
+from minirospy.launch.load import LaunchSource, Problems, describe_args, load_sources
 from minirospy.workspace.manifest import Kind, read_manifest
 from minirospy.workspace.packages import Packages, package_name
 
@@ -36,7 +36,7 @@ def file_needs(
     sources = []
     for file in files:
         unset = {arg.name: "" for arg in describe_args(file) if arg.default is None}
-        sources.append(Source(file, None, unset))
+        sources.append(LaunchSource(file, None, unset))
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for problem in problems:

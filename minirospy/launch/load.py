@@ -23,8 +23,8 @@ from minirospy.workspace.packages import Packages
 __all__ = [
     "STDIN",
     "LaunchFileNotFoundError",
+    "LaunchSource",
     "Problems",
-    "Source",
     "describe_args",
     "find_files",
     "load_files",
@@ -51,7 +51,7 @@ class LaunchFileNotFoundError(MinirospyError):
         return f"{self.ros_text}: {self.hint}"
 
 
-class Source(NamedTuple):
+class LaunchSource(NamedTuple):
     """A launch file, its text (None: it is read), and what its args are given."""
 
     file: str
@@ -83,18 +83,18 @@ def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
     """Load launch files one after another, with ``args`` as on the command line. Raises LaunchError."""
-    return load_sources([Source(file, None, args) for file in files], packages, environ)
+    return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
     """Load one launch file from its text, as from standard input. Raises LaunchError."""
-    return load_sources([Source(STDIN, text.encode(), args)], packages, environ)
+    return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
 def load_sources(
-    sources: Sequence[Source],
+    sources: Sequence[LaunchSource],
     packages: Packages,
     environ: Mapping[str, str] | None = None,
     problems: Problems | None = None,

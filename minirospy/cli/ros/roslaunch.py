@@ -19,7 +19,7 @@ from minirospy.launch.command import shell_line
 from minirospy.launch.load import (
     STDIN,
     LaunchFileNotFoundError,
-    Source,
+    LaunchSource,
     find_files,
     load_sources,
     resolved_arg_docs,
@@ -112,7 +112,7 @@ def _launch(options: LaunchOptions) -> int:
         _print_args(resolved_arg_docs(files[-1], options.args, packages))
         return 0
 
-    sources = [Source(file, None if text is None else text.encode(), options.args) for file in files]
+    sources = [LaunchSource(file, None if text is None else text.encode(), options.args) for file in files]
     if options.check:
         return _check(sources, packages)
     spec = load_sources(sources, packages)
@@ -327,7 +327,7 @@ def _print_args(args: list[ArgDoc]) -> None:
         print("No arguments.")
 
 
-def _check(sources: list[Source], packages: Packages) -> int:
+def _check(sources: list[LaunchSource], packages: Packages) -> int:
     """Print every fault and warning of the files, in the order of their lines."""
     from minirospy.launch.check import find_problems, problem_line
 

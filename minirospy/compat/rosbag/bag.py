@@ -29,7 +29,7 @@ from minirospy.compat.rosbag.exceptions import (
     raise_as_ros,
 )
 from minirospy.compat.rosbag.internals import _ConnectionInfo, _get_message_type
-from minirospy.compat.rosbag.opening import CLOSED, OpenedBag, Source
+from minirospy.compat.rosbag.opening import CLOSED, FileArgument, OpenedBag
 from minirospy.compat.rosbag.private import (
     BagMessage,
     BagMessageWithConnectionHeader,
@@ -96,7 +96,7 @@ class Bag(OpenedBag):
 
     def __init__(
         self,
-        f: Source,
+        f: FileArgument,
         mode: str = "r",
         compression: str = Compression.NONE,
         chunk_threshold: int = 768 * 1024,

@@ -16,9 +16,9 @@ from minirospy.compat.rosbag.exceptions import ROSBagException, ROSBagUnindexedE
 from minirospy.compat.rosbag.private import PrivateBag
 from minirospy.errors import BagUnindexedError
 
-__all__ = ["CLOSED", "OpenedBag", "Source"]
+__all__ = ["CLOSED", "FileArgument", "OpenedBag"]
 
-Source: TypeAlias = str | os.PathLike[str] | BinaryIO
+FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
 """What a bag is read from or written to: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
@@ -51,7 +51,7 @@ class OpenedBag(PrivateBag):
                 reader.connections.setdefault(connection.id, connection)
         return reader
 
-    def _open_read(self, f: Source, allow_unindexed: bool) -> None:
+    def _open_read(self, f: FileArgument, allow_unindexed: bool) -> None:
         stream = self._file = self._take(f, "rb")
         position = stream.tell()
         self._version = read_version(stream)
@@ -65,14 +65,14 @@ class OpenedBag(PrivateBag):
                 stream.seek(position)
                 self._reader = unindexed_bag12(stream)
 
-    def _open_write(self, f: Source, allow_unindexed: bool) -> None:
+    def _open_write(self, f: FileArgument, allow_unindexed: bool) -> None:
         self._file = self._take(f, "w+b")
         self._version = 200
         self._writer = BagWriter(
             self._file, compression=self._compression, chunk_threshold=self._chunk_threshold
         )
 
-    def _open_append(self, f: Source, allow_unindexed: bool) -> None:
+    def _open_append(self, f: FileArgument, allow_unindexed: bool) -> None:
         if isinstance(f, (str, os.PathLike)) and not os.path.exists(f):
             self._open_write(f, allow_unindexed)
             return

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from minirospy.compat.roslaunch.core import RLException
 from minirospy.errors import MinirospyError
-from minirospy.launch.load import STDIN, Source, load_sources
+from minirospy.launch.load import STDIN, LaunchSource, load_sources
 from minirospy.launch.spec import LaunchSpec
 from minirospy.workspace.packages import Packages
 
@@ -43,15 +43,15 @@ class XmlLoader:
         verbose: bool = True,
     ) -> None:
         """Load a file, its args given as ``["name:=value", ...]``. Raises XmlParseException."""
-        self._load(Source(filename, None, assignments(argv or ())), ros_config)
+        self._load(LaunchSource(filename, None, assignments(argv or ())), ros_config)
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
         """Load a text. Raises XmlParseException."""
-        self._load(Source(STDIN, xml_text.encode(), {}), ros_config)
+        self._load(LaunchSource(STDIN, xml_text.encode(), {}), ros_config)
 
-    def _load(self, source: Source, config: Configuration) -> None:
+    def _load(self, source: LaunchSource, config: Configuration) -> None:
         try:
             config.add(load_sources([source], self._packages))
         except MinirospyError as error:

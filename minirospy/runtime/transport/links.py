@@ -354,7 +354,7 @@ def read_frames(
     ``size.newest``: of what is ready when the thread reads, only so many frames, the newest, are
     delivered (0: all), so that a slow receiver sees the present. Raises OSError or WireError.
     """
-    source = _Source(sock, readers)
+    source = _FrameSource(sock, readers)
     try:
         sock.setblocking(True)
         with contextlib.suppress(_Ended):
@@ -398,7 +398,7 @@ def watch_frames(
     loop.add_reader(sock, readable)
 
 
-class _Source:
+class _FrameSource:
     """Frames off a blocking socket: small ones by the bufferful, each large one in its own memory."""
 
     def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
@@ -491,7 +491,7 @@ class _Source:
 
 
 def _deliver_newest(
-    source: _Source, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
+    source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
     """Read on while something is ready, then deliver the newest frames."""
     kept: deque[Frame] = deque(maxlen=newest)
