@@ -7,7 +7,7 @@ import contextlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.errors import MinirospyError, RpcError, WireError
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
@@ -146,7 +146,7 @@ def _described(name: str, header: Mapping[str, str]) -> ServiceInfo | None:
 
     type_ = header.get("type", "")
     try:
-        found: Any = get_service_class(type_)
+        found = get_service_class(type_)
     except (MinirospyError, ImportError, SyntaxError):
         return None
     if found is None or header.get("md5sum") not in (ANY, found._md5sum):

@@ -300,7 +300,7 @@ class PublishedTopic(SharedTopic):
                 raise self._refused(message, again) from None
         return pieces.frame()
 
-    def _refused(self, message: Any, error: SerializationError) -> ROSSerializationException:
+    def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
         """Return the error of a message that does not fit its type: rospy's words, then where it was published."""
         where = f"topic {self.resolved_name}, type {message._type}"
         return ROSSerializationException(f"{error}\n({where})")

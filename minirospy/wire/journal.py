@@ -52,7 +52,7 @@ def pack_in_steps(value: object) -> Iterator[bytes]:
     yield packer.bytes()
 
 
-def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
+def _pack_in_steps(value: Any, packer: msgpack.Packer) -> Iterator[bytes]:
     if type(value) is list:
         packer.pack_array_header(len(value))
         items: Iterable[object] = value
@@ -75,7 +75,7 @@ def _pack_in_steps(value: Any, packer: Any) -> Iterator[bytes]:
             yield _taken(packer)
 
 
-def _pack_long(value: str | bytes, packer: Any) -> Iterator[bytes]:
+def _pack_long(value: str | bytes, packer: msgpack.Packer) -> Iterator[bytes]:
     yield _taken(packer)
     size = len(value)
     if isinstance(value, str) and not value.isascii():
@@ -96,7 +96,7 @@ def _encoded(value: str | bytes) -> bytes:
     return value.encode() if isinstance(value, str) else value
 
 
-def _taken(packer: Any) -> bytes:
+def _taken(packer: msgpack.Packer) -> bytes:
     data: bytes = packer.bytes()
     packer.reset()
     return data

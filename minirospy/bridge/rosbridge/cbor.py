@@ -53,7 +53,7 @@ def decode_cbor(data: bytes) -> object:
     return value
 
 
-def typed_array(type_: str, values: Sequence[Any]) -> object:
+def typed_array(type_: str, values: Sequence[float]) -> object:
     """Return the tagged bytes of an array of numbers."""
     tag, format_ = TYPED_ARRAYS[type_]
     packed = array(format_, values)

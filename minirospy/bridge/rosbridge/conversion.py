@@ -17,7 +17,7 @@ from typing import Any
 from minirospy.bridge.rosbridge.cbor import TYPED_ARRAYS, typed_array
 from minirospy.errors import BridgeProtocolError
 from minirospy.idl.protocols import Message
-from minirospy.times import Time
+from minirospy.times import Duration, Time
 
 __all__ = ["ConversionError", "cbor_values", "fill", "request_values", "values"]
 
@@ -108,7 +108,7 @@ def _same(found: object) -> object:
     return found
 
 
-def _base64(found: Any) -> str:
+def _base64(found: bytes | Sequence[int]) -> str:
     return base64.b64encode(found if isinstance(found, bytes) else bytes(found)).decode()
 
 
@@ -123,7 +123,7 @@ def _floats(found: Sequence[float]) -> list[float | None]:
     return [each if math.isfinite(each) else None for each in found]
 
 
-def _time(found: Any) -> dict[str, int]:
+def _time(found: Time | Duration) -> dict[str, int]:
     return {"secs": found.secs, "nsecs": found.nsecs}
 
 
@@ -163,7 +163,7 @@ def _fill(
 
 
 def _from_value(
-    value: Any, type_: str, root: str, path: tuple[str, ...], present: Any, now: Callable[[], Time]
+    value: object, type_: str, root: str, path: tuple[str, ...], present: object, now: Callable[[], Time]
 ) -> object:
     if array := _ARRAY.match(type_):
         return _from_array(value, type_, array[1], root, path, now)
@@ -178,7 +178,7 @@ def _from_value(
 
 
 def _from_array(
-    value: Any, type_: str, element: str, root: str, path: tuple[str, ...], now: Callable[[], Time]
+    value: object, type_: str, element: str, root: str, path: tuple[str, ...], now: Callable[[], Time]
 ) -> object:
     if element in _BYTES:
         return _from_bytes(value, type_, root, path)
@@ -193,7 +193,7 @@ def _from_array(
     return [_from_value(each, element, root, path, make(), now) for each in value]
 
 
-def _from_bytes(value: Any, type_: str, root: str, path: tuple[str, ...]) -> bytes:
+def _from_bytes(value: object, type_: str, root: str, path: tuple[str, ...]) -> bytes:
     try:
         if isinstance(value, str):
             return base64.b64decode(value)
@@ -207,7 +207,7 @@ def _from_bytes(value: Any, type_: str, root: str, path: tuple[str, ...]) -> byt
 
 
 def _from_time(
-    value: Any, type_: str, root: str, path: tuple[str, ...], present: Any, now: Callable[[], Time]
+    value: object, type_: str, root: str, path: tuple[str, ...], present: object, now: Callable[[], Time]
 ) -> object:
     if type_ == "time" and value == "now":
         return now()
@@ -222,9 +222,8 @@ def _from_time(
     return present
 
 
-def _maker(type_: str) -> Callable[[], Any]:
+def _maker(type_: str) -> Callable[[], object]:
     from minirospy.idl.load import message_class
-    from minirospy.times import Duration
 
     return Time if type_ == "time" else Duration if type_ == "duration" else message_class(type_)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.raw import service_header
@@ -82,7 +82,7 @@ class ClientService:
             raise
         future.set_result(response)
 
-    async def _handle(self, request: Any) -> Message:
+    async def _handle(self, request: Message) -> Message:
         id_ = f"service_request:{self.name}:{next(self._ids)}"
         future = self._waiting[id_] = asyncio.get_running_loop().create_future()
         self.session.send(protocol.service_call(self.name, conversion.values(request), id_))
