@@ -215,9 +215,11 @@ class Publisher(Handle, Generic[_M_co]):
 
     async def _wait_for_expected(self) -> None:
         await self
-        assert self._state
+        state = self._state
+        if state is None:
+            return  # closed while it was registered
         with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
-            await asyncio.wait_for(self._wait_for(self._state.publication.expected), _JOIN_SECONDS)
+            await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
 
 
 class SubscribedTopic:

@@ -1,0 +1,48 @@
+"""The ROS side that clients share: what is ended while it starts, and what ends while it waits."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+import pytest
+from std_msgs.msg import String
+
+from minirospy.bridge.graph import SharedGraph
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from tests.bridge.conftest import Running
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running, turns: int) -> None:
+    async def advertise_and_close() -> None:
+        graph = bridge.bridge.graph
+        publication = graph.advertise("/short", InterfaceType.of(String))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        publication.close()
+        # Raises what a task has raised.
+        await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
+        assert "/short" not in graph.node._published
+
+    bridge.run(advertise_and_close())
+
+
+@pytest.mark.parametrize("turns", range(6))
+def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns: int) -> None:
+    """In one of these turns asyncio.wait_for before Python 3.12 swallows the cancelling: the event has come with it."""
+
+    async def look_and_close() -> None:
+        graph = SharedGraph(bridge.bridge.node, slowest_look=60.0)
+        looked = asyncio.Event()
+        graph.watch(lambda _: looked.set())
+        await looked.wait()
+        await asyncio.sleep(0)
+        graph.look_soon()
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        await asyncio.wait_for(graph.close(), 10)
+
+    bridge.run(look_and_close())
