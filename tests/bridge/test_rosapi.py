@@ -137,7 +137,7 @@ def test_types_are_described(api: Callable[..., Any]) -> None:
     assert api("service_request_details", type="std_srvs/SetBool")["typedefs"][0]["fieldtypes"] == ["bool"]
     response = api("service_response_details", type="std_srvs/SetBool")["typedefs"][0]
     assert response["fieldnames"] == ["success", "message"]
-    assert "Unable to import msg class Thing from package nowhere_msgs" in api(
+    assert "Unable to load the manifest for package nowhere_msgs" in api(
         "message_details", type="nowhere_msgs/Thing"
     )
 

@@ -213,7 +213,9 @@ class RosbridgeSession:
             self._failed(event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
-        self.status(StatusLevel.ERROR, f"{_OPERATIONS[type(event)]}: {error}", event.id)
+        # rosbridge names the operation where it did not report the fault itself.
+        front = "" if isinstance(error, OperationError) else f"{_OPERATIONS[type(event)]}: "
+        self.status(StatusLevel.ERROR, f"{front}{error}", event.id)
 
     def _spawn(self, work: _Work) -> asyncio.Task[None]:
         task = self._graph.spawn(work)
@@ -397,8 +399,8 @@ class RosbridgeSession:
     def _unadvertise_service(self, event: protocol.UnadvertiseService) -> _Work:
         service = self._own_service(event.service)
         if service is None:
-            raise BridgeError(
-                f"Service {event.service} has not been advertised via rosbridge, can't unadvertise."
+            raise OperationError(
+                f"Service {event.service} has not been advertised via rosbridge, can't unadvertise.", event.id
             )
         del self._door.services[event.service]
         self.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
@@ -407,7 +409,7 @@ class RosbridgeSession:
     def _service_response(self, event: protocol.ServiceResponse) -> None:
         service = self._own_service(event.service)
         if service is None:
-            raise BridgeError(f"Service {event.service} has not been advertised via rosbridge.")
+            raise OperationError(f"Service {event.service} has not been advertised via rosbridge.", event.id)
         service.answered(event)
 
     def _own_service(self, name: str) -> ClientService | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+
 from minirospy.errors import BridgeError, MinirospyError
 from minirospy.idl.load import class_from_text, get_message_class, get_service_class
 from minirospy.idl.protocols import Message, ServiceClass
@@ -40,9 +42,17 @@ def _unknown(name: str, kind: str, why: str) -> UnknownTypeError:
     package, _, short = name.partition("/")
     if not package or not short or "/" in short:
         return UnknownTypeError(f"{name[:200]} is not a valid type string")
+    if not _is_installed(package):
+        return UnknownTypeError(
+            f"Unable to load the manifest for package {package[:200]}. Caused by: {package[:200]}"
+        )
     return UnknownTypeError(
         f"Unable to import {kind} class {short[:200]} from package {package[:200]}. Caused by {why}"
     )
+
+
+def _is_installed(package: str) -> bool:
+    return package.isidentifier() and importlib.util.find_spec(package) is not None
 
 
 class ArrivingTypes:
