@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rosapi.msg import TypeDef
@@ -40,6 +40,7 @@ from rosapi.srv import (
 
 from minirospy.aio.node import Node
 from minirospy.aio.raw import service_header
+from minirospy.aio.services import Service, ServiceClass
 from minirospy.bridge.graph import Filters
 from minirospy.bridge.rosapi.typedefs import TypeDefinition, describe
 from minirospy.bridge.rosbridge.types import message_class, service_class
@@ -48,7 +49,31 @@ from minirospy.idl.protocols import Message
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.wire.tcpros import ANY
 
+if TYPE_CHECKING:
+    from rosapi.srv import (
+        DeleteParamRequest,
+        GetParamRequest,
+        HasParamRequest,
+        MessageDetailsRequest,
+        NodeDetailsRequest,
+        PublishersRequest,
+        SearchParamRequest,
+        ServiceHostRequest,
+        ServiceNodeRequest,
+        ServiceProvidersRequest,
+        ServiceRequestDetailsRequest,
+        ServiceResponseDetailsRequest,
+        ServicesForTypeRequest,
+        ServiceTypeRequest,
+        SetParamRequest,
+        SubscribersRequest,
+        TopicsForTypeRequest,
+        TopicTypeRequest,
+    )
+
 __all__ = ["Rosapi"]
+
+_Handler = Callable[[Any], Awaitable[object]]
 
 _PROBES = 8
 _ACTION_TOPICS = ("cancel", "feedback", "goal", "result", "status")
@@ -61,8 +86,8 @@ class Rosapi:
         self.node = node
         self._filters = filters or Filters()
         self._probing = asyncio.Semaphore(_PROBES)
-        self._served: list[Any] = []
-        self._offers: dict[str, tuple[Any, Callable[[Any], Awaitable[object]]]] = {
+        self._served: list[Service] = []
+        self._offers: dict[str, tuple[ServiceClass[Message, Message], _Handler]] = {
             "topics": (Topics, self._topics),
             "topics_for_type": (TopicsForType, self._topics_for_type),
             "topics_and_raw_types": (TopicsAndRawTypes, self._topics_and_raw_types),
@@ -116,29 +141,29 @@ class Rosapi:
         topics = sorted(types, key=lambda topic: (not types[topic], topic))
         return topics, [types[topic] for topic in topics]
 
-    async def _topics(self, _: Any) -> object:
+    async def _topics(self, _: object) -> object:
         return await self._typed_topics()
 
-    async def _topics_for_type(self, request: Any) -> object:
+    async def _topics_for_type(self, request: TopicsForTypeRequest) -> object:
         topics, types = await self._typed_topics()
         return {
             "topics": [topic for topic, type_ in zip(topics, types, strict=True) if type_ == request.type]
         }
 
-    async def _topics_and_raw_types(self, _: Any) -> object:
+    async def _topics_and_raw_types(self, _: object) -> object:
         topics, types = await self._typed_topics()
         return topics, types, [_text_of(type_) for type_ in types]
 
-    async def _topic_type(self, request: Any) -> object:
+    async def _topic_type(self, request: TopicTypeRequest) -> object:
         return {"type": _known((await self._graph()).types.get(self.node.resolve(request.topic)))}
 
-    async def _publishers(self, request: Any) -> object:
+    async def _publishers(self, request: PublishersRequest) -> object:
         return {"publishers": (await self._graph()).publishers.get(request.topic, ())}
 
-    async def _subscribers(self, request: Any) -> object:
+    async def _subscribers(self, request: SubscribersRequest) -> object:
         return {"subscribers": (await self._graph()).subscribers.get(request.topic, ())}
 
-    async def _action_servers(self, _: Any) -> object:
+    async def _action_servers(self, _: object) -> object:
         topics = (await self._graph()).topics
         names = {topic.rpartition("/")[0] for topic in topics if topic.count("/") > 1}
         servers = [name for name in names if all(f"{name}/{part}" in topics for part in _ACTION_TOPICS)]
@@ -161,25 +186,25 @@ class Rosapi:
         types = await asyncio.gather(*(self._type_of(name) for name in services))
         return [each for each, found in zip(services.items(), types, strict=True) if found == type_]
 
-    async def _services(self, _: Any) -> object:
+    async def _services(self, _: object) -> object:
         return {"services": sorted((await self._graph()).services)}
 
-    async def _services_for_type(self, request: Any) -> object:
+    async def _services_for_type(self, request: ServicesForTypeRequest) -> object:
         return {"services": [name for name, _ in await self._services_of(request.type)]}
 
-    async def _service_type(self, request: Any) -> object:
+    async def _service_type(self, request: ServiceTypeRequest) -> object:
         return {"type": await self._type_of(self.node.resolve(request.service))}
 
-    async def _service_providers(self, request: Any) -> object:
+    async def _service_providers(self, request: ServiceProvidersRequest) -> object:
         """``service`` is a type, in spite of its name."""
         found = await self._services_of(request.service)
         return {"providers": [node for _, nodes in found for node in nodes]}
 
-    async def _service_node(self, request: Any) -> object:
+    async def _service_node(self, request: ServiceNodeRequest) -> object:
         nodes = (await self._graph()).services.get(self.node.resolve(request.service), ())
         return {"node": nodes[0] if nodes else ""}
 
-    async def _service_host(self, request: Any) -> object:
+    async def _service_host(self, request: ServiceHostRequest) -> object:
         try:
             uri = await self.node._node.master("lookupService", self.node.resolve(request.service))
         except RpcRefused:
@@ -188,28 +213,28 @@ class Rosapi:
 
     # --- nodes and types
 
-    async def _nodes(self, _: Any) -> object:
+    async def _nodes(self, _: object) -> object:
         graph = await fetch(self.node._node.master)
         tables = (graph.publishers, graph.subscribers, graph.services)
         return {"nodes": sorted({node for table in tables for nodes in table.values() for node in nodes})}
 
-    async def _node_details(self, request: Any) -> object:
+    async def _node_details(self, request: NodeDetailsRequest) -> object:
         graph = await self._graph()
         tables = (graph.subscribers, graph.publishers, graph.services)
         return [sorted(name for name, nodes in table.items() if request.node in nodes) for table in tables]
 
-    async def _message_details(self, request: Any) -> object:
+    async def _message_details(self, request: MessageDetailsRequest) -> object:
         return _typedefs(message_class(request.type))
 
-    async def _request_details(self, request: Any) -> object:
+    async def _request_details(self, request: ServiceRequestDetailsRequest) -> object:
         return _typedefs(service_class(request.type)._request_class)
 
-    async def _response_details(self, request: Any) -> object:
+    async def _response_details(self, request: ServiceResponseDetailsRequest) -> object:
         return _typedefs(service_class(request.type)._response_class)
 
     # --- parameters
 
-    async def _set_param(self, request: Any) -> object:
+    async def _set_param(self, request: SetParamRequest) -> object:
         if self._filters.parameters(request.name):
             try:
                 value = json.loads(request.value)
@@ -221,7 +246,7 @@ class Rosapi:
             await self.node.set_param(request.name, value)
         return {}
 
-    async def _get_param(self, request: Any) -> object:
+    async def _get_param(self, request: GetParamRequest) -> object:
         default: object = None
         if request.default:
             try:
@@ -232,34 +257,34 @@ class Rosapi:
             return {"value": "null"}
         return {"value": json.dumps(await self.node.get_param(request.name, default), default=str)}
 
-    async def _has_param(self, request: Any) -> object:
+    async def _has_param(self, request: HasParamRequest) -> object:
         allowed = self._filters.parameters(request.name)
         return {"exists": allowed and await self.node.has_param(request.name)}
 
-    async def _search_param(self, request: Any) -> object:
+    async def _search_param(self, request: SearchParamRequest) -> object:
         if not self._filters.parameters(request.name):
             return {"global_name": ""}
         return {"global_name": await self.node.search_param(request.name) or ""}
 
-    async def _delete_param(self, request: Any) -> object:
+    async def _delete_param(self, request: DeleteParamRequest) -> object:
         if self._filters.parameters(request.name) and await self.node.has_param(request.name):
             with contextlib.suppress(KeyError):
                 await self.node.delete_param(request.name)
         return {}
 
-    async def _get_param_names(self, _: Any) -> object:
+    async def _get_param_names(self, _: object) -> object:
         return {
             "names": [name for name in await self.node.get_param_names() if self._filters.parameters(name)]
         }
 
-    async def _get_time(self, _: Any) -> object:
+    async def _get_time(self, _: object) -> object:
         return {"time": self.node.now()}
 
 
-def _guarded(handler: Callable[[Any], Awaitable[object]]) -> Callable[[Any], Awaitable[object]]:
+def _guarded(handler: _Handler) -> _Handler:
     """Return a handler whose refusals reach the client as a line, not as a traceback in the log."""
 
-    async def handle(request: Any) -> object:
+    async def handle(request: object) -> object:
         try:
             return await handler(request)
         except BridgeError as error:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from geometry_msgs.msg import Quaternion, Transform, Vector3
+    from tf2_web_republisher.msg import TFSubscriptionGoal
+    from tf2_web_republisher.srv import RepublishTFsRequest
 
 __all__ = ["FramePair", "pairs_of"]
 
@@ -19,9 +24,9 @@ class FramePair:
 
         self._angle = angle
         self._distance = distance
-        self._sent: Any = None
+        self._sent: Transform | None = None
 
-    def is_to_be_sent(self, transform: Any) -> bool:
+    def is_to_be_sent(self, transform: Transform) -> bool:
         """Return whether a transform (geometry_msgs/Transform) differs enough from the last that was sent, and is then."""
         if not (
             self._sent is None
@@ -35,7 +40,7 @@ class FramePair:
         return True
 
 
-def pairs_of(request: Any) -> list[FramePair]:
+def pairs_of(request: TFSubscriptionGoal | RepublishTFsRequest) -> list[FramePair]:
     """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres."""
     target = request.target_frame.removeprefix("/")
     return [
@@ -44,11 +49,11 @@ def pairs_of(request: Any) -> list[FramePair]:
     ]
 
 
-def _distance(one: Any, other: Any) -> float:
+def _distance(one: Vector3, other: Vector3) -> float:
     return math.dist((one.x, one.y, one.z), (other.x, other.y, other.z))
 
 
-def _angle(one: Any, other: Any) -> float:
+def _angle(one: Quaternion, other: Quaternion) -> float:
     """Return the angle between two rotations as quaternions: half of that by which things turn, as the real node has it."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)

@@ -7,8 +7,14 @@ import itertools
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped
-from tf2_web_republisher.msg import TFArray, TFSubscriptionAction, TFSubscriptionGoal, TFSubscriptionResult
-from tf2_web_republisher.srv import RepublishTFs
+from tf2_web_republisher.msg import (
+    TFArray,
+    TFSubscriptionAction,
+    TFSubscriptionFeedback,
+    TFSubscriptionGoal,
+    TFSubscriptionResult,
+)
+from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
 
 from minirospy.actionlib.aio import ActionServer, ServerGoal
 from minirospy.aio.node import Node
@@ -57,7 +63,9 @@ class Republisher:
         await asyncio.gather(*self._requests, return_exceptions=True)
         await self._buffer.close()
 
-    async def _execute(self, goal: ServerGoal[TFSubscriptionGoal, Any]) -> TFSubscriptionResult:
+    async def _execute(
+        self, goal: ServerGoal[TFSubscriptionGoal, TFSubscriptionFeedback]
+    ) -> TFSubscriptionResult:
         """Send transforms as feedback until the client cancels the goal."""
         pairs, period = pairs_of(goal.request), _period(goal.request.rate)
         while True:
@@ -66,7 +74,7 @@ class Republisher:
                 await goal.publish_feedback(transforms=transforms)
             await self.node.sleep(period)
 
-    async def _republish(self, request: Any) -> object:
+    async def _republish(self, request: RepublishTFsRequest) -> object:
         """Publish transforms on a topic of the request's own until nobody subscribed to it for ``timeout``."""
         if len(self._requests) >= _MOST_REQUESTS:
             raise ServiceException(f"{_MOST_REQUESTS} requests are served: no more")
@@ -77,7 +85,7 @@ class Republisher:
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
 
-    async def _serve(self, request: Any, topic: str) -> None:
+    async def _serve(self, request: RepublishTFsRequest, topic: str) -> None:
         pairs, period = pairs_of(request), _period(request.rate)
         timeout = request.timeout.to_sec()
         loop = asyncio.get_running_loop()
