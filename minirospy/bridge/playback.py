@@ -58,7 +58,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge beside a player, on a loop of its own; a context manager. Raises BridgeError."""
+    """A bridge next to a player, on a separate loop; a context manager. Raises BridgeError."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)

@@ -135,7 +135,7 @@ class Player:
         latched = self._bags.last_latched(selection) if options.start else []
         self._span = first[1].time, last
         if self._on_ready:
-            # Its clock stands still until the playing starts.
+            # Its clock does not advance until the playing starts.
             self._schedule = Schedule(options._replace(paused=True), *self._span, time.perf_counter_ns())
             self._starts_paused = options.paused
             self._on_ready(*self._span)

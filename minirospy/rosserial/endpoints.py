@@ -136,7 +136,7 @@ class ServiceServer(_Service):
                     return self._responses.get(timeout=_LOOK_SECONDS)
                 except queue.Empty:
                     continue
-        raise rospy.ServiceException("the device is gone")
+        raise rospy.ServiceException("the device is disconnected")
 
     def handle(self, data: bytes) -> None:
         """Return the device's response to the caller."""

@@ -48,7 +48,7 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where the device is gone."""
+        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
 
     def close(self) -> None:
         """Close it."""
@@ -76,7 +76,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where the device is gone."""
+        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -156,7 +156,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None where none has come within that time. Raises DeviceError where the device is gone."""
+        """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()

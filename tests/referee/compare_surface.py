@@ -598,14 +598,14 @@ def main() -> int:
         described_by(REAL_PYTHON, "--private"), described_by(sys.executable, "--all-private")
     )
     pages = {
-        DOCS / "rospy_compatibility.md": page("rospy beside minirospy, name by name", ROSPY, real, ours),
+        DOCS / "rospy_compatibility.md": page("rospy and minirospy, name by name", ROSPY, real, ours),
         DOCS / "modules_compatibility.md": page(
-            "rosgraph, rosnode, rostopic and their kin beside minirospy, name by name", AROUND, real, ours
+            "rosgraph, rosnode, rostopic and their kin and minirospy, name by name", AROUND, real, ours
         )
         + "\n"
         + submodule_text,
         DOCS / "tf_compatibility.md": page(
-            "tf2_ros, tf and PyKDL beside minirospy, name by name", FRAMES, real, ours
+            "tf2_ros, tf and PyKDL and minirospy, name by name", FRAMES, real, ours
         ),
     }
     status = 0

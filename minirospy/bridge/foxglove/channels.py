@@ -42,12 +42,12 @@ class Channels:
             for topic in snapshot.publishers
             if snapshot.types.get(topic, ANY) != ANY
         }
-        gone = [
+        removed = [
             channel.id
             for topic, channel in self._by_topic.items()
             if wanted.get(topic) != self._declared[channel.id]
         ]
-        for id_ in gone:
+        for id_ in removed:
             self._remove(id_)
 
         new = []
@@ -57,7 +57,7 @@ class Channels:
             found = await graph.texts.of_topic(topic, declared, snapshot.publishers.get(topic, ()))
             type_ = found or InterfaceType(declared, ANY)
             new.append(self._add(topic, declared, type_))
-        return new, gone
+        return new, removed
 
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
         """Return the channel that replaces one whose publisher sends messages of another definition.
@@ -107,8 +107,8 @@ class Services:
         """Return the services that are new and the ids of those that are no more, after a look at the graph."""
         infos = (graph.service_types[name] for name in graph.snapshot.services)
         wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
-        gone = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]
-        for id_ in gone:
+        removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]
+        for id_ in removed:
             del self.infos[id_], self.by_id[id_]
 
         known = {info.name for info in self.infos.values()}
@@ -124,4 +124,4 @@ class Services:
                 )
                 self.by_id[offer.id], self.infos[offer.id] = offer, info
                 new.append(offer)
-        return new, gone
+        return new, removed

@@ -151,7 +151,7 @@ class FoxgloveDoor:
                 "%s: [%s] has another definition than the installed one", channel.topic, replaced.schema.name
             )
             for session in list(self.sessions):
-                session.channels_gone([channel.id])
+                session.channels_removed([channel.id])
                 session.send(protocol.advertise([replaced]))
 
     def playback_changed(self, state: PlaybackState) -> None:
@@ -195,17 +195,17 @@ class FoxgloveDoor:
         """Offer what is new and withdraw what has disappeared, until the graph is as it was when this started."""
         while self._is_outdated:
             self._is_outdated = False
-            new_services, gone_services = self.services.update(self.graph)
-            new, gone = await self.channels.update(self.graph)
+            new_services, removed_services = self.services.update(self.graph)
+            new, removed = await self.channels.update(self.graph)
             for session in list(self.sessions - self._waiting):
-                if gone:
-                    session.channels_gone(gone)
+                if removed:
+                    session.channels_removed(removed)
                 if new:
                     session.send(protocol.advertise(new))
                 if "services" not in self.capabilities_of(session.client):
                     continue
-                if gone_services:
-                    session.send(protocol.unadvertise_services(gone_services))
+                if removed_services:
+                    session.send(protocol.unadvertise_services(removed_services))
                 if new_services:
                     session.send(protocol.advertise_services(new_services))
 

@@ -102,7 +102,7 @@ class FoxgloveSession:
         """Send the time; only the last one waits."""
         self.client.send_message(_TIME, frame, b"", newest_only=True)
 
-    def channels_gone(self, ids: list[int]) -> None:
+    def channels_removed(self, ids: list[int]) -> None:
         """End the subscriptions of channels that are no more."""
         for subscription_id, (channel, listener) in list(self._subscriptions.items()):
             if channel.id in ids:

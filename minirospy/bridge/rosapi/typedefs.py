@@ -9,7 +9,6 @@ import inspect
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from minirospy.idl.protocols import Message
 
@@ -56,7 +55,7 @@ def _walk(
 
 
 def _described(class_: type[Message]) -> TypeDefinition:
-    instance: Any = class_()
+    instance = class_()
     found = TypeDefinition(_name_of(class_))
     for name, type_ in zip(instance.__slots__, instance._slot_types, strict=True):
         array = _ARRAY.match(type_)

@@ -315,8 +315,8 @@ class AnalyzerGroup:
         return any(analyzer.match(name) for analyzer in self._analyzers)
 
     def analyze(self, item: Item) -> bool:
-        taken = [analyzer.analyze(item) for analyzer in self._analyzers if analyzer.match(item.name)]
-        return any(taken)
+        matched = [analyzer.analyze(item) for analyzer in self._analyzers if analyzer.match(item.name)]
+        return any(matched)
 
     def report(self, now: float) -> list[DiagnosticStatus]:
         if not self._analyzers:

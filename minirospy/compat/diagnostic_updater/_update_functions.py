@@ -70,7 +70,7 @@ class FrequencyStatus(DiagnosticTask):
             self.hist_indx = (oldest + 1) % self.params.window_size
             total = self.count
 
-        # A simulated clock may stand still.
+        # A simulated clock may not have advanced.
         frequency = events / window if window else math.inf if events else 0.0
         lowest = self.params.freq_bound["min"] * (1 - self.params.tolerance)
         highest = self.params.freq_bound.get("max", math.inf) * (1 + self.params.tolerance)

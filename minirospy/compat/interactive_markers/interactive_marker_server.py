@@ -106,7 +106,7 @@ class InteractiveMarkerServer:
     ) -> bool:
         """Set what is called with feedback of a type, or with all feedback that has no function of its own.
 
-        None: nothing. Return whether there is such a marker. It holds at once.
+        None: nothing. Return whether there is such a marker. It takes effect immediately.
         """
         with self.mutex:
             found = [

@@ -47,7 +47,7 @@ class ManifestManager:
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
         """Return the one object for these folders."""
-        key: Any = cls
+        key: object = cls
         found = _instance(key, tuple(get_ros_paths() if ros_paths is None else ros_paths))
         assert isinstance(found, cls)
         return found

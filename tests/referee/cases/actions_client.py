@@ -1,4 +1,4 @@
-"""ActionClient: several goals at a time, their handles, who is told of what; a handle that is dropped."""
+"""ActionClient: several goals at a time, their handles, which callbacks are called; a handle that is dropped."""
 
 import gc
 

@@ -49,7 +49,7 @@ def tell(made):
     )
 
 
-# Real actionlib names PENDING wrongly in one line of the log; LOST is no state that a machine gets into.
+# Real actionlib names PENDING wrongly in one line of the log; LOST is not a state that a machine gets into.
 STATES = range(8)
 for state in STATES:
     for status in range(10):

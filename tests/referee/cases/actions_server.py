@@ -1,4 +1,4 @@
-"""ActionServer: what it calls, and what it tells of each goal, by hand on the topics."""
+"""ActionServer: what it calls, and what it publishes of each goal, by hand on the topics."""
 
 import actionlib
 import rospy

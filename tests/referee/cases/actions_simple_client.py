@@ -1,4 +1,4 @@
-"""SimpleActionClient: its state and its callbacks, by a server by hand that tells every status and result."""
+"""SimpleActionClient: its state and its callbacks, with a server by hand that publishes every status and result."""
 
 import actionlib
 import rospy

@@ -1,4 +1,4 @@
-"""Parameters of a server: how long it tells of goals that ended, how often it tells; queue sizes."""
+"""Parameters of a server: how long it reports goals that ended, how often it reports; queue sizes."""
 
 import time
 

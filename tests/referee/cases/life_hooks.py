@@ -1,4 +1,4 @@
-"""The order of shutdown hooks, what they may do, and what they are told."""
+"""The order of shutdown hooks, what they may do, and their arguments."""
 
 import sys
 import threading

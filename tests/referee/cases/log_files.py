@@ -1,4 +1,4 @@
-"""Log files: where they are, what stands in them, the link to the latest."""
+"""Log files: where they are, what they contain, the link to the latest."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""A program's own handlers, and loggers of Python's, beside rospy's."""
+"""A program's own handlers, and loggers of Python's, next to rospy's."""
 
 import logging
 

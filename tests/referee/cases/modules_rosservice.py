@@ -1,4 +1,4 @@
-"""rosservice as programs that call services by name use it; the program is no node before."""
+"""rosservice as programs that call services by name use it; the program is not a node before."""
 
 import contextlib
 import io

@@ -14,7 +14,7 @@ listening = socket.create_server(("127.0.0.1", 0))
 port = listening.getsockname()[1]
 rosgraph.Master("/other").registerService("/s", f"rosrpc://localhost:{port}", "http://localhost:1/")
 MD5 = SetBool._md5sum
-told = []
+received = []
 
 
 def packed(text):
@@ -45,7 +45,7 @@ def serve(answers):
             (length,) = struct.unpack("<I", body[:4])
             fields.append(body[4 : 4 + length].decode())
             body = body[4 + length :]
-        told.append(sorted(fields))
+        received.append(sorted(fields))
         sock.sendall(greeting)
         for reply in replies:
             receive(sock, struct.unpack("<I", receive(sock, 4))[0])
@@ -58,14 +58,14 @@ yes = b"\x01" + packed(b"\x01" + packed(b"fine"))
 
 
 def case(label, answers, calls=None, **kwds):
-    told.clear()
+    received.clear()
     thread = threading.Thread(target=serve, args=(answers,))
     thread.start()
     proxy = rospy.ServiceProxy("/s", SetBool, **kwds)
     for call in calls or [lambda p: p(True)]:
         outcome(label, lambda: call(proxy))
     thread.join()
-    for fields in told:
+    for fields in received:
         show("   told", fields)
 
 

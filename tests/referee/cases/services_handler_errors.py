@@ -1,4 +1,4 @@
-"""Handlers that raise: what the client is told, what the server logs, what error_handler is given."""
+"""Handlers that raise: what the client receives, what the server logs, what error_handler is given."""
 
 import logging
 
@@ -70,13 +70,13 @@ def on_error(e, exception_type, exception_value, tb):
     show("told", repr(e), exception_type.__name__, repr(exception_value), type(tb).__name__)
 
 
-told = rospy.Service("told", Trigger, raises(ValueError("bad")), error_handler=on_error)
+offered = rospy.Service("told", Trigger, raises(ValueError("bad")), error_handler=on_error)
 outcome("the client", rospy.ServiceProxy("told", Trigger))
-told_none = rospy.Service("told_none", Trigger, lambda request: None, error_handler=on_error)
+offered_none = rospy.Service("told_none", Trigger, lambda request: None, error_handler=on_error)
 outcome("None", rospy.ServiceProxy("told_none", Trigger))
-told_wrong = rospy.Service("told_wrong", Trigger, lambda request: [1, 2], error_handler=on_error)
+offered_wrong = rospy.Service("told_wrong", Trigger, lambda request: [1, 2], error_handler=on_error)
 outcome("wrong", rospy.ServiceProxy("told_wrong", Trigger))
-told_service = rospy.Service(
+offered_service = rospy.Service(
     "told_service", Trigger, raises(rospy.ServiceException("s")), error_handler=on_error
 )
 outcome("ServiceException", rospy.ServiceProxy("told_service", Trigger))

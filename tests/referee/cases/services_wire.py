@@ -57,7 +57,7 @@ def connect(label, **fields):
     sock = socket.create_connection((address[0], int(address[1])), 5)
     sock.sendall(header(**fields))
     try:
-        # roscpp's fields beside rospy's do no harm.
+        # roscpp's fields next to rospy's do no harm.
         found = fields_of(sock)
         show(
             label,

@@ -40,7 +40,7 @@ show(rospy.rostime.is_rostime_initialized(), rospy.Time.now() > rospy.Time(0))
 rospy.init_node("case", argv=[])
 show(rospy.client._init_node_args, rospy.rostime._rostime_initialized, rospy.rostime._rostime_current)
 
-# A service, as its manager tells of it.
+# A service, as its manager reports it.
 service = rospy.Service("x", Empty, lambda request: {})
 manager = get_service_manager()
 show(isinstance(manager, ServiceManager), sorted(name for name, _ in manager.get_services()))
@@ -105,7 +105,7 @@ show("mine" in caller.get_loggers("case"))
 outcome("loggers", lambda: caller.get_loggers("/nobody"))
 show(issubclass(ROSConsoleException, Exception))
 
-# Parameters that the node keeps, and what the master tells of them.
+# Parameters that the node keeps, and what the master reports of them.
 kept = rospy.impl.paramserver.get_param_server_cache()
 show(kept is rospy.impl.paramserver.get_param_server_cache())
 try:
@@ -114,14 +114,14 @@ except KeyError:
     show("not kept yet")
 rospy.set_param("/p", 1)
 show(rospy.get_param_cached("/p"), kept.get("/p"))
-told = []
-kept.set_notifier(lambda key, value: told.append((key, value)))
+notified = []
+kept.set_notifier(lambda key, value: notified.append((key, value)))
 master = rospy.core.xmlrpcapi(__import__("os").environ["ROS_MASTER_URI"])
 master.setParam("/other", "/p", 5)
-show(eventually(lambda: told), told, kept.get("/p"))
-kept.update = lambda key, value: told.append(value)
+show(eventually(lambda: notified), notified, kept.get("/p"))
+kept.update = lambda key, value: notified.append(value)
 master.setParam("/other", "/p", 6)
-show(eventually(lambda: 6 in told))
+show(eventually(lambda: 6 in notified))
 
 # A hook that is taken back.
 rospy.on_shutdown(lambda: show("hook", rospy.core._in_shutdown, rospy.core._shutdown_flag))

@@ -92,10 +92,10 @@ for label, changes in {
     sock = socket.create_connection((host, port), 10)
     sock.sendall(header(**fields))
     try:
-        told = answer(sock)
-        told.pop("message_definition", None)
-        show(label, "|", *(f"{name}={value}" for name, value in sorted(told.items())))
-        if "error" in told:
+        reply = answer(sock)
+        reply.pop("message_definition", None)
+        show(label, "|", *(f"{name}={value}" for name, value in sorted(reply.items())))
+        if "error" in reply:
             show(label, "then", sock.recv(1))
         else:
             show(label, "then", receive(sock, struct.unpack("<I", receive(sock, 4))[0]))
@@ -124,11 +124,16 @@ for nodelay in (False, True):
     subscriber = rospy.Subscriber("/from_outside", String, heard.append, tcp_nodelay=nodelay)
     server.settimeout(10)
     sock, _ = server.accept()
-    told = answer(sock)
+    reply = answer(sock)
     show(
-        "a Subscriber sends", sorted(told), told["tcp_nodelay"], told["topic"], told["type"], told["callerid"]
+        "a Subscriber sends",
+        sorted(reply),
+        reply["tcp_nodelay"],
+        reply["topic"],
+        reply["type"],
+        reply["callerid"],
     )
-    show("its definition", repr(told["message_definition"]))
+    show("its definition", repr(reply["message_definition"]))
     show("it asked", asked.pop())
     sock.sendall(header(md5sum=MD5, type="std_msgs/String") + struct.pack("<II", 5, 1) + b"a")
     show("received", eventually(lambda: len(heard) == 1), heard[0].data)

@@ -1,4 +1,4 @@
-"""SubscribeListener: who is told of subscribers that come and go, and what the two publish functions do."""
+"""SubscribeListener: which listeners are notified of subscribers that come and go, and what the two publish functions do."""
 
 import threading
 
@@ -15,19 +15,19 @@ sys.stdin.read()
 """
 
 rospy.init_node("case", argv=[])
-told = []
+notified = []
 changed = threading.Condition()
 
 
 def tell(*what):
     with changed:
-        told.append(what)
+        notified.append(what)
         changed.notify_all()
 
 
 def wait(count):
     with changed:
-        return changed.wait_for(lambda: len(told) >= count, 10)
+        return changed.wait_for(lambda: len(notified) >= count, 10)
 
 
 class Listener(rospy.SubscribeListener):
@@ -42,34 +42,34 @@ class Listener(rospy.SubscribeListener):
 publisher = rospy.Publisher("/told", String, Listener(), queue_size=10)
 first = Other(LISTENER, "/told")
 wait(1)
-show(told, publisher.get_num_connections())
+show(notified, publisher.get_num_connections())
 show("first", first.read())
 second = Other(LISTENER, "/told")
 wait(2)
-show(told, publisher.get_num_connections())
+show(notified, publisher.get_num_connections())
 show("second", second.read())
 publisher.publish("for all")
 show(first.read(), second.read())
 first.close()
 wait(3)
-show(told[2:], publisher.get_num_connections())
+show(notified[2:], publisher.get_num_connections())
 
 other = rospy.Publisher("/told", String, Listener(), queue_size=10)
 third = Other(LISTENER, "/told")
 wait(5)
-show("two listeners", told[3:])
+show("two listeners", notified[3:])
 show(third.read(), third.read())
 other.unregister()
 second.close()
 wait(6)
-show("one Publisher is gone", len(told) >= 6, told[5])
+show("one Publisher is gone", len(notified) >= 6, notified[5])
 third.close()
-del told[:]
+del notified[:]
 show("nobody", eventually(lambda: publisher.get_num_connections() == 0))
 
 
 class Whole(rospy.SubscribeListener):
-    """Uses the other function, and tells nobody that peers go."""
+    """Uses the other function, and reports to nobody that peers go."""
 
     def peer_subscribe(self, topic_name, topic_publish, peer_publish):
         topic_publish(String("welcome, all"))

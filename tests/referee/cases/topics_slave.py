@@ -1,4 +1,4 @@
-"""The Slave API of a node with topics: what tools are told of its connections, and what bad calls are answered."""
+"""The Slave API of a node with topics: what it reports of its connections to tools, and what bad calls are answered."""
 
 import os
 import re
