@@ -57,7 +57,7 @@ import sys
 
 if {root!r} not in sys.path:
     sys.path.insert(1, {root!r})
-__path__.insert(0, {folder!r})
+__path__.append({folder!r})  # what is generated is found first, as in ROS
 """
 _RELAY_RUN = """__file__ = {file!r}
 with open(__file__, "rb") as _source:

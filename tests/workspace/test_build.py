@@ -182,6 +182,19 @@ def test_python_and_messages_in_one_package(scene: Scene) -> None:
     assert python(scene, "import both; print(both.A(a=2).a, both.MORE)") == "2 1\n"
 
 
+def test_generated_modules_come_before_a_source_folder_of_their_name(scene: Scene) -> None:
+    folder = scene.messages("both", {"msg/A.msg": "int8 a\n"})
+    (folder / "setup.py").write_text(SETUP.format("packages=['both'], package_dir={'': 'src'}"))
+    for name in ("both/__init__.py", "both/msg/__init__.py"):
+        file = folder / "src" / name
+        file.parent.mkdir(parents=True)
+        file.touch()
+    cmake = folder / "CMakeLists.txt"
+    cmake.write_text(cmake.read_text().replace("add_message", "catkin_python_setup()\nadd_message"))
+    scene.build()
+    assert python(scene, "from both.msg import A; print(A(a=2).a)") == "2\n"
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -637,6 +650,17 @@ def test_the_command(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
 
     assert catkin_make(["-C", str(scene.root), "clean"]) == 0
     assert not scene.devel.exists()
+
+
+def test_what_is_built_is_usable_beside_a_faulty_package(
+    scene: Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    scene.messages("much_later_msgs", {"msg/Bad.msg": "int65 number\n"})
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    assert "Bad.msg:1" in capsys.readouterr().err
+    assert (scene.devel / "setup.bash").is_file()
+    assert python(scene, "from led_msgs.msg import Led; print(Led(number=3).number)") == "3\n"
 
 
 def test_variables_of_cmake(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:

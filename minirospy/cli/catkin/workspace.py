@@ -77,8 +77,9 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    build(workspace, plans, Packages(), only or None, show)
+    # As in catkin, which configures first: what is built is usable where another package has a fault.
     write_set_up(workspace.devel, (workspace.source,))
+    build(workspace, plans, Packages(), only or None, show)
     if not plans:
         print(f"There are no packages in {workspace.source} yet")
     return plans
