@@ -97,6 +97,10 @@ class Substitution:
             raise SubstitutionError("[$(optenv)]: $(optenv VAR default) takes an environment variable")
         return self.environ.get(name, " ".join(default))
 
+    def _optenv_value(self, name: str, default: object = "") -> object:
+        """Return what ``optenv()`` of an expression is: the variable's text, else the default itself, which may be a number."""
+        return self.environ.get(name, default)
+
     def _anon(self, name: str) -> str:
         return self.anonymous.setdefault(name, names.anonymous_name(name))
 
@@ -111,7 +115,7 @@ class Substitution:
         functions: dict[str, object] = {
             "arg": lambda name: convert(self._arg(name), "auto"),
             "env": self._env,
-            "optenv": self._optenv,
+            "optenv": self._optenv_value,
             "find": lambda package: str(self.packages.find(package)),
             "anon": self._anon,
             "dirname": self._dirname,

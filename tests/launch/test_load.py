@@ -46,6 +46,8 @@ def test_the_workshops_file(packages: Packages) -> None:
         ('value="$(env HOME)/x"', "/home/me/x"),
         ('value="$(optenv NOPE a b)"', "a b"),
         ('value="$(eval 1 + 2 * 3)"', 7),
+        ("value=\"$(eval optenv('NOPE', 5) + 1)\"", 6),
+        ("value=\"$(eval optenv('NOPE', 0) and optenv('HOME', 1))\"", 0),
     ],
 )
 def test_param_values(packages: Packages, attributes: str, value: object) -> None:
