@@ -17,7 +17,17 @@ LAYERS = [
     {"launch"},
     {"bridge"},
     {"frames"},
-    {"introspect", "actionlib", "robots", "maps", "recording", "rosserial", "teleop", "topic_tools"},
+    {
+        "introspect",
+        "actionlib",
+        "robots",
+        "maps",
+        "recording",
+        "rosserial",
+        "teleop",
+        "topic_tools",
+        "turtlesim",
+    },
     {"workspace"},
     {"client", "aio", "rosout"},
     {"runtime"},
@@ -57,7 +67,7 @@ PURE_FILES = {
         "video/pictures.py",
         "web/queue.py",
     )
-}
+} | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
 FILES = sorted(
