@@ -1,6 +1,6 @@
-"""roslibpy, rosbridge's client in Python, with the bridge: topics, services, parameters, actions, transforms, images.
+"""roslibpy and roslib.js, rosbridge's clients in Python and JavaScript, with the bridge.
 
-It brings twisted and autobahn: it is installed once into an environment of its own, in the user's cache folder.
+roslibpy brings twisted and autobahn: it is installed once into an environment of its own, in the user's cache folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 from actionlib_tutorials.msg import FibonacciAction
 from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
@@ -26,8 +26,12 @@ from tf2_msgs.msg import TFMessage
 from minirospy import Node
 from minirospy.actionlib.aio import ActionServer
 from minirospy.bridge.bridge import Bridge, BridgeOptions
+from tests.interop.test_interop_foreign import modules
+
+__all__ = ["modules"]
 
 PEER = Path(__file__).parent / "roslibpy_peer.py"
+ROSLIB = Path(__file__).parent / "foreign" / "roslib_peer.mjs"
 RELEASE = "roslibpy==2.1.0"
 DATA = bytes(range(256)) * 3600
 
@@ -128,3 +132,38 @@ def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: 
         "tf": 1.5,
     }
     assert ours == ["hello", True, True, "from roslibpy"]
+
+
+def test_roslib_js_reads_every_compression(master: str, modules: Path) -> None:
+    async def run() -> dict[str, Any]:
+        async with Node("peer", rosout=False) as node, Node("bridge", rosout=False) as inner:
+            scans = await node.advertise("/latched_scan", LaserScan, latch=True)
+            await scans.publish(LaserScan(ranges=[1.5, 2.5]))
+            options = BridgeOptions(foxglove_port=None, rosbridge_port=0, diagnostics=False, rosapi=True)
+            bridge = Bridge(inner, options)
+            await bridge.start()
+            peer = await asyncio.create_subprocess_exec(
+                *("node", str(ROSLIB), str(bridge.listeners["rosbridge"].port)),
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+                env={**os.environ, "NODE_PATH": str(modules)},
+            )
+            try:
+                output, errors = await asyncio.wait_for(peer.communicate(), 90)
+            finally:
+                if peer.returncode is None:
+                    peer.kill()
+                    await peer.wait()
+                await bridge.close()
+            assert output, errors.decode()
+            found: dict[str, Any] = json.loads(output)
+            return found
+
+    assert asyncio.run(run()) == {
+        "none": [1.5, 2.5],
+        "png": [1.5, 2.5],
+        "cbor": [1.5, 2.5],
+        "cbor-raw": ["secs", "nsecs", "bytes"],
+        "topics": True,
+        "parameter": 2.5,
+    }
