@@ -5,12 +5,17 @@ Source: http://wiki.ros.org/ROS/Technical%20Overview ("Message serialization and
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable
 
 from minirospy.errors import DefinitionError
 from minirospy.idl.spec import MessageSpec, ServiceSpec
 from minirospy.idl.validate import MOST_LEVELS
+
+try:
+    # As hashlib without OpenSSL, whose loading takes 2 ms, and whose FIPS mode refuses MD5.
+    from _md5 import md5  # type: ignore[import-not-found]
+except ImportError:
+    from hashlib import md5
 
 __all__ = [
     "Lookup",
@@ -71,7 +76,8 @@ def joined_texts(text: str, needed: Iterable[tuple[str, str]]) -> str:
 
 
 def _md5(text: str) -> str:
-    return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
+    digest: str = md5(text.encode(), usedforsecurity=False).hexdigest()
+    return digest
 
 
 def _md5_text(

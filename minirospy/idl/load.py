@@ -7,7 +7,6 @@ a full text at run time.
 from __future__ import annotations
 
 import contextlib
-import difflib
 import importlib.machinery
 import importlib.util
 import linecache
@@ -132,6 +131,8 @@ class Catalogue:
             return self._specs[full_name]
         if name in _OF_OTHER_LANGUAGES and name not in files:
             raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
+        import difflib  # only for the error
+
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
             raise NotFoundError("message type", full_name, hint=f"did you mean {near[0]}?")
