@@ -131,8 +131,9 @@ def test_topics_prefix_start_and_duration(ear: Ear, start: Start, tmp_path: Path
     )
     ear.listen("/robot/a")
     words = ["-p", "/robot", "-s", "0.3", "-u", "0.3", "-q", "--topics", "/a", "--bags", name]
-    play(start, *words).communicate(timeout=GUARD)
+    output, _ = play(start, *words).communicate(timeout=GUARD)
 
+    assert "Using prefix '/robot'' for topics" in output
     assert ear.texts == ["/a3", "/a4", "/a5", "/a6"]
 
 

@@ -177,6 +177,9 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             client.init_node("play", anonymous=True, disable_rostime=True)
             for path in paths:
                 client.loginfo("Opening %s", path)
+            if options.prefix:
+                # With both quotes, as the C++ program prints it.
+                client.loginfo("Using prefix '%s'' for topics ", options.prefix)
             player = Player(bags, options, serve if foxglove_port is not None else None)
             return player.run()
         except ROSInterruptException:
