@@ -115,6 +115,7 @@ class Publication:
             return why
 
         sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
+        sockets.enlarge_send_buffer(sock)
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         link = OutLink(
             sock,

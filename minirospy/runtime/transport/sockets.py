@@ -17,6 +17,7 @@ __all__ = [
     "HANDSHAKE_SECONDS",
     "busy_poll",
     "busy_receive",
+    "enlarge_send_buffer",
     "hang_up",
     "is_readable",
     "is_writable",
@@ -37,6 +38,9 @@ BUSY_POLL_SECONDS = 0.0002
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between probes, number of probes. macOS calls the first TCP_KEEPALIVE."""
+
+_SEND_BUFFER = 4 * 1024 * 1024
+"""What a Unix socket is to hold: TCP holds as much. Linux allows 208 kB unless net.core.wmem_max is raised, and counts double."""
 
 _PEER = struct.Struct("iII")
 """The system's record of a peer, see Peer."""
@@ -64,6 +68,16 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
         if hasattr(socket, option):
             with contextlib.suppress(OSError):
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+
+
+def enlarge_send_buffer(sock: socket.socket) -> None:
+    """Let a Unix socket take some megabytes in one step, as far as the kernel allows; TCP enlarges its own buffers.
+
+    Otherwise a message of 1 MB needs the receiver several times, and each time a busy machine may run another process.
+    """
+    if sock.family not in FAMILIES:
+        with contextlib.suppress(OSError):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
 
 def resolvable(host: str) -> bytes:

@@ -74,6 +74,30 @@ def test_the_publisher_chooses(
     run(scene)
 
 
+def test_the_send_buffer_of_a_unix_socket_is_enlarged_and_of_tcp_is_not() -> None:
+    one, other = socket.socketpair()
+    with one, other, socket.socket() as tcp:
+        for sock, is_larger in ((one, True), (tcp, False)):
+            before = sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+            sockets.enlarge_send_buffer(sock)
+            assert (sock.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) > before) is is_larger
+
+
+def test_a_publisher_enlarges_the_send_buffer_of_a_unix_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+    enlarged: list[int] = []
+    monkeypatch.setattr(sockets, "enlarge_send_buffer", lambda sock: enlarged.append(sock.family))
+
+    async def scene() -> None:
+        async with graph("/a", "/b") as (_, (a, b)):
+            box = Box()
+            publication = await publish(a, "/t")
+            await listen(b, "/t", box)
+            await eventually(lambda: publication.links)
+
+    run(scene)
+    assert enlarged == [socket.AF_UNIX]
+
+
 @pytest.mark.parametrize(
     ("of_a", "of_b", "transport"),
     [("", "", "UNIXROS"), ("auto", "auto", "UNIXROS"), ("tcp", "", "TCPROS"), ("", "tcp", "TCPROS")],
