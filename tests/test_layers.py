@@ -54,8 +54,10 @@ PURE_FILES = {
     PACKAGE / "bridge" / name
     for name in (
         "access.py",
-        "foxglove/protocol.py",
         "foxglove/channels.py",
+        "foxglove/parsing.py",
+        "foxglove/protocol.py",
+        "foxglove/serializing.py",
         "rosapi/typedefs.py",
         "rosbridge/cbor.py",
         "rosbridge/conversion.py",

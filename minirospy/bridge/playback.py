@@ -8,7 +8,7 @@ from types import TracebackType
 from minirospy.aio.node import Node
 from minirospy.bridge.addresses import links
 from minirospy.bridge.bridge import Bridge, BridgeOptions
-from minirospy.bridge.foxglove import protocol
+from minirospy.bridge.foxglove import serializing
 from minirospy.bridge.foxglove.protocol import PlaybackCommand, PlaybackControl, PlaybackState, PlaybackStatus
 from minirospy.recording.player import Player
 from minirospy.runtime.transport.loop import LoopThread
@@ -108,7 +108,7 @@ class PlayerBridge:
                 bridge.foxglove.playback_changed(state)
             if state.now != time:
                 time = state.now
-                frame = protocol.time_frame(time)
+                frame = serializing.time_frame(time)
                 for session in list(bridge.foxglove.sessions):
                     session.send_time(frame)
             await asyncio.sleep(_TICK_SECONDS)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minirospy.bridge.foxglove import protocol
+from minirospy.bridge.foxglove import parsing, serializing
 from minirospy.bridge.foxglove.protocol import (
     Channel,
     ClientAdvertise,
@@ -94,30 +94,32 @@ FROM_CLIENTS = [
 
 TO_CLIENTS = [
     (
-        protocol.server_info("example server", ["clientPublish", "time"], {"key": "value"}, "1675789422160"),
+        serializing.server_info(
+            "example server", ["clientPublish", "time"], {"key": "value"}, "1675789422160"
+        ),
         """{"op": "serverInfo", "name": "example server", "capabilities": ["clientPublish", "time"],
             "supportedEncodings": ["ros1"], "metadata": {"key": "value"}, "sessionId": "1675789422160"}""",
     ),
     (
-        protocol.server_info("bag", ["playbackControl"], {}, "1", (1_500_000_000, 2_000_000_001)),
+        serializing.server_info("bag", ["playbackControl"], {}, "1", (1_500_000_000, 2_000_000_001)),
         """{"op": "serverInfo", "name": "bag", "capabilities": ["playbackControl"], "supportedEncodings": ["ros1"],
             "metadata": {}, "sessionId": "1", "dataStartTime": {"sec": 1, "nsec": 500000000},
             "dataEndTime": {"sec": 2, "nsec": 1}}""",
     ),
     (
-        protocol.status(StatusLevel.INFO, "Some info", "status-123"),
+        serializing.status(StatusLevel.INFO, "Some info", "status-123"),
         '{"op": "status", "level": 0, "message": "Some info", "id": "status-123"}',
     ),
-    (protocol.status(StatusLevel.ERROR, "x"), '{"op": "status", "level": 2, "message": "x"}'),
-    (protocol.remove_status(["status-123"]), '{"op": "removeStatus", "statusIds": ["status-123"]}'),
+    (serializing.status(StatusLevel.ERROR, "x"), '{"op": "status", "level": 2, "message": "x"}'),
+    (serializing.remove_status(["status-123"]), '{"op": "removeStatus", "statusIds": ["status-123"]}'),
     (
-        protocol.advertise([Channel(1, "foo", Schema("a/B", "int8 x"))]),
+        serializing.advertise([Channel(1, "foo", Schema("a/B", "int8 x"))]),
         """{"op": "advertise", "channels": [{"id": 1, "topic": "foo", "encoding": "ros1", "schemaName": "a/B",
             "schema": "int8 x", "schemaEncoding": "ros1msg"}]}""",
     ),
-    (protocol.unadvertise([1, 2]), '{"op": "unadvertise", "channelIds": [1, 2]}'),
+    (serializing.unadvertise([1, 2]), '{"op": "unadvertise", "channelIds": [1, 2]}'),
     (
-        protocol.parameter_values(
+        serializing.parameter_values(
             [
                 Parameter("/int_param", 2),
                 Parameter("/float_param", 1.2),
@@ -142,7 +144,7 @@ TO_CLIENTS = [
            ], "id": "request-123"}""",
     ),
     (
-        protocol.advertise_services(
+        serializing.advertise_services(
             [
                 ServiceOffer(
                     2,
@@ -160,9 +162,9 @@ TO_CLIENTS = [
                          "schema": "bool success\nstring message"},
             "requestSchema": "bool data", "responseSchema": "bool success\nstring message"}]}""",
     ),
-    (protocol.unadvertise_services([1, 2]), '{"op": "unadvertiseServices", "serviceIds": [1, 2]}'),
+    (serializing.unadvertise_services([1, 2]), '{"op": "unadvertiseServices", "serviceIds": [1, 2]}'),
     (
-        protocol.connection_graph_update(
+        serializing.connection_graph_update(
             GraphTables(
                 {"/foo": ["/node_1"], "/bar": ("/node_1",)}, {"/foo": ["/node_2"]}, {"/set": ["/node_2"]}
             ),
@@ -176,7 +178,7 @@ TO_CLIENTS = [
             "removedTopics": ["/baz"], "removedServices": []}""",
     ),
     (
-        protocol.service_call_failure(1, 1, "Service does not exist"),
+        serializing.service_call_failure(1, 1, "Service does not exist"),
         '{"op": "serviceCallFailure", "serviceId": 1, "callId": 1, "message": "Service does not exist"}',
     ),
 ]
@@ -220,7 +222,7 @@ REFUSED_BINARIES = [
 
 @pytest.mark.parametrize(("text", "event"), FROM_CLIENTS, ids=lambda each: str(each)[8:30])
 def test_json_of_the_specification_is_parsed(text: str, event: object) -> None:
-    assert protocol.parse_text(text) == event
+    assert parsing.parse_text(text) == event
 
 
 @pytest.mark.parametrize(("text", "expected"), TO_CLIENTS)
@@ -231,23 +233,23 @@ def test_json_to_clients_is_that_of_the_specification(text: str, expected: str) 
 @pytest.mark.parametrize(("text", "why"), REFUSED_TEXTS)
 def test_wrong_json_is_refused_with_the_reason(text: str, why: str) -> None:
     with pytest.raises(BridgeProtocolError, match=why.replace("(", r"\(")):
-        protocol.parse_text(text)
+        parsing.parse_text(text)
 
 
 @pytest.mark.parametrize(("data", "why"), REFUSED_BINARIES)
 def test_wrong_binary_is_refused_with_the_reason(data: bytes, why: str) -> None:
     with pytest.raises(BridgeProtocolError, match=why):
-        protocol.parse_binary(data)
+        parsing.parse_binary(data)
 
 
 def test_binary_messages_of_clients_are_parsed() -> None:
-    message = protocol.parse_binary(b"\x01" + b"\x02\x00\x00\x00" + b"abc")
+    message = parsing.parse_binary(b"\x01" + b"\x02\x00\x00\x00" + b"abc")
     assert message == ClientMessage(2, memoryview(b"abc"))
 
     request = (
         b"\x02" + b"\x01\x00\x00\x00" + b"\x07\x00\x00\x00" + b"\x04\x00\x00\x00" + b"ros1" + b"\x00\x01"
     )
-    assert protocol.parse_binary(request) == ServiceRequest(1, 7, "ros1", b"\x00\x01")
+    assert parsing.parse_binary(request) == ServiceRequest(1, 7, "ros1", b"\x00\x01")
 
     control = (
         b"\x03\x01"
@@ -257,27 +259,27 @@ def test_binary_messages_of_clients_are_parsed() -> None:
         + b"\x02\x00\x00\x00"
         + b"r1"
     )
-    assert protocol.parse_binary(control) == PlaybackControl(PlaybackCommand.PAUSE, 2.0, 8, "r1")
+    assert parsing.parse_binary(control) == PlaybackControl(PlaybackCommand.PAUSE, 2.0, 8, "r1")
     without_seek = struct.pack("<BBfBQI", 3, 0, 0.5, 0, 99, 0)
-    assert protocol.parse_binary(without_seek) == PlaybackControl(PlaybackCommand.PLAY, 0.5, None, "")
+    assert parsing.parse_binary(without_seek) == PlaybackControl(PlaybackCommand.PLAY, 0.5, None, "")
 
 
 def test_binary_messages_to_clients_are_little_endian() -> None:
-    assert protocol.message_head(258, 3) == b"\x01" + b"\x02\x01\x00\x00" + b"\x03" + bytes(7)
-    assert protocol.time_frame(1) == b"\x02" + b"\x01" + bytes(7)
+    assert serializing.message_head(258, 3) == b"\x01" + b"\x02\x01\x00\x00" + b"\x03" + bytes(7)
+    assert serializing.time_frame(1) == b"\x02" + b"\x01" + bytes(7)
     assert (
-        protocol.service_response_head(1, 7)
+        serializing.service_response_head(1, 7)
         == b"\x03" + b"\x01\0\0\0" + b"\x07\0\0\0" + b"\x04\0\0\0" + b"ros1"
     )
-    assert protocol.asset(123, b"data") == b"\x04" + b"\x7b\0\0\0" + b"\x00" + b"\0\0\0\0" + b"data"
-    assert protocol.asset_failure(1, "no") == b"\x04" + b"\x01\0\0\0" + b"\x01" + b"\x02\0\0\0" + b"no"
+    assert serializing.asset(123, b"data") == b"\x04" + b"\x7b\0\0\0" + b"\x00" + b"\0\0\0\0" + b"data"
+    assert serializing.asset_failure(1, "no") == b"\x04" + b"\x01\0\0\0" + b"\x01" + b"\x02\0\0\0" + b"no"
     state = PlaybackState(PlaybackStatus.PAUSED, 5, 2.0, did_seek=True, request_id="r1")
     expected = b"\x05\x01" + b"\x05" + bytes(7) + b"\x00\x00\x00\x40" + b"\x01" + b"\x02\0\0\0" + b"r1"
-    assert protocol.playback_state(state) == expected
+    assert serializing.playback_state(state) == expected
 
 
 def test_numbers_that_json_lacks_become_texts() -> None:
-    text = protocol.parameter_values([Parameter("/a", float("nan")), Parameter("/b", [float("inf"), 1.0])])
+    text = serializing.parameter_values([Parameter("/a", float("nan")), Parameter("/b", [float("inf"), 1.0])])
     values = [each["value"] for each in json.loads(text)["parameters"]]
     assert values == ["nan", ["inf", 1.0]]
 
@@ -285,7 +287,7 @@ def test_numbers_that_json_lacks_become_texts() -> None:
 @given(st.binary(max_size=60))
 def test_any_binary_is_parsed_or_refused(data: bytes) -> None:
     try:
-        protocol.parse_binary(data)
+        parsing.parse_binary(data)
     except BridgeProtocolError as error:
         assert str(error)  # noqa: PT017 one of the two outcomes
 
@@ -314,6 +316,6 @@ _KEYS = ["subscriptions", "channels", "parameters", "parameterNames", "id", "uri
 )
 def test_any_json_is_parsed_or_refused(op: str, fields: dict[str, object]) -> None:
     try:
-        protocol.parse_text(json.dumps({**fields, "op": op}))
+        parsing.parse_text(json.dumps({**fields, "op": op}))
     except BridgeProtocolError as error:
         assert str(error).startswith(op)  # noqa: PT017 one of the two outcomes

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from minirospy.bridge.foxglove import protocol
+from minirospy.bridge.foxglove import protocol, serializing
 from minirospy.bridge.foxglove.assets import Assets
 from minirospy.bridge.foxglove.channels import Channels, Services
 from minirospy.bridge.foxglove.parameters import Parameters
@@ -98,7 +98,7 @@ class FoxgloveDoor:
         """Start serving a client."""
         session = FoxgloveSession(self, client)
         session.send(
-            protocol.server_info(
+            serializing.server_info(
                 self._options.name,
                 self.capabilities_of(client),
                 self._options.metadata,
@@ -107,7 +107,7 @@ class FoxgloveDoor:
             )
         )
         if self.playback:
-            client.send_binary(protocol.playback_state(self.playback.state()))
+            client.send_binary(serializing.playback_state(self.playback.state()))
 
         is_first = not self.sessions
         self.sessions.add(session)
@@ -141,7 +141,7 @@ class FoxgloveDoor:
         """Send the whole graph to a client."""
         snapshot = self.graph.snapshot
         tables = GraphTables(snapshot.publishers, snapshot.subscribers, snapshot.services)
-        session.send(protocol.connection_graph_update(tables, (), ()))
+        session.send(serializing.connection_graph_update(tables, (), ()))
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
         """Replace a channel whose publisher sends messages of another definition than the installed one."""
@@ -152,12 +152,12 @@ class FoxgloveDoor:
             )
             for session in list(self.sessions):
                 session.channels_removed([channel.id])
-                session.send(protocol.advertise([replaced]))
+                session.send(serializing.advertise([replaced]))
 
     def playback_changed(self, state: PlaybackState) -> None:
         """Report a player's state to all clients."""
         for session in list(self.sessions):
-            session.client.send_binary(protocol.playback_state(state))
+            session.client.send_binary(serializing.playback_state(state))
 
     # --- within
 
@@ -183,7 +183,9 @@ class FoxgloveDoor:
     def _graph_changed(self, changes: Changes) -> None:
         tables = GraphTables(changes.publishers, changes.subscribers, changes.services)
         if changes:
-            text = protocol.connection_graph_update(tables, changes.removed_topics, changes.removed_services)
+            text = serializing.connection_graph_update(
+                tables, changes.removed_topics, changes.removed_services
+            )
             for session in list(self.sessions):
                 if session.wants_graph:
                     session.send(text)
@@ -201,26 +203,26 @@ class FoxgloveDoor:
                 if removed:
                     session.channels_removed(removed)
                 if new:
-                    session.send(protocol.advertise(new))
+                    session.send(serializing.advertise(new))
                 if "services" not in self.capabilities_of(session.client):
                     continue
                 if removed_services:
-                    session.send(protocol.unadvertise_services(removed_services))
+                    session.send(serializing.unadvertise_services(removed_services))
                 if new_services:
-                    session.send(protocol.advertise_services(new_services))
+                    session.send(serializing.advertise_services(new_services))
 
         self._is_known = True
         while self._waiting:
             self._offer_all(self._waiting.pop())
 
     def _offer_all(self, session: FoxgloveSession) -> None:
-        session.send(protocol.advertise(self.channels.by_id.values()))
+        session.send(serializing.advertise(self.channels.by_id.values()))
         if "services" in self.capabilities_of(session.client):
-            session.send(protocol.advertise_services(self.services.by_id.values()))
+            session.send(serializing.advertise_services(self.services.by_id.values()))
 
     def _clock(self, arrival: Arrival) -> None:
         if (now := time_of_clock_message(arrival.body)) is not None:
-            frame = protocol.time_frame(now)
+            frame = serializing.time_frame(now)
             for session in list(self.sessions):
                 session.send_time(frame)
 

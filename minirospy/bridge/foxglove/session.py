@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from minirospy.bridge.foxglove import protocol
+from minirospy.bridge.foxglove import parsing, protocol, serializing
 from minirospy.bridge.foxglove.protocol import Channel, Event, Parameter, StatusLevel
 from minirospy.bridge.graph import Arrival, Publication
 from minirospy.errors import (
@@ -73,11 +73,11 @@ class FoxgloveSession:
 
     def received_text(self, text: str) -> None:
         """Take over a JSON message."""
-        self._handle(protocol.parse_text, text)
+        self._handle(parsing.parse_text, text)
 
     def received_binary(self, data: bytes) -> None:
         """Take over a binary message."""
-        self._handle(protocol.parse_binary, data)
+        self._handle(parsing.parse_binary, data)
 
     def ended(self) -> None:
         """End everything that the client has."""
@@ -108,7 +108,7 @@ class FoxgloveSession:
             if channel.id in ids:
                 del self._subscriptions[subscription_id]
                 self._graph.unsubscribe(channel.topic, listener)
-        self.send(protocol.unadvertise(ids))
+        self.send(serializing.unadvertise(ids))
 
     def report_drops(self) -> None:
         """Say that messages were dropped, or that none are any more; called now and then."""
@@ -124,13 +124,13 @@ class FoxgloveSession:
             )
             self._are_drops_shown = True
         elif self._are_drops_shown:
-            self.send(protocol.remove_status(["drops"]))
+            self.send(serializing.remove_status(["drops"]))
             self._are_drops_shown = False
         self._dropped = dropped
 
     def parameters_changed(self, changed: list[Parameter]) -> None:
         """Report changes of parameters."""
-        self.send(protocol.parameter_values(changed))
+        self.send(serializing.parameter_values(changed))
 
     # --- within
 
@@ -142,7 +142,7 @@ class FoxgloveSession:
             self._status(StatusLevel.ERROR, str(error))
 
     def _status(self, level: StatusLevel, text: str, id_: str | None = None) -> None:
-        self.send(protocol.status(level, text, id_))
+        self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
         """Raise BridgeError where the client may not do this."""
@@ -187,7 +187,7 @@ class FoxgloveSession:
             # The text that the client decodes with does not fit this publisher.
             self._door.definition_differs(channel, arrival.header)
             return
-        head = protocol.message_head(subscription_id, arrival.nanoseconds)
+        head = serializing.message_head(subscription_id, arrival.nanoseconds)
         self.client.send_message(subscription_id, head, arrival.body)
 
     def _unsubscribe(self, event: protocol.Unsubscribe) -> None:
@@ -265,7 +265,7 @@ class FoxgloveSession:
             self._status(
                 StatusLevel.ERROR, f"Failed to retrieve the following parameters: {', '.join(unset[:20])}"
             )
-        self.send(protocol.parameter_values((each for each in found if each.is_set), id_))
+        self.send(serializing.parameter_values((each for each in found if each.is_set), id_))
 
     def _set_parameters(self, event: protocol.SetParameters) -> None:
         self._require("parameters", "setting parameters")
@@ -303,16 +303,16 @@ class FoxgloveSession:
             self._require("assets", "fetching assets")
             self._spawn(self._send_asset(event))
         except BridgeError as error:
-            self.client.send_binary(protocol.asset_failure(event.request_id, str(error)))
+            self.client.send_binary(serializing.asset_failure(event.request_id, str(error)))
 
     async def _send_asset(self, event: protocol.FetchAsset) -> None:
         loop = asyncio.get_running_loop()
         try:
             data = await loop.run_in_executor(None, self._door.assets.read, event.uri)
         except BridgeError as error:
-            self.client.send_binary(protocol.asset_failure(event.request_id, str(error)))
+            self.client.send_binary(serializing.asset_failure(event.request_id, str(error)))
         else:
-            self.client.send_binary(protocol.asset(event.request_id, data))
+            self.client.send_binary(serializing.asset(event.request_id, data))
 
     def _call_service(self, event: protocol.ServiceRequest) -> None:
         try:
@@ -334,10 +334,12 @@ class FoxgloveSession:
         except (ServiceException, BridgeError) as error:
             self._call_failed(event, str(error))
         else:
-            self.client.send_binary(protocol.service_response_head(event.service_id, event.call_id), response)
+            self.client.send_binary(
+                serializing.service_response_head(event.service_id, event.call_id), response
+            )
 
     def _call_failed(self, event: protocol.ServiceRequest, why: str) -> None:
-        self.send(protocol.service_call_failure(event.service_id, event.call_id, why))
+        self.send(serializing.service_call_failure(event.service_id, event.call_id, why))
 
     def _control_playback(self, event: protocol.PlaybackControl) -> None:
         self._require("playbackControl", "controlling the player")
