@@ -66,7 +66,12 @@ def _fetch(port: int, token: str) -> Any:
         finally:
             connection.close()
         if answer.status == 401:
-            raise BridgeError(f"the bridge at port {port} wants its token: give --token")
+            why = (
+                f"the token is not one of the bridge at port {port}"
+                if token
+                else f"the bridge at port {port} wants its token"
+            )
+            raise BridgeError(f"{why}: give --token")
         try:
             if answer.status == 200:
                 return json.loads(body)

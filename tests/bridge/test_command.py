@@ -120,6 +120,29 @@ def test_status_is_also_json(start: Start, capsys: pytest.CaptureFixture[str]) -
     assert json.loads(capsys.readouterr().out)["node"] == "/door"
 
 
+def test_status_names_what_is_wrong_in_one_line(
+    start: Start, capsys: pytest.CaptureFixture[str], master: str
+) -> None:
+    def refusal(*words: str) -> str:
+        assert command.main(["--status", *words]) == 1
+        output = capsys.readouterr()
+        assert output.out == ""
+        assert output.err.count("\n") == 1
+        return output.err
+
+    port = start("bridge", "--port", "0", "--token", "right-token-000").port
+    assert command.main(["--status", "--port", str(port), "--token", "right-token-000"]) == 0
+    assert "right-token-000" not in capsys.readouterr().out
+    assert f"the bridge at port {port} wants its token: give --token" in refusal("--port", str(port))
+    wrong = refusal("--port", str(port), "--token", "wrong-token-000")
+    assert f"the token is not one of the bridge at port {port}: give --token" in wrong
+    assert "wrong-token-000" not in wrong
+    none = free_port()
+    assert f"no bridge answers at port {none} of this machine" in refusal("--port", str(none))
+    other = master.rpartition(":")[2].strip("/")
+    assert f"port {other} is that of another program" in refusal("--port", other)
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
