@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from http.client import HTTPConnection, HTTPSConnection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -196,6 +197,29 @@ def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Runn
     while bridge.call(lambda: len(listener.connections)) > 1:
         time.sleep(0.01)
     assert_alive(bridge.client())
+
+
+def test_thousand_connections_leave_the_first_ones_unaffected(bridge: Running) -> None:
+    first = bridge.client()
+    first.next("serverInfo")
+    socks = []
+    answers = []
+    try:
+        socks.extend(socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(1000))
+        # The connections are accepted in their order: the limit is 256, one of which is the first.
+        for sock in socks[255:]:
+            with sock:
+                answers.append(b"".join(iter(partial(sock.recv, 4096), b"")))
+        listener = bridge.bridge.listeners["foxglove"]
+        assert len(listener.connections) == 256
+        assert listener.refused == 745
+        assert_alive(first)
+    finally:
+        for sock in socks:
+            sock.close()
+    assert len(answers) == 745
+    assert {answer.split(b"\r\n")[0] for answer in answers} == {b"HTTP/1.1 503 Service Unavailable"}
+    assert {answer.rpartition(b"\r\n")[2] for answer in answers} == {b"too many connections.\n"}
 
 
 def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Running]) -> None:
