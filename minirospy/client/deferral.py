@@ -12,7 +12,7 @@ __all__ = ["Deferral", "is_main_thread"]
 class Deferral:
     """A critical section of the main thread: ``with deferral:`` a signal is dispatched when the block ends.
 
-    A hook may publish, log or register, and so must not run while the main thread is half way through such a thing. In
+    A hook may publish, log or register, and so must not run while the main thread is in the middle of one. In
     other threads, where no signal arrives, without effect.
     """
 

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-__all__ = ["suppress_tracebacks", "what_runs"]
+__all__ = ["report_waiting", "suppress_tracebacks"]
 
 
-def what_runs() -> str:
+def report_waiting(*, is_leaving: bool) -> None:
+    """Print what the process still waits for; ``is_leaving``: the node waits for the master to unregister it."""
+    what = "the master to unregister this node" if is_leaving else _what_runs()
+    advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
+    # There may be no terminal any more.
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
+
+
+def _what_runs() -> str:
     """Return the thread or process that keeps this process from its exit, and where in the program it is."""
     main = threading.main_thread()
     threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]

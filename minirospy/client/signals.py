@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
-from minirospy.client.exit_messages import what_runs
+from minirospy.client.exit_messages import report_waiting
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.shutdown import Action, Phase
 from minirospy.signal_dispatch import dispatching_signal
@@ -189,7 +189,7 @@ class SignalWatchdog:
                 case Action.STOP_LEAVING:
                     self._stop_leaving()
                 case Action.REPORT:
-                    self._report()
+                    report_waiting(is_leaving=self._machine.phase is Phase.LEAVING)
                 case Action.EXIT:
                     os._exit(_EXIT_STATUS)
 
@@ -206,14 +206,6 @@ class SignalWatchdog:
                 signal.raise_signal(signal.SIGINT)
             else:
                 signal.pthread_kill(threading.main_thread().ident or 0, self._number)
-
-    def _report(self) -> None:
-        is_leaving = self._machine.phase is Phase.LEAVING
-        what = "the master to unregister this node" if is_leaving else what_runs()
-        advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-        # There may be no terminal any more.
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 
 
 def _start(target: Callable[..., object], argument: object, name: str) -> None:
