@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg, SubscribeListener
 from minirospy.errors import ROSInterruptException
+from minirospy.names import is_legal_name
 
 __all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
 
@@ -40,7 +41,7 @@ class Output:
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
         """``latch``: None as the input. ``on_advertised`` is called after the first message has come."""
-        self.topic = topic
+        self.topic = _checked(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
         self._on_advertised = on_advertised
@@ -99,7 +100,7 @@ class Input:
     """A subscription that can be given up and taken again."""
 
     def __init__(self, topic: str, callback: Callable[[AnyMsg], object]) -> None:
-        self.topic = topic
+        self.topic = _checked(topic)
         self._callback = callback
         self._subscriber: rospy.Subscriber[AnyMsg] | None = None
         self._lock = threading.Lock()
@@ -127,10 +128,17 @@ class Input:
 
 def base_name(topic: str) -> str:
     """Return the last part of a topic's name, of which the node's name is made. Raises ValueError where it has none."""
-    name = topic.rstrip("/").rpartition("/")[2].lstrip("~")
+    name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
     return name
+
+
+def _checked(topic: str) -> str:
+    """Return a topic's name. Raises ValueError where it is not legal."""
+    if not is_legal_name(topic):
+        raise ValueError(f"[{topic}] is not the name of a topic")
+    return topic
 
 
 def flag(name: str) -> bool:

@@ -69,6 +69,8 @@ def drop_main() -> int:
 
 def _start_drop(words: Sequence[str]) -> Filter:
     source, dropped, of = words[0], _count(words[1]), _count(words[2])
+    if not of:
+        raise ValueError("messages are dropped out of each 1 or more, not out of each 0")
     target = words[3] if len(words) > 3 else f"{source}_drop"
     return Filter(source, target, every(dropped, of), rospy.get_time)
 

@@ -91,6 +91,7 @@ AROUND = [
     "message_filters",
     "sensor_msgs.point_cloud2",
     "angles",
+    "topic_tools",
     "cv_bridge",
     "cv_bridge.core",
     "image_geometry",
@@ -148,7 +149,7 @@ OF_ROS = (
     "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
     "diagnostic_updater", "bondpy", "interactive_markers",
     "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure", "image_geometry", "laser_geometry", "camera_calibration_parsers",
-    "resource_retriever",
+    "resource_retriever", "topic_tools",
 )  # fmt: skip
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",

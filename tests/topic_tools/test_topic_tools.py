@@ -32,6 +32,7 @@ def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
     [
         (["relay"], "usage: relay IN_TOPIC [OUT_TOPIC]"),
         (["relay", "a", "b", "c"], "usage: relay IN_TOPIC [OUT_TOPIC]"),
+        (["relay", "a b"], "ERROR: [a b] is not the name of a topic"),
         (["relay", "/"], "[/] is not the name of a topic"),
         (["throttle", "messages"], "throttle messages IN_TOPIC MSGS_PER_SEC"),
         (["drop", "a", "1"], "usage: drop IN_TOPIC X Y [OUT_TOPIC]"),
@@ -62,6 +63,10 @@ def test_wrong_words_are_refused_with_the_usage(words: list[str], text: str) -> 
         (["throttle", "bytes", "a", "5"], "throttle bytes takes 3 words"),
         (["throttle", "letters", "a", "5"], "usage:"),
         (["drop", "a", "-1", "3"], "[-1] is not a number of messages"),
+        (["drop", "a", "1", "0"], "out of each 1 or more"),
+        (["relay", "a", "b c"], "ERROR: [b c] is not the name of a topic"),
+        (["mux", "a", "b", "c d"], "ERROR: [/c d] is not the name of a topic"),
+        (["demux", "a", "b", "c d"], "ERROR: [/c d] is not the name of a topic"),
         (["transform", "/a", "/b", "std_msgs/String", "m"], "ERROR: Wrong input topic (or topic field): /a"),
         (["transform", "/a", "/b", "std_msgs/String", "m +"], "'m +' is not an expression of Python"),
         (["transform", "/a", "/b", "std_msgs/Strong", "m"], "std_msgs/Strong"),
@@ -128,3 +133,23 @@ def test_base_names() -> None:
     assert [base_name(topic) for topic in ("a", "/a/b", "/a/b/", "~c")] == ["a", "b", "b", "c"]
     with pytest.raises(ValueError, match="not the name of a topic"):
         base_name("/")
+
+
+def test_lazy_transport_subscribes_with_its_subscribers(master: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "lazy.py")], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.split() == ["subscribed", "word", "unsubscribed"] * 2, done.stderr
+    assert done.returncode == 0, done.stderr
+
+
+def test_lazy_transport_subscribes_when_it_is_not_lazy(master: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "lazy.py"), "_lazy:=false"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout.split() == ["subscribed", "word", "word"], done.stderr
+    assert done.returncode == 0, done.stderr
