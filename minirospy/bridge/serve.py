@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import signal
+import sys
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Protocol, TypeVar
 
@@ -11,7 +13,7 @@ from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, ROSInterruptException
 from minirospy.runtime.transport.loop import new_event_loop
 
-__all__ = ["Part", "require_libraries", "run"]
+__all__ = ["Part", "require_libraries", "run", "run_program"]
 
 
 class Part(Protocol):
@@ -33,6 +35,16 @@ def require_libraries() -> None:
         raise BridgeError(
             f"the bridge needs the library {error.name}: python -m pip install 'minirospy[web]'"
         ) from error
+
+
+def run_program(name: str, module: str) -> int:
+    """Run a node's program, whose module imports the libraries; return the exit status, 1 where one is missing."""
+    try:
+        require_libraries()
+    except BridgeError as error:
+        print(f"{name}: ERROR: {error}", file=sys.stderr)
+        return 1
+    return int(importlib.import_module(module).main())
 
 
 def run(

@@ -22,6 +22,7 @@ from minirospy.errors import BridgeError
 from tests.bridge.conftest import Client
 from tests.conftest import free_port
 
+PACKAGES = Path(command.__file__).parents[1] / "ros_packages"
 Start = Callable[..., "Process"]
 
 
@@ -171,6 +172,26 @@ def test_missing_library_is_named_with_the_command(
     monkeypatch.setitem(sys.modules, "websockets.server", None)
     assert command.main([]) == 1
     assert "python -m pip install 'minirospy[web]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("package", "program"),
+    [
+        ("foxglove_bridge", "foxglove_bridge"),
+        ("rosbridge_server", "rosbridge_websocket"),
+        ("web_video_server", "web_video_server"),
+    ],
+)
+def test_missing_library_ends_a_node_in_one_line(package: str, program: str) -> None:
+    path = PACKAGES / package / "nodes" / program
+    without = f"import runpy, sys; sys.modules['websockets'] = None; runpy.run_path({str(path)!r}, run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"{program}: ERROR: the bridge needs the library websockets")
+    assert "pip install 'minirospy[web]'" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_launch_file_starts_the_bridge_with_its_arguments(start: Start, master: str) -> None:
