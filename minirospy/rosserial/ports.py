@@ -54,7 +54,10 @@ class SerialPort:
     """A serial port. Raises PortError where it cannot be opened, ImportError without pyserial."""
 
     def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
-        import serial  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        try:
+            import serial  # type: ignore[import-not-found,import-untyped,unused-ignore]
+        except ImportError as error:
+            raise ImportError("serial ports need pyserial: `pip install 'minirospy[serial]'`") from error
 
         self._errors: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
         try:

@@ -42,14 +42,10 @@ def _run(words: list[str]) -> int:
     if port == "tcp":
         return _serve(RosSerialServer(tcp_port, bool(_param("fork_server", False))))
     try:
-        import serial  # type: ignore[import-not-found,import-untyped,unused-ignore] # noqa: F401
-    except ImportError:
-        print(
-            "serial_node: ERROR: serial ports need pyserial: `pip install 'minirospy[serial]'`",
-            file=sys.stderr,
-        )
+        _follow(port, baud, bool(rospy.get_param("~fix_pyserial_for_test", False)))
+    except ImportError as error:
+        print(f"serial_node: ERROR: {error}", file=sys.stderr)
         return 1
-    _follow(port, baud, bool(rospy.get_param("~fix_pyserial_for_test", False)))
     return 0
 
 

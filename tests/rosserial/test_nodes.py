@@ -18,6 +18,7 @@ from std_msgs.msg import String
 from minirospy import Node
 from minirospy.rosserial.endpoints import to_bytes
 from minirospy.rosserial.packets import Decoder, Packet, encode
+from minirospy.rosserial.ports import SerialPort
 from minirospy.workspace.packages import Packages
 from tests.conftest import free_port
 from tests.robots.conftest import SECONDS, Start, end
@@ -240,6 +241,13 @@ def test_missing_pyserial_names_what_to_install(master: str) -> None:
     )
     assert done.returncode == 1
     assert "serial ports need pyserial: `pip install 'minirospy[serial]'`" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_client_without_pyserial_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(ImportError, match="serial ports need pyserial"):
+        SerialPort("/dev/ttyUSB0", 57600)
 
 
 def test_message_info_service_says_that_it_is_not_needed(start: Start, master: str) -> None:
