@@ -43,6 +43,12 @@ def opencv() -> Any:
     return cv2
 
 
+def require_library() -> None:
+    """Raise ValueError with what to install where there is neither OpenCV nor Pillow."""
+    if opencv() is None:
+        _pillow()
+
+
 def decode(data: bytes) -> Pixels:
     """Return a compressed image with its channels in OpenCV's order: gray, BGR or BGRA. Raises ValueError."""
     import numpy as np

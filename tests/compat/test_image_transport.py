@@ -265,6 +265,19 @@ def test_wrong_words_are_refused(words: list[str], status: int, text: str) -> No
     assert "Traceback" not in done.stderr
 
 
+def test_missing_library_is_logged_before_any_image(master: str) -> None:
+    code = (
+        "import runpy, sys; sys.modules['cv2'] = sys.modules['PIL'] = None; from minirospy import client; "
+        "client.spin = lambda: None; sys.argv = ['republish', 'raw', 'compressed']; "
+        f"runpy.run_path({str(PROGRAM)!r}, run_name='__main__')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stderr.count("compressed images need OpenCV or Pillow: pip install 'minirospy[images]'") == 1
+    assert "Traceback" not in done.stderr
+
+
 def test_list_of_transports() -> None:
     done = subprocess.run(
         [str(Path(sys.executable).with_name("rosrun")), "image_transport", "list_transports"],

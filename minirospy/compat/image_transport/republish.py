@@ -27,6 +27,7 @@ from minirospy.compat.image_transport.codecs import (
     uncompressed_depth,
 )
 from minirospy.errors import ROSInterruptException
+from minirospy.images.compressed import require_library
 
 __all__ = ["Republisher", "list_main", "main", "settings_of"]
 
@@ -66,12 +67,22 @@ def main() -> int:
         return 1
     try:
         rospy.init_node("image_republisher", anonymous=True)
+        if set(words[:1] + (words[1:] or list(_TRANSPORTS))) != {"raw"}:
+            _warn_without_library()
         running = Republisher("in", words[0], "out", words[1:] or list(_TRANSPORTS))
         rospy.spin()
         del running
     except ROSInterruptException:
         pass
     return 0
+
+
+def _warn_without_library() -> None:
+    """Log what to install where no library is there: without a subscriber nothing else would show it."""
+    try:
+        require_library()
+    except ValueError as error:
+        rospy.logwarn("%s", error)
 
 
 def list_main() -> int:
