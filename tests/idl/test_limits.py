@@ -95,6 +95,8 @@ LARGE = {
     "long arrays": "uint8[1000000] a\nfloat64[1000000] b\n",
     "deep": chain(40, "{0} a\n"),
     "arrays in arrays": chain(15, "{0}[] a\n"),
+    # As MoveIt's largest action, whose types have some 17,000 fields, each counted where it is used.
+    "one large type in nine layers": chain(9, "{0} a\n", "".join(f"int8 b{n}\n" for n in range(1900))),
     "many types": full_text(
         "".join(f"p/T{n} a{n}\n" for n in range(100)), **{f"T{n}": "int8 a\nstring b\n" for n in range(100)}
     ),
