@@ -12,7 +12,7 @@ _RUN_IT_THERE = (
     "and run it there with the same ROS_MASTER_URI: it works with minirospy's nodes"
 )
 _DEFINITIONS = (
-    "it holds definitions: clone it into a workspace's src, then `catkin_make` generates its modules"
+    "it holds definitions: `git clone {repository}` in a workspace's src, `catkin_make`, and source devel/setup.bash"
 )
 _QT = (
     "`pip install PyQt5 pydot catkin_pkg`, clone {repository} into a workspace's src, `catkin_make`, and source "
@@ -173,25 +173,31 @@ _QT_LIBRARIES = (
     "rqt_py_common",
 )
 
-_MESSAGES = (
-    "mavros_msgs",
-    "moveit_msgs",
-    "costmap_converter",
-    "robot_localization_msgs",
-)
+_MESSAGES = {
+    "cartesian_control_msgs": "https://github.com/UniversalRobots/Universal_Robots_ROS_cartesian_control_msgs",
+    "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
+    "mavros_msgs": "-b master https://github.com/mavlink/mavros",
+    "moveit_msgs": "https://github.com/moveit/moveit_msgs",
+    "vision_msgs": "-b noetic-devel https://github.com/ros-perception/vision_msgs",
+}
+"""Packages of definitions -> what `git clone` takes for ROS 1's."""
 
 IMPORTED = frozenset(
     {
+        "cartesian_control_msgs",
         "gazebo_ros",
+        "mavros_msgs",
         "moveit_commander",
+        "moveit_msgs",
         "moveit_ros_planning_interface",
         "nodelet",
         "rviz",
         "rqt_graph",
+        "vision_msgs",
         *_QT_LIBRARIES,
     }
 )
-"""The modules that Python programs import of them; `overlay/` has one for each, which raises ImportError."""
+"""The modules of them that Python programs import; `overlay/` has one for each, which raises ImportError."""
 
 
 def advice(name: str) -> str:
@@ -206,5 +212,5 @@ def advice(name: str) -> str:
         plugin = name if name in _QT_PLUGINS else "the plug-in"
         return f"a window of Qt, from its source: {_QT.format(repository=_QT_REPOSITORIES.format(plugin=plugin))}"
     if name in _MESSAGES:
-        return f"minirospy does not bring it: {_DEFINITIONS}"
+        return f"minirospy does not bring it: {_DEFINITIONS.format(repository=_MESSAGES[name])}"
     return ""
