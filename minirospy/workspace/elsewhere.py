@@ -11,9 +11,7 @@ _RUN_IT_THERE = (
     "install it by RoboStack (`conda install -c conda-forge -c robostack-noetic ros-noetic-{conda}`) or on a machine with ROS 1, "
     "and run it there with the same ROS_MASTER_URI: it works with minirospy's nodes"
 )
-_DEFINITIONS = (
-    "it holds definitions: `git clone {repository}` in a workspace's src, `catkin_make`, and source devel/setup.bash"
-)
+_DEFINITIONS = "it holds definitions: `git clone {repository}` in a workspace's src, `catkin_make`, and source devel/setup.bash"
 _QT = (
     "`pip install PyQt5 pydot catkin_pkg`, clone {repository} into a workspace's src, `catkin_make`, and source "
     "devel/setup.bash"
