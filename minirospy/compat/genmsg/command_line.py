@@ -1,0 +1,19 @@
+"""genmsg.command_line: the search path of message generators. Source: http://wiki.ros.org/genmsg."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+__all__ = ["includepath_to_dict"]
+
+
+def includepath_to_dict(includepath: Iterable[str]) -> dict[str, list[str]]:
+    """Return package -> folders of the values ``package:folder`` of the option ``-I``; those without a package at ''."""
+    found: dict[str, list[str]] = {}
+    for value in includepath:
+        package, colon, folder = value.partition(":")
+        if not colon:
+            package, folder = "", value
+        if folder:
+            found.setdefault(package, []).append(folder)
+    return found

@@ -1,0 +1,21 @@
+"""genpy.generator, provided by minirospy: Python modules of definitions, written by its own compiler."""
+
+from minirospy.compat.genpy.generator import (
+    Generator,
+    MsgGenerator,
+    SrvGenerator,
+    compute_outfile_name,
+    compute_resource_name,
+    msg_generator,
+    srv_generator,
+)
+
+__all__ = [
+    "Generator",
+    "MsgGenerator",
+    "SrvGenerator",
+    "compute_outfile_name",
+    "compute_resource_name",
+    "msg_generator",
+    "srv_generator",
+]
