@@ -7,13 +7,18 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from minirospy.workspace.elsewhere import IMPORTED, advice
+from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 
 __all__: list[str] = []
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise ImportError for a module of the table, AttributeError for any other name."""
+    """Raise ImportError for a module of the tables (``pkg_sub`` is ``pkg.sub``), AttributeError for any other name."""
     if name in IMPORTED:
         raise ImportError(f"No module named '{name}': {advice(name)}", name=name)
+    submodule = name.replace("_", ".", 1)
+    if submodule in SUBMODULES:
+        raise ImportError(
+            f"minirospy does not have the module '{submodule}': {SUBMODULES[submodule]}", name=submodule
+        )
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

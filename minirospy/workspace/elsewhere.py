@@ -5,7 +5,7 @@ It is consulted where a package, a program or a module is not found: what a work
 
 from __future__ import annotations
 
-__all__ = ["IMPORTED", "advice"]
+__all__ = ["IMPORTED", "SUBMODULES", "advice"]
 
 _RUN_IT_THERE = (
     "install it by RoboStack (`conda install -c conda-forge -c robostack-noetic ros-noetic-{conda}`) or on a machine with ROS 1, "
@@ -196,6 +196,16 @@ IMPORTED = frozenset(
     }
 )
 """The modules of them that Python programs import; `overlay/` has one for each, which raises ImportError."""
+
+SUBMODULES = {
+    "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
+    "rosmaster.registrations": "rosgraph.Master(name).getSystemState() returns what is registered; `rosmaster` runs a master",
+    "rosmaster.threadpool": "concurrent.futures.ThreadPoolExecutor runs tasks in threads",
+    "rostest.runner": "`rostest FILE` or rostest.rostest_main.rostestmain() runs a file of tests",
+    "rostest.rostest_parent": "`rostest FILE` runs the tests of a file, each with a master of its own",
+    "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
+}
+"""Submodules that programs import of real ROS's packages and ours lack -> what to use; `overlay/` has one for each."""
 
 
 def advice(name: str) -> str:

@@ -7,11 +7,13 @@ from types import ModuleType
 
 import genpy.message
 import pytest
+import roslaunch.rlutil
 import rosmsg
 import rosnode
 import rosparam
 import rospkg
 import rosservice
+import rostest.rostestutil
 import rostopic
 from rosgraph import Master
 from rospy.impl.tcpros import DEFAULT_BUFF_SIZE
@@ -86,3 +88,29 @@ def test_names_without_a_command(tmp_path: Path) -> None:
     assert genpy.message._get_message_or_service_class("service", "std_srvs/Empty") is Empty
     assert rospkg.RosPack()._load_manifest("std_msgs").name == "std_msgs"
     assert DEFAULT_BUFF_SIZE == 65536
+
+
+def test_sleep_and_wait_for_master_return(master: str, capsys: pytest.CaptureFixture[str]) -> None:
+    rostopic._sleep(0.0)
+    roslaunch.rlutil._wait_for_master()
+    assert capsys.readouterr().out == ""
+
+
+def test_master_of_rosservice_is_called_by_its_name(master: str) -> None:
+    assert rosservice._get_master().caller_id == "/rosservice"
+    assert rosservice._get_master().getPid() > 0
+
+
+def test_types_of_a_folder_are_listed(tmp_path: Path) -> None:
+    for name in ("B.srv", "A.srv", "C.msg"):
+        (tmp_path / name).touch()
+    assert rosmsg._list_types(str(tmp_path), "srv", ".srv") == ["A", "B"]
+    assert rosmsg._list_types(str(tmp_path / "none"), "srv", ".srv") == []
+
+
+def test_log_lines_of_rostest_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    rostest.rostestutil.printlog("a %s", "b")
+    rostest.rostestutil.printlog("%s")
+    rostest.rostestutil.printlogerr("x %s", 3)
+    out, err = capsys.readouterr()
+    assert (out, err) == ("[ROSTEST]a b\n[ROSTEST]%s\n", "[ROSTEST]x 3\n")

@@ -12,7 +12,7 @@ import pytest
 
 from minirospy.errors import NotFoundError
 from minirospy.workspace import elsewhere
-from minirospy.workspace.elsewhere import IMPORTED, advice
+from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 from minirospy.workspace.packages import Packages, built_in_roots
 
 OVERLAY = Path(elsewhere.__file__).parents[1] / "overlay"
@@ -51,6 +51,13 @@ def test_imports_raise_import_error_in_one_line(name: str) -> None:
         importlib.import_module(name)
     assert caught.value.name == name
     assert str(caught.value) == f"No module named '{name}': {advice(name)}"
+
+
+@pytest.mark.parametrize("name", sorted(SUBMODULES))
+def test_submodules_that_are_missing_name_what_to_use(name: str) -> None:
+    with pytest.raises(ImportError, match="minirospy does not have the module") as caught:
+        importlib.import_module(name)
+    assert str(caught.value).endswith(SUBMODULES[name])
 
 
 def test_package_that_a_workspace_has_comes_first(tmp_path: Path) -> None:

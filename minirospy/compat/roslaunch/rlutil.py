@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import uuid
 from collections.abc import Sequence
 
@@ -11,6 +12,7 @@ from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
 from minirospy.launch.load import find_files
+from minirospy.launch.master import LaunchMaster
 from minirospy.launch.output import Output, warn_of_large_logs
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
@@ -70,3 +72,13 @@ def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
         return find_files([word for word in args if ":=" not in word], Packages())
     except MinirospyError as error:
         raise RLException(str(error)) from error
+
+
+def _wait_for_master() -> None:
+    """Wait until the master of the environment answers."""
+    master = LaunchMaster(Environment.read(), Output(), time.sleep)
+    try:
+        if not master.is_online():
+            master.wait()
+    finally:
+        master.close()

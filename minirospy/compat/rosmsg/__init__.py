@@ -169,6 +169,16 @@ def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) 
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
 
 
+def _msg_filter(ext: str) -> Callable[[str], bool]:
+    """Return a function of a path that returns whether it is a file with this extension."""
+    return lambda path: os.path.isfile(path) and path.endswith(ext)
+
+
+def _list_types(path: str, subdir: str, ext: str) -> list[str]:
+    """Return the names of the types that the files in a folder define, sorted; ``subdir`` has no effect, as in ROS."""
+    return sorted(name[: -len(ext)] for name in _list_resources(path, _msg_filter(ext)))
+
+
 def _plain(value: object) -> object:
     """Return a value as dictionaries, lists and scalars of YAML."""
     if isinstance(value, TVal):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from minirospy.compat.rosgraph import masterapi
 from minirospy.errors import (
     MasterUnreachableError,
     MessageException,
@@ -144,6 +145,11 @@ _rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice
 def _fullusage() -> None:
     """Print the commands, and exit with the status of a usage error."""
     rosservicemain([NAME])
+
+
+def _get_master() -> masterapi.Master:
+    """Return the master as rosservice calls it."""
+    return masterapi.Master("/rosservice")
 
 
 @contextmanager

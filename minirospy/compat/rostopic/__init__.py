@@ -262,6 +262,13 @@ def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
     return master.getTopicTypes()
 
 
+def _sleep(duration: float) -> None:
+    """Wait for these seconds of ROS's clock. Raises ROSInterruptException."""
+    import rospy
+
+    rospy.rostime.wallsleep(duration)
+
+
 _get_topic_type = get_topic_type
 
 

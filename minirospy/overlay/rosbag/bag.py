@@ -18,4 +18,5 @@ __all__ = [
     "ROSBagEncryptNotSupportedException", "ROSBagException", "ROSBagFormatException", "ROSBagUnindexedException",
     "found_lz4",
 ]  # fmt: skip
+from minirospy.compat.rosbag.internals import _ConnectionInfo as _ConnectionInfo
 from minirospy.compat.rosbag.internals import _get_message_type as _get_message_type

@@ -19,3 +19,4 @@ __all__ = [
     "resolve_launch_arguments",
     "update_terminal_name",
 ]
+from minirospy.compat.roslaunch.rlutil import _wait_for_master as _wait_for_master

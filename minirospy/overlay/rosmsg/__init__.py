@@ -23,6 +23,8 @@ __all__ = [
     "list_msgs", "list_srvs", "list_types", "rosmsg_md5", "rosmsg_search", "rosmsgmain", "spec_to_str",
 ]  # fmt: skip
 from minirospy.compat.rosmsg import _list_resources as _list_resources
+from minirospy.compat.rosmsg import _list_types as _list_types
+from minirospy.compat.rosmsg import _msg_filter as _msg_filter
 from minirospy.compat.rosmsg import rosmsg_cmd_list as rosmsg_cmd_list
 from minirospy.compat.rosmsg import rosmsg_cmd_md5 as rosmsg_cmd_md5
 from minirospy.compat.rosmsg import rosmsg_cmd_package as rosmsg_cmd_package

@@ -23,6 +23,7 @@ __all__ = [
     "get_service_uri", "has_service_args", "rosservice_find", "rosservicemain",
 ]  # fmt: skip
 from minirospy.compat.rosservice import _fullusage as _fullusage
+from minirospy.compat.rosservice import _get_master as _get_master
 from minirospy.compat.rosservice import _rosservice_cmd_args as _rosservice_cmd_args
 from minirospy.compat.rosservice import _rosservice_cmd_call as _rosservice_cmd_call
 from minirospy.compat.rosservice import _rosservice_cmd_find as _rosservice_cmd_find

@@ -24,6 +24,7 @@ from minirospy.compat.rostopic import _rostopic_echo as _rostopic_echo
 from minirospy.compat.rostopic import _rostopic_info as _rostopic_info
 from minirospy.compat.rostopic import _rostopic_list as _rostopic_list
 from minirospy.compat.rostopic import _rostopic_type as _rostopic_type
+from minirospy.compat.rostopic import _sleep as _sleep
 from minirospy.compat.rostopic.echo import CallbackEcho, create_field_filter, create_value_transform
 from minirospy.compat.rostopic.rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
 

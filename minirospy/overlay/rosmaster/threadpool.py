@@ -1,0 +1,3 @@
+"""rosmaster.threadpool, which is not here: the import raises ImportError with what to use."""
+
+from minirospy.compat.elsewhere import rosmaster_threadpool as threadpool
