@@ -85,8 +85,10 @@ async def _run(
         else:
             main.cancel()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
+    before = {
+        number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     # On Windows a signal is noticed when the loop next wakes up.
     ticking = asyncio.ensure_future(_tick())
     try:
@@ -103,6 +105,8 @@ async def _run(
             raise
     finally:
         ticking.cancel()
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return 0
 
 

@@ -164,8 +164,9 @@ class Recorded(io.StringIO):
         self._on_text = on_text
 
     def write(self, text: str) -> int:
+        count = super().write(text)
         self._on_text()
-        return super().write(text)
+        return count
 
 
 def run(line: str, **streams: Any) -> Result:
@@ -522,18 +523,19 @@ def test_words_that_are_no_text(line: str, graph: Robot) -> None:
 # --- Ctrl-C
 
 
-def _until_ctrl_c(line: str) -> Result:
-    """Run a command; Ctrl-C once it has said something."""
+def _until_ctrl_c(line: str, text: str = "") -> Result:
+    """Run a command; Ctrl-C once it has printed something, or ``text`` as a part of its errors."""
     main = threading.main_thread().ident
     assert main is not None
     once = partial(next, iter([True]), False)
 
     def interrupt() -> None:
-        if once():
+        if text in errors.getvalue() and once():
             timer = threading.Timer(0.05, signal.pthread_kill, (main, signal.SIGINT))
             timer.start()
 
-    return run(line, stdout=Recorded(interrupt), stderr=Recorded(interrupt))
+    errors = Recorded(interrupt)
+    return run(line, stdout=Recorded(interrupt), stderr=errors)
 
 
 @posix
@@ -555,14 +557,14 @@ def test_ctrl_c(line: str, graph: Robot) -> None:
 @pytest.mark.parametrize("line", ["rostopic echo", "rostopic hz", "rostopic bw", "rostopic delay"])
 def test_the_nearest_of_a_topic_that_is_waited_for(line: str, graph: Robot) -> None:
     """Below real ROS's own warning, which scripts may read."""
-    assert _until_ctrl_c(f"{line} /buton_state").err == (
+    assert _until_ctrl_c(f"{line} /buton_state", "did you mean").err == (
         "WARNING: topic [/buton_state] does not appear to be published yet\ndid you mean /button_state?\n"
     )
 
 
 @posix
 def test_the_nearest_of_what_else_is_waited_for(graph: Robot) -> None:
-    assert _until_ctrl_c("rosservice call --wait /set_led_stat").err == (
+    assert _until_ctrl_c("rosservice call --wait /set_led_stat", "did you mean").err == (
         "WARNING: service [/set_led_stat] is not there yet\ndid you mean /set_led_state?\n"
     )
     # A service that is known and does not answer is near nobody but itself.

@@ -248,7 +248,7 @@ def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch.setattr(links, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     with one, other:
         sock: Any = SimpleNamespace(recv_into=recv_into)
-        source = links._Source(sock, links.ReaderSet())
+        source = links._FrameSource(sock, links.ReaderSet())
         space = memoryview(bytearray(8))
         for expected in (0, 1, 1, 2, 2):  # blocked, no data, blocked, late, blocked
             source._receive(space)
