@@ -145,6 +145,8 @@ class Target:
         if self._parts:
             master, node, bridge = self._parts
             self._parts = None
+            for session in list(bridge.foxglove.sessions):
+                bridge.foxglove.left(session)
             await bridge.close()
             await node.close()
             await master.close()
