@@ -185,7 +185,7 @@ rosmsg shwo
 rosmsg show std_msgs/Bool
 rosmsg show Bool
 rosmsg show PoseStamped
-rosmsg show Log
+rosmsg show TwistStamped
 rosmsg show actionlib/TestAction
 rosmsg show <<< std_msgs/Header\\n
 rosmsg show std_msgs/Bol
