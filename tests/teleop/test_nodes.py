@@ -149,8 +149,16 @@ def test_missing_device_is_one_line_and_waited_for(start: Start, tmp_path: Path)
                 assert array.status[0].level == 2
                 break
 
+    # The first diagnostics are published before the device is opened.
+    assert process.stderr
+    first = ""
+    while "Will retry every second." not in first:
+        line = process.stderr.readline()
+        assert line, first
+        first += line
     asyncio.run(asyncio.wait_for(main(), SECONDS))
-    _, errors = end(process)
+    _, rest = end(process)
+    errors = first + rest
     assert "Couldn't find a joystick with name No such pad. Falling back to default device." in errors
     assert errors.count(f"Couldn't open joystick {tmp_path}/js0. Will retry every second.") == 1
     assert process.returncode == 0
