@@ -36,6 +36,7 @@ class Pad:
 
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
+        self._link = link
         link.unlink(missing_ok=True)
         link.symlink_to(os.ttyname(self._slave))
         self._is_open = True
@@ -46,6 +47,8 @@ class Pad:
     def unplug(self) -> None:
         if self._is_open:
             self._is_open = False
+            # The next pseudo-terminal of any process gets its name.
+            self._link.unlink(missing_ok=True)
             os.close(self._slave)
             os.close(self._master)
 
