@@ -263,6 +263,9 @@ def test_changes_of_parameters_reach_subscribers(bridge: Running) -> None:
     bridge.run(node.delete_param("/a"))
     assert client.next("parameterValues")["parameters"] == [{"name": "/a"}]
     client.send(op="unsubscribeParameterUpdates", parameterNames=["/a", "/ns", "/ns/x"])
+    # Its answer shows that the bridge has read what came before.
+    client.send(op="getParameters", parameterNames=["/a"], id="unsubscribed")
+    assert client.next("parameterValues")["id"] == "unsubscribed"
     everything.close()
     bridge.run(node.set_param("/a", 3))
     client.send(op="getParameters", parameterNames=["/a"], id="last")
