@@ -54,7 +54,7 @@ LOCK_PATIENCE = 5.0
 def main(argv: list[str]) -> int:
     """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
     place = Place(argv[1], Path(argv[0]))
-    # A board that somebody kept stays, whoever starts it again.
+    # A board that somebody kept stays, also when another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not place.state_path.exists()
     with _locked(place) as owned:
         if owned:

@@ -1,4 +1,4 @@
-"""`minirospy python FILE`, as an installation of its own needs it."""
+"""`minirospy python FILE`, as a separate installation needs it."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class CameraInfoManager:
         return bool(self.getCameraInfo().K[0] != 0.0)
 
     def loadCameraInfo(self) -> None:
-        """Load the calibration; an empty one where there is no such file. What is wrong with it is logged."""
+        """Load the calibration; an empty one where the file is missing. What is wrong with it is logged."""
         filename = _filename(self.url, self.cname)
         if filename is not None:
             self.camera_info = loadCalibrationFile(filename, self.cname)
@@ -153,7 +153,7 @@ def resolveURL(url: str, cname: str) -> str:
 
 
 def getPackageFileName(url: str) -> str:
-    """Return the path of a package:// URL; nothing, with a warning, where there is no such package."""
+    """Return the path of a package:// URL; nothing, with a warning, where the package is not found."""
     package, _, name = url[len("package://") :].partition("/")
     try:
         return f"{RosPack().get_path(package)}/{name}"

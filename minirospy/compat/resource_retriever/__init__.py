@@ -19,7 +19,7 @@ _TIMEOUT = 60.0
 def get(url: str) -> bytes:
     """Return what is at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or what urllib opens, as http and https.
 
-    Raises Exception, as ROS does, where there is nothing; ResourceNotFound where there is no such package, ValueError
+    Raises Exception, as ROS does, where there is nothing; ResourceNotFound where the package is not found, ValueError
     where it is not a URL.
     """
     try:

@@ -37,7 +37,7 @@ class SoundError(Exception):
 
 
 class PlayingSound:
-    """A program that plays a sound, once or again and again, in a thread of its own."""
+    """A program that plays a sound, once or again and again, in a separate thread."""
 
     def __init__(self, command: Command, repeats: bool) -> None:
         self._command = command
