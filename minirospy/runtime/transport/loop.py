@@ -34,6 +34,7 @@ class LoopThread:
         # A signal handler may run while its thread holds it.
         self._lock = threading.RLock()
         self._is_ending = False
+        self._end = asyncio.Event()
         self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
         try:
             with naming_thread_limit():
@@ -83,14 +84,15 @@ class LoopThread:
         """End the loop: what still runs on it is cancelled."""
         if not self._thread.is_alive():
             return
-        self.post(self.loop.stop)
+        # Not loop.stop(): a second one would interrupt the last steps of the thread.
+        self.post(self._end.set)
         if threading.current_thread() is not self._thread:
             self._thread.join(2.0)
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self.loop)
         try:
-            self.loop.run_forever()
+            self.loop.run_until_complete(self._end.wait())
         finally:
             with self._lock:
                 self._is_ending = True

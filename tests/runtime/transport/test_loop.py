@@ -16,7 +16,7 @@ def test_a_call_while_the_loop_closes_gets_an_error() -> None:
     stopping, started = threading.Event(), threading.Event()
 
     def stop() -> None:
-        thread.loop.stop()
+        thread.close()
         stopping.set()
         started.wait(30)
 
@@ -32,6 +32,27 @@ def test_a_call_while_the_loop_closes_gets_an_error() -> None:
     with pytest.raises(LoopClosedError):
         thread.run(asyncio.sleep(0))
     thread.close()
+
+
+def test_a_second_close_does_not_interrupt_the_end() -> None:
+    thread = LoopThread("test-loop")
+    ended: list[str] = []
+
+    async def close_again() -> None:
+        try:
+            await asyncio.sleep(60)
+        finally:
+            thread.close()
+            await asyncio.sleep(0)
+            ended.append("task")
+
+    wait = thread.start(close_again())
+    thread.run(asyncio.sleep(0))
+    thread.close()
+    with pytest.raises(LoopClosedError):
+        wait(10)
+    assert thread.loop.is_closed()
+    assert ended == ["task"]
 
 
 def test_calls_start_in_their_order() -> None:
