@@ -119,6 +119,16 @@ def test_callback_may_feed_its_own_synchronizer(is_approximate: bool) -> None:
     assert seen == [1, 2, 3]
 
 
+def test_stamp_older_than_a_full_queue_completes_no_set() -> None:
+    inputs = [SimpleFilter(), SimpleFilter()]
+    seen: list[object] = []
+    ApproximateTimeSynchronizer(inputs, 1, 1.0).registerCallback(lambda *messages: seen.append(messages))
+    newest, older, other = Stamped(900), Stamped(5), Stamped(7)
+    for source, message in ((0, newest), (0, older), (1, other)):
+        inputs[source].signalMessage(message)
+    assert seen == [(newest, other)]
+
+
 def test_message_without_a_header_leaves_the_synchronizer_usable() -> None:
     inputs = [SimpleFilter()]
     seen: list[object] = []

@@ -168,6 +168,7 @@ class TimeSynchronizer(SimpleFilter):
         """Take the messages of these filters."""
         inputs = list(fs)
         self._stamp_queues = [StampQueue() for _ in inputs]
+        self._orders = [queue.order for queue in self._stamp_queues]
         self.queues: Sequence[Queue] = self._stamp_queues
         self.latest_stamps: list[Time] = [rospy.Time(0) for _ in inputs]
         self.input_connections = [
@@ -242,25 +243,28 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             is_stale = self.enable_reset and self._reset_if_time_jumped(my_queue, my_queue_index)
             if isinstance(my_queue, StampQueue):
                 my_queue.put(nanoseconds, stamp, msg)
+                waiting = len(my_queue.order)
             else:
                 my_queue[stamp] = msg
+                waiting = len(my_queue)
             now = _now()
             if now < self._last_added:
                 rospy.loginfo("ApproximateTimeSynchronizer: Detected jump back in time. Clearing buffer.")
                 for queue in self.queues:
                     queue.clear()
             self._last_added = now
-            if len(my_queue) > self.queue_size:
+            if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
+                if my_queue_index is not None and stamp not in my_queue:
+                    # It was older than all that the queue keeps.
+                    return
             if is_stale:
                 return
 
             # Most messages come while another input has none: no search for them.
-            if self.queues is self._stamp_queues:
-                for each in self._stamp_queues:
-                    if not each.order:
-                        return
-            found = self._match(my_queue, my_queue_index, stamp, nanoseconds)
+            if self.queues is self._stamp_queues and not all(self._orders):
+                return
+            found = self._match(my_queue_index, nanoseconds)
             if found:
                 self.signalMessage(*found)
 
@@ -269,22 +273,19 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         """When a message arrived last."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
-    def _match(
-        self, my_queue: Queue, my_queue_index: int | None, stamp: Time, nanoseconds: int
-    ) -> list[object]:
+    def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
         """Take the set that a stamp completes out of the queues; return its messages, none without such a set."""
         # A class that is derived from this one may have made its own list, of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]
-        if my_queue_index is not None and stamp not in my_queue:
-            # It was older than all that the queue keeps.
-            return []
         found = closest_stamps(queues, nanoseconds, self.slop.to_nsec(), my_queue_index)
         if found is None:
             return []
+        if self.queues is queues:
+            return [queue.take(each) for queue, each in zip(queues, found, strict=True)]
         return [
-            kept.take(each) if kept is queue else queue.pop(kept.stamp_at(each))
+            queue.pop(kept.stamp_at(each))
             for queue, kept, each in zip(self.queues, queues, found, strict=True)
         ]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from itertools import count
 
 from minirospy.times import Time
 
@@ -14,14 +13,13 @@ __all__ = ["StampQueue", "closest_stamps"]
 class StampQueue(MutableMapping[Time, object]):
     """The messages of one input by their stamps: a dict of ROS's, which keeps its stamps sorted in addition."""
 
-    __slots__ = ("_entries", "_numbers", "order")
+    __slots__ = ("_entries", "order")
 
     def __init__(self, messages: Mapping[Time, object] | None = None) -> None:
         """``messages``: what it holds from the start, in the order of their arrival."""
         self.order: list[int] = []
-        """The stamps, in nanoseconds, ascending."""
-        self._entries: dict[int, tuple[int, Time, object]] = {}
-        self._numbers = count()
+        """The stamps, in nanoseconds, ascending; the same list as long as the queue lives."""
+        self._entries: dict[int, tuple[Time, object]] = {}
         if messages:
             self.update(messages)
 
@@ -29,7 +27,7 @@ class StampQueue(MutableMapping[Time, object]):
         self.put(stamp.to_nsec(), stamp, message)
 
     def __getitem__(self, stamp: Time) -> object:
-        return self._entries[stamp.to_nsec()][2]
+        return self._entries[stamp.to_nsec()][1]
 
     def __delitem__(self, stamp: Time) -> None:
         self.take(stamp.to_nsec())
@@ -38,7 +36,7 @@ class StampQueue(MutableMapping[Time, object]):
         return isinstance(stamp, Time) and stamp.to_nsec() in self._entries
 
     def __iter__(self) -> Iterator[Time]:
-        return (stamp for _, stamp, _ in self._entries.values())
+        return (stamp for stamp, _ in self._entries.values())
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -48,17 +46,15 @@ class StampQueue(MutableMapping[Time, object]):
 
     def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
         """Store a message by its stamp, given in nanoseconds, too."""
-        before = self._entries.get(nanoseconds)
-        if before:
+        entries, order = self._entries, self.order
+        if nanoseconds in entries:
             # As in a dict, the key that is there keeps its place and its identity.
-            self._entries[nanoseconds] = before[0], before[1], message
-            return
-        self._entries[nanoseconds] = next(self._numbers), stamp, message
-        order = self.order
-        if order and nanoseconds < order[-1]:
+            stamp = entries[nanoseconds][0]
+        elif order and nanoseconds < order[-1]:
             insort(order, nanoseconds)
         else:
             order.append(nanoseconds)
+        entries[nanoseconds] = stamp, message
 
     def clear(self) -> None:
         """Remove every message."""
@@ -67,17 +63,14 @@ class StampQueue(MutableMapping[Time, object]):
 
     def take(self, nanoseconds: int) -> object:
         """Remove a message by its stamp in nanoseconds, and return it. Raises KeyError."""
-        message = self._entries.pop(nanoseconds)[2]
-        del self.order[bisect_left(self.order, nanoseconds)]
+        message = self._entries.pop(nanoseconds)[1]
+        order = self.order
+        del order[bisect_left(order, nanoseconds) if nanoseconds > order[0] else 0]
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
         """Return the stamp as it was given. Raises KeyError."""
-        return self._entries[nanoseconds][1]
-
-    def has(self, nanoseconds: int) -> bool:
-        """Return whether there is a message with this stamp, in nanoseconds."""
-        return nanoseconds in self._entries
+        return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
         """Remove the oldest messages, so that at most ``size`` are left."""
@@ -92,7 +85,10 @@ class StampQueue(MutableMapping[Time, object]):
         after = bisect_left(order, stamp)
         if after == 0 or order[after] == stamp:
             return order[after]
-        return min(order[after - 1], order[after], key=lambda each: self._rank(each, stamp))
+        earlier, later = order[after - 1], order[after]
+        if stamp - earlier == later - stamp:
+            return next(each for each in self._entries if each in (earlier, later))
+        return earlier if stamp - earlier < later - stamp else later
 
     def between(self, first: int, last: int) -> list[int]:
         """Return the stamps from ``first`` to ``last``, ascending."""
@@ -100,10 +96,8 @@ class StampQueue(MutableMapping[Time, object]):
 
     def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
         """Return some of its stamps, the closest to ``stamp`` first; equally close ones in the order of their arrival."""
-        return sorted(stamps, key=lambda each: self._rank(each, stamp))
-
-    def _rank(self, each: int, stamp: int) -> tuple[int, int]:
-        return abs(each - stamp), self._entries[each][0]
+        ranks = {each: rank for rank, each in enumerate(self._entries)}
+        return sorted(stamps, key=lambda each: (abs(each - stamp), ranks[each]))
 
 
 def closest_stamps(
@@ -119,12 +113,18 @@ def closest_stamps(
     """
     nearest = []
     for at, queue in enumerate(queues):
-        if not queue.order:
+        order = queue.order
+        if not order:
             return None
-        nearest.append(stamp if at == index else queue.nearest(stamp))
-    if min(nearest) < stamp - slop or max(nearest) > stamp + slop:
+        if at == index:
+            nearest.append(stamp)
+        else:
+            # The most frequent case first: the new message is the newest of all.
+            nearest.append(newest if (newest := order[-1]) <= stamp else queue.nearest(stamp))
+    first, last = min(nearest), max(nearest)
+    if first < stamp - slop or last > stamp + slop:
         return None
-    if max(nearest) - min(nearest) < slop:
+    if last - first < slop:
         return nearest
 
     # Stamps that are less than `slop` apart are in a window of that width, which starts at one of them.
