@@ -6,6 +6,8 @@ import math
 import struct
 import subprocess
 import sys
+import types
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,6 +16,8 @@ from hypothesis import strategies as st
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
+
+from minirospy.compat.sensor_msgs import point_cloud2 as reading
 
 FORMATS = {1: "b", 2: "B", 3: "h", 4: "H", 5: "i", 6: "I", 7: "f", 8: "d"}
 
@@ -60,10 +64,21 @@ def slowly(cloud: PointCloud2, *, skip_nans: bool) -> list[tuple[float, ...]]:
     return [each for each in points if not (skip_nans and any(map(math.isnan, each)))]
 
 
-@given(clouds(), st.booleans())
-def test_points_are_those_of_struct(cloud: PointCloud2, skip_nans: bool) -> None:
-    found = list(point_cloud2.read_points(cloud, skip_nans=skip_nans))
+@given(clouds(), st.booleans(), st.sampled_from([1, 7, 50, 4096]), st.sampled_from([1, 1000]))
+def test_points_are_those_of_struct(cloud: PointCloud2, skip_nans: bool, block: int, few: int) -> None:
+    with mock.patch.object(reading, "_BLOCK", block), mock.patch.object(reading, "_FEW", few):
+        found = list(point_cloud2.read_points(cloud, skip_nans=skip_nans))
     assert repr(found) == repr(slowly(cloud, skip_nans=skip_nans))
+
+
+def test_points_of_a_large_cloud_come_from_a_generator() -> None:
+    cloud = xyz(40, 300, padding=8)
+    points = point_cloud2.read_points(cloud)
+    assert isinstance(points, types.GeneratorType)
+    assert next(points) == (0.0, 0.0, 0.0)
+    points.close()
+    assert next(points, None) is None
+    assert repr(list(point_cloud2.read_points(cloud))) == repr(slowly(cloud, skip_nans=False))
 
 
 @given(clouds())
