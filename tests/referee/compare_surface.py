@@ -440,8 +440,8 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
 
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
         is_ours = ours.get(name)
-        told_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND, *FRAMES)
-        if is_ours is None and told_at_home and name not in REASONS:
+        listed_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND, *FRAMES)
+        if is_ours is None and listed_at_home and name not in REASONS:
             continue
 
         if is_ours is None:

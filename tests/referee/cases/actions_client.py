@@ -92,7 +92,7 @@ show(
     len({first, second, first}),
 )
 
-show("== a handle that is dropped is told no more")
+show("== a handle that is dropped is not notified any more")
 fourth = client.send_goal(TestGoal(5), changed)
 show(server.wait_goals(5))
 del fourth

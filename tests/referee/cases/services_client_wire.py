@@ -66,7 +66,7 @@ def case(label, answers, calls=None, **kwds):
         outcome(label, lambda: call(proxy))
     thread.join()
     for fields in received:
-        show("   told", fields)
+        show("   received", fields)
 
 
 case("good", [(good, [yes])])
@@ -75,7 +75,7 @@ case("headers that are ours", [(good, [yes])], headers={"callerid": "/fake", "md
 case("persistent", [(good, [yes, yes])], [lambda p: p(True), lambda p: p(False)], persistent=True)
 case("an error", [(good, [b"\0" + packed(b"what went wrong")])])
 case("an error without text", [(good, [b"\0" + packed(b"")])])
-case("an error that is no UTF-8", [(good, [b"\0" + packed(b"\xff\xfe")])])
+case("an error that is not UTF-8", [(good, [b"\0" + packed(b"\xff\xfe")])])
 case("error, then good", [(good, [b"\0" + packed(b"wrong"), yes])], [lambda p: p(True)] * 2, persistent=True)
 case("refused", [(header(error="go away"), [])])
 case("hangs up at the header", [(b"", [])])

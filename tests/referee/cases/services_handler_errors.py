@@ -67,11 +67,11 @@ show("error_handler")
 
 
 def on_error(e, exception_type, exception_value, tb):
-    show("told", repr(e), exception_type.__name__, repr(exception_value), type(tb).__name__)
+    show("failing", repr(e), exception_type.__name__, repr(exception_value), type(tb).__name__)
 
 
-offered = rospy.Service("told", Trigger, raises(ValueError("bad")), error_handler=on_error)
-outcome("the client", rospy.ServiceProxy("told", Trigger))
+offered = rospy.Service("failing", Trigger, raises(ValueError("bad")), error_handler=on_error)
+outcome("the client", rospy.ServiceProxy("failing", Trigger))
 offered_none = rospy.Service("told_none", Trigger, lambda request: None, error_handler=on_error)
 outcome("None", rospy.ServiceProxy("told_none", Trigger))
 offered_wrong = rospy.Service("told_wrong", Trigger, lambda request: [1, 2], error_handler=on_error)

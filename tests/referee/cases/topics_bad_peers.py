@@ -9,10 +9,10 @@ from referee import outcome
 from std_msgs.msg import String
 
 rospy.init_node("case", argv=[])
-publisher = rospy.Publisher("/told", String, queue_size=1, latch=True)
+publisher = rospy.Publisher("/topic", String, queue_size=1, latch=True)
 publisher.publish("x")
 node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
-_, _, (_, host, port) = node.requestTopic("/me", "/told", [["TCPROS"]])
+_, _, (_, host, port) = node.requestTopic("/me", "/topic", [["TCPROS"]])
 
 
 def field(text):
@@ -23,7 +23,7 @@ def good():
     """Return what a good subscriber receives."""
     with socket.create_connection((host, port), 10) as sock:
         body = b"".join(
-            field(t) for t in (b"topic=/told", b"md5sum=" + String._md5sum.encode(), b"callerid=/raw")
+            field(t) for t in (b"topic=/topic", b"md5sum=" + String._md5sum.encode(), b"callerid=/raw")
         )
         sock.sendall(field(body))
         stream = sock.makefile("rb")

@@ -49,30 +49,30 @@ rospy.init_node("case", argv=[])
 got = []
 arrived = threading.Event()
 publisher = rospy.Publisher(
-    "/told", String, queue_size=1, latch=True, headers={"extra": "5", "topic": "mine"}
+    "/topic", String, queue_size=1, latch=True, headers={"extra": "5", "topic": "mine"}
 )
 publisher.publish("x")
-rospy.Subscriber("/told", String, lambda message: (got.append(message), arrived.set()))
+rospy.Subscriber("/topic", String, lambda message: (got.append(message), arrived.set()))
 arrived.wait(10)
 for name, value in sorted(got[0]._connection_header.items()):
     show("header", name, repr(value))
 
 node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
-code, text, (protocol, host, port) = node.requestTopic("/me", "/told", [["TCPROS"]])
+code, text, (protocol, host, port) = node.requestTopic("/me", "/topic", [["TCPROS"]])
 show("requestTopic", code, text, protocol, host)
 for label, args in {
     "an unknown topic": ("/me", "/nobody", [["TCPROS"]]),
-    "an unknown protocol": ("/me", "/told", [["CARRIER_PIGEON"]]),
-    "UDPROS first": ("/me", "/told", [["CARRIER_PIGEON"], ["TCPROS"]]),
-    "no protocol": ("/me", "/told", []),
+    "an unknown protocol": ("/me", "/topic", [["CARRIER_PIGEON"]]),
+    "UDPROS first": ("/me", "/topic", [["CARRIER_PIGEON"], ["TCPROS"]]),
+    "no protocol": ("/me", "/topic", []),
     "a number as topic": ("/me", 5, [["TCPROS"]]),
-    "too few arguments": ("/me", "/told"),
-    "a string as protocols": ("/me", "/told", "TCPROS"),
+    "too few arguments": ("/me", "/topic"),
+    "a string as protocols": ("/me", "/topic", "TCPROS"),
 }.items():
     outcome(f"requestTopic with {label}", lambda args=args: node.requestTopic(*args))
 
 MD5, OTHER = String._md5sum, Bool._md5sum
-usual = {"topic": "/told", "md5sum": MD5, "type": "std_msgs/String", "callerid": "/raw"}
+usual = {"topic": "/topic", "md5sum": MD5, "type": "std_msgs/String", "callerid": "/raw"}
 for label, changes in {
     "as it should be": {},
     "any type": {"md5sum": "*", "type": "*"},

@@ -12,16 +12,16 @@ from std_msgs.msg import String
 os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[])
 node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
-publisher = rospy.Publisher("/told", String, queue_size=1)
+publisher = rospy.Publisher("/topic", String, queue_size=1)
 got = []
-subscriber = rospy.Subscriber("/told", String, got.append)
+subscriber = rospy.Subscriber("/topic", String, got.append)
 show(eventually(lambda: publisher.get_num_connections() == 1 and subscriber.get_num_connections() == 1))
 publisher.publish("abc")
 show(eventually(lambda: len(got) == 1))
 code, text, rows = node.getBusInfo("/me")
 show("getBusInfo", code, text)
 for row in sorted(rows, key=lambda row: row[2]):
-    if row[4] == "/told":
+    if row[4] == "/topic":
         # The subscriber's end may not know its socket any more: a race of the real one.
         what = re.sub(r"\d+|None", "<number>", row[6].split(" to [")[0]) if len(row) > 6 else None
         show("row", row[1:6], what, type(row[0]).__name__, len(row))
@@ -29,7 +29,7 @@ code, text, (publications, subscriptions, services) = node.getBusStats("/me")
 show("getBusStats", code, text, services)
 show(
     "publications",
-    [(topic, data > 0, [row[2:] for row in rows]) for topic, data, rows in publications if topic == "/told"],
+    [(topic, data > 0, [row[2:] for row in rows]) for topic, data, rows in publications if topic == "/topic"],
 )
 show("subscriptions", [(topic, len(rows[0])) for topic, rows in subscriptions])
 outcome("getPublications", lambda: node.getPublications("/me"))
@@ -39,8 +39,8 @@ outcome("getMasterUri", lambda: node.getMasterUri("/me")[:2])
 outcome("getPid", lambda: node.getPid("/me")[:2])
 outcome("getUri", lambda: node.getUri("/me"))
 outcome("publisherUpdate of nothing", lambda: node.publisherUpdate("/me", "/nobody", []))
-outcome("publisherUpdate with a string", lambda: node.publisherUpdate("/me", "/told", "x"))
-outcome("publisherUpdate with numbers", lambda: node.publisherUpdate("/me", "/told", [5]))
+outcome("publisherUpdate with a string", lambda: node.publisherUpdate("/me", "/topic", "x"))
+outcome("publisherUpdate with numbers", lambda: node.publisherUpdate("/me", "/topic", [5]))
 outcome("publisherUpdate without a topic", lambda: node.publisherUpdate("/me"))
 outcome("publisherUpdate with a number", lambda: node.publisherUpdate("/me", 5, []))
 outcome("publisherUpdate with no name", lambda: node.publisherUpdate("/me", "", []))
@@ -54,6 +54,6 @@ outcome("one argument too many", lambda: node.getName("/me", 5))
 outcome("paramUpdate, relative key", lambda: node.paramUpdate("/me", "x", 1))
 outcome("paramUpdate, empty key", lambda: node.paramUpdate("/me", "", 1))
 outcome("paramUpdate, number as key", lambda: node.paramUpdate("/me", 3, 1))
-outcome("publisherUpdate, no URL", lambda: node.publisherUpdate("/me", "/told", ["x"]))
-outcome("publisherUpdate, no list", lambda: node.publisherUpdate("/me", "/told", 3))
-outcome("requestTopic, relative name", lambda: node.requestTopic("/me", "told", [["TCPROS"]])[0])
+outcome("publisherUpdate, no URL", lambda: node.publisherUpdate("/me", "/topic", ["x"]))
+outcome("publisherUpdate, no list", lambda: node.publisherUpdate("/me", "/topic", 3))
+outcome("requestTopic, relative name", lambda: node.requestTopic("/me", "topic", [["TCPROS"]])[0])
