@@ -93,31 +93,37 @@ class Parameters:
             self._graph.spawn(self._graph.node.parameters.remove(_ROOT))
 
     def _changed(self, name: str, value: object) -> None:
-        """Report a change at ``name``, a parameter or a namespace; ``{}`` is one that was deleted."""
-        leaves = list(_leaves(name.rstrip("/"), value)) if isinstance(value, dict) else [(name, value)]
-        allowed = [Parameter(leaf, each) for leaf, each in leaves if self._graph.filters.parameters(leaf)]
-        if value == {} and self._graph.filters.parameters(name):
-            allowed = [Parameter(name, is_set=False)]
-        above: set[str] = set()
+        """Report a change at ``name``, a parameter or a namespace; ``{}`` is one that was deleted, or an empty one."""
+        allowed = self._graph.filters.parameters
+        is_empty = value == {}
+        leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
+        # The master does not distinguish what was deleted from what is empty: reading it does.
+        emptied = name if is_empty and name != _ROOT and allowed(name) else ""
+        again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):
-            mine = [each for each in allowed if names is None or each.name in names]
+            mine = [Parameter(*leaf) for leaf in leaves if names is None or leaf[0] in names]
             if mine:
                 listener.parameters_changed(mine)
-            above |= {each for each in names or () if name.startswith(each.rstrip("/") + "/")}
-            if isinstance(value, dict):
-                above |= {each for each in names or () if each == name}
-                if value == {}:
-                    above |= {each for each in names or () if each.startswith(name.rstrip("/") + "/")}
-        if above:
-            self._graph.spawn(self._report(tuple(above)))
+            again |= {each for each in names or () if allowed(each) and _is_affected(each, name, value)}
+        if again:
+            self._graph.spawn(self._report(tuple(again), emptied))
 
-    async def _report(self, names: tuple[str, ...]) -> None:
-        """Report the present values of namespaces that clients subscribe to as a whole, and of what was deleted with one."""
+    async def _report(self, names: tuple[str, ...], emptied: str) -> None:
+        """Report the present values of what clients subscribe to, of ``emptied`` to those that subscribe to all, too."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
-            mine = [each for each in found if wanted and each.name in wanted]
+            mine = [each for each in found if each.name in (wanted or (emptied,))]
             if mine:
                 listener.parameters_changed(mine)
+
+
+def _is_affected(wanted: str, name: str, value: object) -> bool:
+    """Return whether a change at ``name`` may change a parameter in a way that ``value`` does not show."""
+    if name.startswith(wanted.rstrip("/") + "/"):
+        return True
+    if not isinstance(value, dict):
+        return False
+    return wanted == name or (value == {} and wanted.startswith(name.rstrip("/") + "/"))
 
 
 def _leaves(namespace: str, value: object) -> Iterable[tuple[str, object]]:
