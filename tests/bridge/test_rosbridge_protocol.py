@@ -421,3 +421,11 @@ def test_message_is_encoded_as_by_the_real_server(name: str) -> None:
     found = cbor2.loads(cbor2.dumps(conversion.cbor_values(message)))
     # Two NaNs are not equal.
     assert repr(found) == repr(cbor2.loads(bytes.fromhex(recorded["cbor"]))["msg"])
+
+
+@pytest.mark.parametrize("value", ["Infinity", "NaN", "1e400", "1" + "0" * 400])
+def test_numbers_that_are_not_finite_are_refused(value: str) -> None:
+    fields = protocol.decode(f'{{"op":"subscribe","id":"a","topic":"/t","throttle_rate":{value}}}')
+    with pytest.raises(OperationError, match="field throttle_rate is not a number") as caught:
+        protocol.parse(fields)
+    assert caught.value.id == "a"

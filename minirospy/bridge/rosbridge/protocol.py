@@ -7,6 +7,7 @@ https://github.com/RobotWebTools/rosbridge_suite, branch ros1.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -75,30 +76,44 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Advertise(Event):
+class TopicEvent(Event):
+    """An operation on a topic."""
+
     topic: str
+
+
+@dataclass(frozen=True)
+class ServiceEvent(Event):
+    """An operation on a service."""
+
+    service: str
+
+
+@dataclass(frozen=True)
+class Advertise(TopicEvent):
+    """Publish a topic."""
+
     type: str
     latch: bool
     queue_size: int
 
 
-@dataclass(frozen=True)
-class Unadvertise(Event):
-    topic: str
+class Unadvertise(TopicEvent):
+    """Publish it no more."""
 
 
 @dataclass(frozen=True)
-class Publish(Event):
-    topic: str
+class Publish(TopicEvent):
+    """Send a message."""
+
     message: object
     latch: bool
 
 
 @dataclass(frozen=True)
-class Subscribe(Event):
-    """``throttle_rate`` in milliseconds."""
+class Subscribe(TopicEvent):
+    """Receive a topic's messages; ``throttle_rate`` in milliseconds."""
 
-    topic: str
     type: str | None
     throttle_rate: int
     queue_length: int
@@ -106,37 +121,36 @@ class Subscribe(Event):
     compression: Compression
 
 
-@dataclass(frozen=True)
-class Unsubscribe(Event):
-    topic: str
+class Unsubscribe(TopicEvent):
+    """Receive them no more."""
 
 
 @dataclass(frozen=True)
-class CallService(Event):
+class CallService(ServiceEvent):
     """``arguments``: the fields of the request, a list of their values, or anything else for none."""
 
-    service: str
     arguments: object
     fragment_size: int | None
     compression: Compression
 
 
 @dataclass(frozen=True)
-class ServiceResponse(Event):
-    service: str
+class ServiceResponse(ServiceEvent):
+    """Answer a call; ``values`` is a text where ``result`` is false."""
+
     values: object
     result: bool
 
 
 @dataclass(frozen=True)
-class AdvertiseService(Event):
-    service: str
+class AdvertiseService(ServiceEvent):
+    """Offer a service."""
+
     type: str
 
 
-@dataclass(frozen=True)
-class UnadvertiseService(Event):
-    service: str
+class UnadvertiseService(ServiceEvent):
+    """Offer it no more."""
 
 
 @dataclass(frozen=True)
@@ -189,13 +203,15 @@ def parse(fields: Fields) -> Event:
     op = fields.get("op")
     if op is None:
         raise _without_op(fields, id_)
-    reader = _READERS.get(op) if isinstance(op, str) else None
-    if reader is None:
+    if not isinstance(op, str) or op not in OPERATIONS:
         raise OperationError(
             f"Unknown operation: {str(op)[:_SHOWN]}.  Allowed operations: {list(OPERATIONS)}", id_
         )
     try:
-        return reader(fields, id_)
+        if op in _READERS:
+            return _READERS[op](fields, id_)
+        event, readers = _FIELDS[op]
+        return event(id_, *(read(fields) for read in readers))
     except OperationError:
         raise
     except BridgeProtocolError as error:
@@ -255,38 +271,76 @@ def _fragment_size(fields: Fields) -> int | None:
     return found
 
 
-def _advertise(fields: Fields, id_: Id) -> Event:
-    return Advertise(
-        id_,
-        _text(fields, "topic"),
-        _text(fields, "type"),
-        bool(fields.get("latch")),
-        _value(fields, "queue_size", (int,), 100),
-    )
+def _number(fields: Fields, name: str, default: Any = ...) -> float:
+    found = _value(fields, name, (int, float), default)
+    try:
+        number = float(found)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise BridgeProtocolError(
+            f"field {name} is not a number of seconds or milliseconds: {str(found)[:_SHOWN]}"
+        )
+    return number
 
 
-def _unadvertise(fields: Fields, id_: Id) -> Event:
-    return Unadvertise(id_, _text(fields, "topic"))
+def _throttle_rate(fields: Fields) -> int:
+    return max(0, int(_number(fields, "throttle_rate", 0)))
 
 
-def _publish(fields: Fields, id_: Id) -> Event:
-    return Publish(id_, _text(fields, "topic"), fields.get("msg", {}), bool(fields.get("latch")))
+def _queue_length(fields: Fields) -> int:
+    return max(0, int(_value(fields, "queue_length", (int,), 0)))
 
 
-def _subscribe(fields: Fields, id_: Id) -> Event:
-    return Subscribe(
-        id_,
-        _text(fields, "topic"),
-        _text(fields, "type", None) or None,
-        max(0, int(_value(fields, "throttle_rate", (int, float), 0))),
-        max(0, _value(fields, "queue_length", (int,), 0)),
-        _fragment_size(fields),
-        _compression(fields),
-    )
+_Read = Callable[[Fields], Any]
 
 
-def _unsubscribe(fields: Fields, id_: Id) -> Event:
-    return Unsubscribe(id_, _text(fields, "topic"))
+def _required(name: str) -> _Read:
+    return lambda fields: _text(fields, name)
+
+
+def _latch(fields: Fields) -> bool:
+    return bool(fields.get("latch"))
+
+
+_TOPIC, _SERVICE, _TYPE = (_required(name) for name in ("topic", "service", "type"))
+
+_FIELDS: Mapping[str, tuple[Callable[..., Event], tuple[_Read, ...]]] = {
+    "advertise": (
+        Advertise,
+        (_TOPIC, _TYPE, _latch, lambda fields: _value(fields, "queue_size", (int,), 100)),
+    ),
+    "unadvertise": (Unadvertise, (_TOPIC,)),
+    "publish": (Publish, (_TOPIC, lambda fields: fields.get("msg", {}), _latch)),
+    "subscribe": (
+        Subscribe,
+        (
+            _TOPIC,
+            lambda fields: _text(fields, "type", None) or None,
+            _throttle_rate,
+            _queue_length,
+            _fragment_size,
+            _compression,
+        ),
+    ),
+    "unsubscribe": (Unsubscribe, (_TOPIC,)),
+    "service_response": (
+        ServiceResponse,
+        (_SERVICE, lambda fields: fields.get("values", {}), lambda fields: _value(fields, "result", (bool,))),
+    ),
+    "advertise_service": (AdvertiseService, (_SERVICE, _TYPE)),
+    "unadvertise_service": (UnadvertiseService, (_SERVICE,)),
+    "auth": (
+        Auth,
+        (
+            *(_required(name) for name in ("mac", "client", "dest", "rand")),
+            lambda fields: _number(fields, "t"),
+            _required("level"),
+            lambda fields: _number(fields, "end"),
+        ),
+    ),
+}
+"""The operations whose record has a field for each of these, in its order."""
 
 
 def _call_service(fields: Fields, id_: Id) -> Event:
@@ -299,19 +353,6 @@ def _call_service(fields: Fields, id_: Id) -> Event:
         _fragment_size(fields),
         _compression(fields),
     )
-
-
-def _service_response(fields: Fields, id_: Id) -> Event:
-    result = _value(fields, "result", (bool,))
-    return ServiceResponse(id_, _text(fields, "service"), fields.get("values", {}), result)
-
-
-def _advertise_service(fields: Fields, id_: Id) -> Event:
-    return AdvertiseService(id_, _text(fields, "service"), _text(fields, "type"))
-
-
-def _unadvertise_service(fields: Fields, id_: Id) -> Event:
-    return UnadvertiseService(id_, _text(fields, "service"))
 
 
 def _fragment(fields: Fields, id_: Id) -> Event:
@@ -344,29 +385,17 @@ def _set_level(fields: Fields, id_: Id) -> Event:
         raise BridgeProtocolError(f"Invalid status level {level[:_SHOWN]}; must be one of {names}") from None
 
 
-def _auth(fields: Fields, id_: Id) -> Event:
-    mac, client, dest, rand = (_text(fields, name) for name in ("mac", "client", "dest", "rand"))
-    time, end = (_value(fields, name, (int, float)) for name in ("t", "end"))
-    return Auth(id_, mac, client, dest, rand, float(time), _text(fields, "level"), float(end))
-
-
 _READERS: Mapping[str, Callable[[Fields, Id], Event]] = {
     "call_service": _call_service,
-    "advertise": _advertise,
-    "unadvertise": _unadvertise,
-    "publish": _publish,
-    "subscribe": _subscribe,
-    "unsubscribe": _unsubscribe,
     "fragment": _fragment,
-    "advertise_service": _advertise_service,
-    "service_response": _service_response,
-    "unadvertise_service": _unadvertise_service,
     "png": _png,
     "set_level": _set_level,
-    "auth": _auth,
 }
-OPERATIONS = tuple(_READERS)
-"""The operations that clients may send."""
+OPERATIONS = (
+    *("call_service", "advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "fragment"),
+    *("advertise_service", "service_response", "unadvertise_service", "png", "set_level", "auth"),
+)
+"""The operations that clients may send, in the order in which errors list them."""
 
 
 # --- out
