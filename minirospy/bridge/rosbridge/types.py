@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
+from typing import TypeVar
 
 from minirospy.errors import BridgeError, MinirospyError
 from minirospy.idl.load import class_from_text, get_message_class, get_service_class
@@ -11,6 +13,8 @@ from minirospy.wire.header import Header
 
 __all__ = ["ArrivingTypes", "UnknownTypeError", "message_class", "service_class"]
 
+_Class = TypeVar("_Class")
+
 
 class UnknownTypeError(BridgeError):
     """A type that is not installed."""
@@ -18,23 +22,21 @@ class UnknownTypeError(BridgeError):
 
 def message_class(name: str) -> type[Message]:
     """Return a message's class. Raises UnknownTypeError."""
-    try:
-        found = get_message_class(name)
-    except (MinirospyError, ImportError, SyntaxError) as error:
-        raise _unknown(name, "msg", str(error)) from error
-    if found is None:
-        raise _unknown(name, "msg", "no such definition is installed here")
-    return found
+    return _installed(get_message_class, name, "msg")
 
 
 def service_class(name: str) -> ServiceClass:
     """Return a service's class. Raises UnknownTypeError."""
+    return _installed(get_service_class, name, "srv")
+
+
+def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Class:
     try:
-        found = get_service_class(name)
+        found = get(name)
     except (MinirospyError, ImportError, SyntaxError) as error:
-        raise _unknown(name, "srv", str(error)) from error
+        raise _unknown(name, kind, str(error)) from error
     if found is None:
-        raise _unknown(name, "srv", "no such definition is installed here")
+        raise _unknown(name, kind, "no such definition is installed here")
     return found
 
 
