@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TypeVar
 
+from minirospy.aio.node import Node
+from minirospy.bridge.access import Access, is_loopback
+from minirospy.bridge.addresses import host_names
 from minirospy.bridge.tokens import Tokens, kept_tokens
 from minirospy.environment import Environment
 from minirospy.errors import BridgeError
 
-__all__ = ["globs", "number", "texts", "tokens_of", "value"]
+__all__ = ["access_of", "address_of", "globs", "number", "private_parameters", "texts", "value"]
 
 _T = TypeVar("_T", str, int, bool)
+
+_OFF = (None, False, 0, "", "None")
+"""Values of parameters that switch nothing on."""
+
+
+async def private_parameters(
+    node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
+) -> dict[str, object]:
+    """Return a node's private parameters and those ``given`` as arguments; warn of each that is set ``without_effect``."""
+    found = await node.get_param("~", {})
+    private = {**(found if isinstance(found, dict) else {}), **given}
+    for name in without_effect:
+        if private.get(name) not in _OFF:
+            node.log.warning("parameter ~%s has no effect", name)
+    return private
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
@@ -46,7 +65,26 @@ def globs(private: Mapping[str, object], name: str) -> list[str]:
     return [each for each in texts({name: found}, name, ()) if each]
 
 
-def tokens_of(environ: Mapping[str, str], *, beyond: bool) -> Tokens:
-    """Return the tokens of the environment; where others may connect (``beyond``) and there are none, those of this user."""
-    given = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))
-    return kept_tokens(Environment.read().home) if beyond and not any(given) else given
+def address_of(private: Mapping[str, object]) -> str:
+    """Return the address to listen at. Raises BridgeError."""
+    return value(private, "address", str, "") or "127.0.0.1"
+
+
+def access_of(
+    private: Mapping[str, object], environ: Mapping[str, str], origins: Iterable[str] = ()
+) -> Access:
+    """Return the rules for clients, with the tokens of the environment.
+
+    Where other machines may connect and there are none, the tokens are those that are kept for this user. Raises BridgeError.
+    """
+    beyond = not is_loopback(address_of(private))
+    tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))
+    if beyond and not any(tokens):
+        tokens = kept_tokens(Environment.read().home)
+    return Access(
+        hosts=tuple(host_names()),
+        origins=tuple(origins),
+        read_token=tokens.read,
+        write_token=tokens.write,
+        requires_token=beyond or any(tokens),
+    )

@@ -7,13 +7,16 @@ import importlib
 import signal
 import sys
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.aio.node import Node
-from minirospy.errors import BridgeError, ROSInterruptException
+from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.runtime.transport.loop import new_event_loop
 
-__all__ = ["Part", "require_libraries", "run", "run_program"]
+if TYPE_CHECKING:
+    from minirospy.bridge.bridge import Bridge
+
+__all__ = ["Part", "announce", "exit_status", "require_libraries", "run", "run_program"]
 
 
 class Part(Protocol):
@@ -39,27 +42,49 @@ def require_libraries() -> None:
 
 def run_program(name: str, module: str) -> int:
     """Run a node's program, whose module imports the libraries; return the exit status, 1 where one is missing."""
-    try:
+
+    def body() -> int:
         require_libraries()
-    except BridgeError as error:
+        return int(importlib.import_module(module).main())
+
+    return exit_status(name, body)
+
+
+def exit_status(name: str, body: Callable[[], int]) -> int:
+    """Return the exit status of a program; 1 where ``body`` raises MinirospyError, which is printed in one line."""
+    try:
+        return body()
+    except MinirospyError as error:
         print(f"{name}: ERROR: {error}", file=sys.stderr)
         return 1
-    return int(importlib.import_module(module).main())
+
+
+def announce(bridge: Bridge, door: str, text: str, scheme: str = "ws") -> None:
+    """Log where a door is, and whether it needs a token."""
+    listener = bridge.listeners[door]
+    scheme += "s" if listener.is_encrypted else ""
+    bridge.node.log.info("%s %s://%s:%d", text, scheme, listener.host, listener.port)
+    if bridge.options.access.requires_token:
+        bridge.node.log.info(
+            "a token is required: `minirospy bridge --show-tokens` prints those of this user"
+        )
 
 
 def run(
     name: str,
-    argv: Sequence[str],
+    argv: Sequence[str] | None,
     start: Callable[[Node], Awaitable[_P]],
     on_started: Callable[[_P], None],
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as a launch file gives them. ``start`` makes the bridge, ``on_started`` shows its addresses.
+    ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
+    ``on_started`` shows its addresses.
     """
     loop = new_event_loop()
     try:
-        return loop.run_until_complete(_run(name, argv, start, on_started))
+        words = sys.argv[1:] if argv is None else argv
+        return loop.run_until_complete(_run(name, words, start, on_started))
     finally:
         loop.close()
 

@@ -7,20 +7,18 @@ node can read. Source: https://github.com/foxglove/ros-foxglove-bridge (README).
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
-from minirospy.bridge.access import Access, NameFilter, is_loopback
-from minirospy.bridge.addresses import host_names
+from minirospy.bridge.access import NameFilter
 from minirospy.bridge.bridge import FOXGLOVE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.foxglove.assets import ALLOWED
 from minirospy.bridge.foxglove.door import CAPABILITIES
 from minirospy.bridge.graph import Filters
-from minirospy.bridge.node_parameters import texts, tokens_of, value
-from minirospy.bridge.serve import require_libraries, run
+from minirospy.bridge.node_parameters import access_of, address_of, private_parameters, texts, value
+from minirospy.bridge.serve import announce, exit_status, run
 from minirospy.bridge.web.connection import Limits
-from minirospy.errors import BridgeError, MinirospyError
+from minirospy.errors import BridgeError
 
 __all__ = ["main", "options_of"]
 
@@ -29,28 +27,16 @@ _WITHOUT_EFFECT = ("use_compression",)
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is shut down; return the exit status."""
-    try:
-        require_libraries()
-        return run("foxglove_bridge", sys.argv[1:] if argv is None else argv, _start, _announce)
-    except MinirospyError as error:
-        print(f"foxglove_bridge: ERROR: {error}", file=sys.stderr)
-        return 1
+    return exit_status("foxglove_bridge", lambda: run("foxglove_bridge", argv, _start, _announce))
 
 
 async def _start(node: Node) -> Bridge:
-    parameters = await node.get_param("~", {})
-    private = parameters if isinstance(parameters, dict) else {}
-    for name in _WITHOUT_EFFECT:
-        if private.get(name):
-            node.log.warning("parameter ~%s has no effect: messages are sent as they are", name)
+    private = await private_parameters(node, _WITHOUT_EFFECT)
     return Bridge(node, options_of(private, os.environ))
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
     """Return the options that a node's private parameters mean. Raise BridgeError."""
-    address = value(private, "address", str, "127.0.0.1")
-    beyond = not is_loopback(address)
-    tokens = tokens_of(environ, beyond=beyond)
     uses_tls = value(private, "tls", bool, False)
     certificate = value(private, "certfile", str, "")
     if uses_tls and not certificate:
@@ -59,14 +45,9 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         )
     topics = NameFilter.of(whitelist=texts(private, "topic_whitelist", [".*"]))
     return BridgeOptions(
-        address=address,
+        address=address_of(private),
         foxglove_port=value(private, "port", int, FOXGLOVE_PORT),
-        access=Access(
-            hosts=tuple(host_names()),
-            read_token=tokens.read,
-            write_token=tokens.write,
-            requires_token=beyond or any(tokens),
-        ),
+        access=access_of(private, environ),
         limits=Limits(queue=max(1, value(private, "send_buffer_limit", int, 10_000_000))),
         filters=Filters(
             topics=topics,
@@ -91,10 +72,4 @@ def _capabilities(names: Sequence[str]) -> list[str]:
 
 
 def _announce(bridge: Bridge) -> None:
-    listener = bridge.listeners["foxglove"]
-    scheme = "wss" if listener.is_encrypted else "ws"
-    bridge.node.log.info("Foxglove protocol at %s://%s:%d", scheme, listener.host, listener.port)
-    if bridge.options.access.requires_token:
-        bridge.node.log.info(
-            "a token is required: `minirospy bridge --show-tokens` prints those of this user"
-        )
+    announce(bridge, "foxglove", "Foxglove protocol at")

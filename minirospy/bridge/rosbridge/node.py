@@ -10,15 +10,14 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from minirospy.aio.node import Node
-from minirospy.bridge.access import Access, NameFilter, is_loopback
-from minirospy.bridge.addresses import host_names
+from minirospy.bridge.access import NameFilter
 from minirospy.bridge.bridge import ROSBRIDGE_PORT, Bridge, BridgeOptions
 from minirospy.bridge.graph import Filters
-from minirospy.bridge.node_parameters import globs, number, tokens_of, value
+from minirospy.bridge.node_parameters import access_of, address_of, globs, number, private_parameters, value
 from minirospy.bridge.rosbridge.door import RosbridgeOptions
-from minirospy.bridge.serve import require_libraries, run
+from minirospy.bridge.serve import announce, exit_status, run
 from minirospy.bridge.web.connection import Limits
-from minirospy.errors import BridgeError, MinirospyError
+from minirospy.errors import BridgeError
 
 __all__ = ["main", "options_of", "refuse"]
 
@@ -33,22 +32,17 @@ _ARGUMENTS = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is shut down; return the exit status."""
-    try:
-        require_libraries()
+
+    def body() -> int:
         given, rest = _arguments(sys.argv[1:] if argv is None else argv)
 
         async def start(node: Node) -> Bridge:
-            parameters = await node.get_param("~", {})
-            private = {**(parameters if isinstance(parameters, dict) else {}), **given}
-            for name in _WITHOUT_EFFECT:
-                if private.get(name) not in (None, False, 0, "", "None"):
-                    node.log.warning("parameter ~%s has no effect", name)
+            private = await private_parameters(node, _WITHOUT_EFFECT, given)
             return Bridge(node, options_of(private, os.environ))
 
         return run("rosbridge_websocket", rest, start, _announce)
-    except MinirospyError as error:
-        print(f"rosbridge_websocket: ERROR: {error}", file=sys.stderr)
-        return 1
+
+    return exit_status("rosbridge_websocket", body)
 
 
 def refuse(program: str) -> int:
@@ -65,9 +59,6 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
     """Return the options that a node's private parameters mean. Raise BridgeError."""
     if private.get("bson_only_mode") or private.get("binary_encoder") == "bson":
         raise BridgeError("BSON is not offered: subscribe with compression cbor, which is as small")
-    address = value(private, "address", str, "") or "127.0.0.1"
-    beyond = not is_loopback(address)
-    tokens = tokens_of(environ, beyond=beyond)
     services = globs(private, "services_glob")
     most = _size(private)
     ping = number(private, "websocket_ping_interval", 0.0)
@@ -77,15 +68,11 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         limits = Limits(ping_seconds=ping, silent_seconds=silent)
     topics = NameFilter.of(globs(private, "topics_glob"))
     return BridgeOptions(
-        address=address,
+        address=address_of(private),
         foxglove_port=None,
         rosbridge_port=value(private, "port", int, ROSBRIDGE_PORT),
-        access=Access(
-            hosts=tuple(host_names()),
-            origins=("null",) if private.get("websocket_null_origin") is True else (),
-            read_token=tokens.read,
-            write_token=tokens.write,
-            requires_token=beyond or any(tokens),
+        access=access_of(
+            private, environ, origins=["null"] if private.get("websocket_null_origin") is True else []
         ),
         limits=limits,
         filters=Filters(
@@ -139,12 +126,4 @@ def _arguments(argv: Sequence[str]) -> tuple[dict[str, object], list[str]]:
 
 
 def _announce(bridge: Bridge) -> None:
-    listener = bridge.listeners["rosbridge"]
-    scheme = "wss" if listener.is_encrypted else "ws"
-    bridge.node.log.info(
-        "Rosbridge WebSocket server started at %s://%s:%d", scheme, listener.host, listener.port
-    )
-    if bridge.options.access.requires_token:
-        bridge.node.log.info(
-            "a token is required: `minirospy bridge --show-tokens` prints those of this user"
-        )
+    announce(bridge, "rosbridge", "Rosbridge WebSocket server started at")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 from minirospy.aio.node import Node
-from minirospy.bridge.serve import run
+from minirospy.bridge.serve import exit_status, run
 from minirospy.bridge.tf_republisher.republisher import Republisher
-from minirospy.errors import MinirospyError
 
 __all__ = ["main"]
 
@@ -19,11 +17,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     async def start(node: Node) -> Republisher:
         return Republisher(node, node.name)
 
-    try:
-        return run("tf2_web_republisher", sys.argv[1:] if argv is None else argv, start, _started)
-    except MinirospyError as error:
-        print(f"tf2_web_republisher: ERROR: {error}", file=sys.stderr)
-        return 1
+    name = "tf2_web_republisher"
+    return exit_status(name, lambda: run(name, argv, start, _started))
 
 
 def _started(republisher: Republisher) -> None:
