@@ -15,6 +15,7 @@ from minirospy.bridge.access import Access
 from minirospy.bridge.foxglove.assets import ALLOWED, Assets
 from minirospy.bridge.foxglove.door import CAPABILITIES, FoxgloveDoor, FoxgloveOptions, Playback
 from minirospy.bridge.graph import Filters, SharedGraph
+from minirospy.bridge.rosbridge.client_topics import ClientTopics
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
 from minirospy.bridge.video.pages import VideoPages
 from minirospy.bridge.web.connection import Door, Exchange, Limits
@@ -88,9 +89,12 @@ class Bridge:
             ),
             playback,
         )
-        self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge)
+        client_topics = ClientTopics(node)
+        self.rosbridge = RosbridgeDoor(self.graph, self.options.rosbridge, client_topics.changed)
         self._video = VideoPages(self.graph)
-        self._beside: list[Rosapi | Republisher] = []
+        self._beside: list[ClientTopics | Rosapi | Republisher] = []
+        if self.options.rosbridge_port is not None:
+            self._beside.append(client_topics)
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import cbor2
 import pytest
 from geometry_msgs.msg import PoseStamped
+from rosbridge_msgs.msg import ConnectedClients
 from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBool, SetBoolResponse
@@ -431,3 +432,25 @@ def test_client_has_to_authenticate_first(run_bridge: Callable[..., Running]) ->
         refused.send(**first)
         with pytest.raises(ConnectionClosed):
             refused.next("publish")
+
+
+def test_clients_are_published_as_by_rosbridge_server(bridge: Running) -> None:
+    node = bridge.node("watcher")
+
+    async def subscribe() -> tuple[Any, ...]:
+        return tuple(
+            node.subscribe(topic, class_, queue_size=100)
+            for topic, class_ in (("/client_count", Int32), ("/connected_clients", ConnectedClients))
+        )
+
+    counts, lists = bridge.run(subscribe())
+    assert bridge.run(counts.next(30)).data == 0
+    assert bridge.run(lists.next(30)).clients == []
+    client = bridge.rosbridge()
+    assert bridge.run(counts.next(30)).data == 1
+    (found,) = bridge.run(lists.next(30)).clients
+    assert found.ip_address == "127.0.0.1"
+    assert found.connection_time.secs > 0
+    client.close()
+    assert bridge.run(counts.next(30)).data == 0
+    assert bridge.run(lists.next(30)).clients == []
