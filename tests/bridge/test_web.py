@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 import ssl
@@ -37,10 +38,14 @@ def raw_answer(port: int, request: bytes) -> bytes:
     """Return all that a server answers to these bytes."""
     with socket.create_connection(("127.0.0.1", port), 30) as sock:
         sock.sendall(request)
-        answer = b""
-        while more := sock.recv(65536):
-            answer += more
-        return answer
+        return read_all(sock)
+
+
+def read_all(sock: socket.socket) -> bytes:
+    data = b""
+    while more := sock.recv(65536):
+        data += more
+    return data
 
 
 def page(port: int, path: str, **headers: str) -> tuple[int, str]:
@@ -166,19 +171,54 @@ def test_fragments_of_a_message_are_joined(bridge: Running) -> None:
     assert client.next("parameterValues")["id"] == "joined"
 
 
-def test_pings_are_answered_and_silent_clients_disconnected(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(ping_seconds=0.05, silent_seconds=0.2))
+def fragment(length: int, *, starts: bool = False) -> bytes:
+    """Return a frame that is a part of a binary message, and not the last one."""
+    return (
+        bytes([Opcode.BINARY if starts else Opcode.CONT, 0xFE])
+        + length.to_bytes(2, "big")
+        + bytes(4 + length)
+    )
+
+
+def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(unfinished=1_000_000))
+    listener = bridge.bridge.listeners["foxglove"]
+
+    def wait_for_unfinished(total: int) -> None:
+        while bridge.call(lambda: sum(each.unfinished for each in listener.connections)) != total:
+            time.sleep(0.005)
+
+    other = bridge.client()
+    with contextlib.ExitStack() as stack:
+        socks = [
+            stack.enter_context(socket.create_connection(("127.0.0.1", bridge.port), 30)) for _ in range(20)
+        ]
+        for sock in socks:
+            sock.sendall(HANDSHAKE.encode() + fragment(30_000, starts=True))
+        socks[7].sendall(fragment(30_000) * 13 + fragment(9_900))
+        wait_for_unfinished(999_900)
+
+        socks[3].sendall(fragment(200))
+        wait_for_unfinished(19 * 30_000 + 200)
+        answer = read_all(socks[7])
+        assert (1013).to_bytes(2, "big") + b"too many unfinished messages" in answer
+        assert_alive(other)
+    wait_for_unfinished(0)
+    assert_alive(other)
+
+
+def test_pings_are_answered(bridge: Running) -> None:
     client = bridge.client()
     client.next("serverInfo")
-    client.socket.ping().wait(30)
+    assert client.socket.ping().wait(30)
 
+
+def test_clients_that_answer_no_ping_are_disconnected(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(ping_seconds=0.05, silent_seconds=0.2))
     with socket.create_connection(("127.0.0.1", bridge.port), 30) as silent:
         silent.sendall(HANDSHAKE.encode())
-        data = b""
-        while more := silent.recv(65536):  # reads, and answers no ping
-            data += more
+        data = read_all(silent)
     assert bytes([0x80 | Opcode.PING, 9]) + b"minirospy" in data
-    assert_alive(client)
 
 
 def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Running]) -> None:

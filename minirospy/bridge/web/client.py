@@ -47,6 +47,8 @@ class Limits:
     """The limits of one client: bytes of a message, messages and bytes a second, seconds without progress, connections."""
 
     message: int = 64_000_000
+    unfinished: int = 256_000_000
+    """Bytes of messages that have not arrived whole yet, of all clients."""
     messages_a_second: int = 20_000
     queue: int = DEFAULT_LIMIT
     connections: int = 256
@@ -100,6 +102,8 @@ class Site(Protocol):
     def check(self, credentials: Credentials) -> Grant | Refusal: ...
 
     def page(self, path: str) -> HttpHandler | None: ...
+
+    def unfinished_grew(self, count: int) -> None: ...
 
     def left(self, connection: Connection) -> None: ...
 

@@ -82,6 +82,8 @@ class Connection:
         self.session: Session | None = None
         self.client: WebClient | None = None
         self.exchange: Exchange | None = None
+        self.unfinished = 0
+        """Bytes of a message that has not arrived whole."""
         self._site = site
         self._pipe = pipe
         self._loop = loop
@@ -91,7 +93,7 @@ class Connection:
             logger=_QUIET,
         )
         self._door: Door | None = None
-        self._fragments: list[bytes] = []
+        self._fragments = bytearray()
         self._frames: deque[Frame] = deque()
         self._head_end = b""
         self._is_head_read = False
@@ -102,7 +104,7 @@ class Connection:
         self._is_over = False
         self._second = 0.0
         self._in_second = 0
-        self._heard = loop.time()
+        self._received = loop.time()
         self._progressed = loop.time()
         self._timer = loop.call_later(site.limits.handshake_seconds, self._handshake_late)
         self._limits = site.limits
@@ -113,12 +115,13 @@ class Connection:
         """Take over bytes of the client."""
         if self._is_closing:
             return
-        self._heard = self._loop.time()
+        self._received = self._loop.time()
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # one request a connection
         if self._is_head_read:
             self._parse(data)
+            self._count_unfinished()
             return
         # What follows the request is parsed once the request is accepted.
         joined = self._head_end + data
@@ -132,6 +135,7 @@ class Connection:
         self._parse(data[:cut])
         if data[cut:] and self.client and not self._is_closing:
             self._parse(data[cut:])
+            self._count_unfinished()
 
     def writable(self) -> None:
         """Send more."""
@@ -143,6 +147,7 @@ class Connection:
             return
         self._is_over = self._is_closing = True
         self._timer.cancel()
+        self._discard_unfinished()
         try:
             if self.session:
                 self.session.ended()
@@ -186,6 +191,12 @@ class Connection:
         self._protocol.send_close(code, _cut(reason))
         self._answer_protocol()
         self.close_when_sent()
+
+    def refuse_unfinished(self) -> None:
+        """End the connection, and free the part of a message that has arrived."""
+        _log.warning("%s: unfinished messages take too much memory: disconnected", self.peer)
+        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
+        self._discard_unfinished()
 
     def abort(self) -> None:
         """End the connection now."""
@@ -308,14 +319,14 @@ class Connection:
             self._opcode = frame.opcode
         elif frame.opcode is not Opcode.CONT:
             return
-        if not frame.fin:
-            self._fragments.append(bytes(frame.data))
+        if frame.fin and not self._fragments:
+            self._delivered(bytes(frame.data))
             return
-        data = bytes(frame.data)
-        if self._fragments:
-            data = b"".join((*self._fragments, data))
+        self._fragments += frame.data
+        if frame.fin:
+            data = bytes(self._fragments)
             self._fragments.clear()
-        self._delivered(data)
+            self._delivered(data)
 
     def _delivered(self, data: bytes) -> None:
         assert self.session
@@ -331,6 +342,16 @@ class Connection:
         except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
             _log.exception("a message of %s could not be handled", self.peer)
             self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on this message")
+
+    def _count_unfinished(self) -> None:
+        grown = len(self._protocol.reader.buffer) + len(self._fragments) - self.unfinished
+        self.unfinished += grown
+        self._site.unfinished_grew(grown)
+
+    def _discard_unfinished(self) -> None:
+        self._protocol.reader.buffer.clear()
+        self._fragments.clear()
+        self._count_unfinished()
 
     def _is_held_back(self) -> bool:
         """Return whether a client has sent what it may in this second; then it is read again in the next one."""
@@ -384,7 +405,7 @@ class Connection:
         """See whether the client is there: it answers a ping, or takes what is sent."""
         now = self._loop.time()
         stuck = self._pipe.is_full and now - self._progressed > self._limits.silent_seconds
-        if stuck or now - self._heard > self._limits.silent_seconds:
+        if stuck or now - self._received > self._limits.silent_seconds:
             _log.info("%s %s: disconnected", self.peer, "reads nothing" if stuck else "does not answer")
             self._abort()
             return

@@ -47,6 +47,7 @@ class Listener:
         self.connections: set[Connection] = set()
         self.refused = 0
         """Connections that were refused because there were too many."""
+        self._unfinished = 0
 
         self.host = ""
         self.port = 0
@@ -117,6 +118,12 @@ class Listener:
     def page(self, path: str) -> HttpHandler | None:
         """Return what answers a path."""
         return self._pages.get(path)
+
+    def unfinished_grew(self, count: int) -> None:
+        """Count bytes of messages that have not arrived whole; disconnect the client with the most, beyond the limit."""
+        self._unfinished += count
+        if count > 0 and self._unfinished > self.limits.unfinished:
+            max(self.connections, key=lambda connection: connection.unfinished).refuse_unfinished()
 
     def left(self, connection: Connection) -> None:
         """Forget a connection."""
