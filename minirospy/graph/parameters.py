@@ -181,22 +181,26 @@ class ParameterTree:
     def names_in_steps(self) -> Steps[list[str]]:
         """Return the same, of a tree that may be large."""
         found: list[str] = []
-        left = [_STEP_ITEMS]
-
-        def walk(table: dict[str, object], prefix: str) -> Steps[None]:
-            for name, value in table.items():
-                if isinstance(value, dict):
-                    yield from walk(value, f"{prefix}{name}/")
-                else:
-                    found.append(prefix + name)
-                left[0] -= 1
-                if not left[0]:
-                    left[0] = _STEP_ITEMS
-                    yield None
-
+        left = _STEP_ITEMS
         root = self.get("/")
         assert isinstance(root, dict)
-        yield from walk(root, "/")
+        # The namespaces around the present one. No function that calls itself: its list would be in a cycle of
+        # references, and the master's garbage collector does not look at what lives long.
+        around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
+
+        while around:
+            prefix, items = around[-1]
+            for name, value in items:
+                left -= 1
+                if not left:
+                    left = _STEP_ITEMS
+                    yield None
+                if isinstance(value, dict):
+                    around.append((f"{prefix}{name}/", iter(value.items())))
+                    break
+                found.append(prefix + name)
+            else:
+                around.pop()
         return found
 
     def subscribe(self, key: str, caller_id: str, uri: str) -> object:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import tracemalloc
 from sys import getsizeof
+from types import CellType
 from typing import Any
 
 import pytest
@@ -348,6 +350,17 @@ def test_search_starts_in_any_namespace() -> None:
         ("/box", "/p"),
     ):
         assert tree.search(namespace, "p") == found
+
+
+def test_names_come_in_the_order_of_the_tree() -> None:
+    tree = tree_of(a={"b": 1, "c": {"d": 2}, "e": 3}, f=4, g={})
+    assert tree.names() == ["/a/b", "/a/c/d", "/a/e", "/f"]
+
+
+def test_names_are_in_no_cycle_of_references() -> None:
+    # The master's garbage collector does not look at old objects: a list in a cycle would never be freed.
+    names = tree_of(a={"b": 1}).names()
+    assert [each for each in gc.get_referrers(names) if isinstance(each, CellType)] == []
 
 
 def test_names_of_a_large_tree_come_in_steps() -> None:
