@@ -95,6 +95,7 @@ class HttpReader:
         "_buffer",
         "_chunked",
         "_ended",
+        "_has_more",
         "_head",
         "_in_body",
         "_max_body",
@@ -110,6 +111,8 @@ class HttpReader:
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
+        # Whether the bytes that were fed may hold another message.
+        self._has_more = False
         # What was taken out of the buffer of a body in chunks.
         self._chunked: bytearray | None = None
         self.wants_continue = False
@@ -135,11 +138,23 @@ class HttpReader:
 
         Raises RpcProtocolError.
         """
+        messages: list[HttpMessage] = []
+        message = self.feed_one(data)
+        while message is not None:
+            messages.append(message)
+            message = self.next_message()
+        return messages
+
+    def feed_one(self, data: bytes) -> HttpMessage | None:
+        """Return the first message that is complete with ``data``, and leave the others to :meth:`next_message`.
+
+        None where the first one is not complete. Raises RpcProtocolError.
+        """
         head = self._head
         if head is not None:
             self._head = None
             if len(data) == head.plain_length:
-                return [HttpMessage(head, data)]
+                return HttpMessage(head, data)
         elif self.is_idle:
             end = data.find(b"\r\n\r\n")
             if 0 < end <= _MAX_HEAD:
@@ -148,26 +163,32 @@ class HttpReader:
                     self._check(first.plain_length)
                     length = len(data) - end - 4
                     if length == first.plain_length:
-                        return [HttpMessage(first, data[end + 4 :])]
+                        return HttpMessage(first, data[end + 4 :])
                     if not length:
                         self._head = first
-                        return []
+                        return None
         if data:
             self._buffer += data
         else:
             self._ended = True
         if self._parser is None or head is not None:
             self._parser = self._parse(head)
-        messages: list[HttpMessage] = []
-        while True:
-            message = next(self._parser)
-            if message is None:
-                return messages
-            messages.append(message)
+        self._has_more = True
+        return self.next_message()
+
+    def next_message(self) -> HttpMessage | None:
+        """Return the next message that is complete, of the bytes that were fed. Raises RpcProtocolError."""
+        if not self._has_more:
+            return None
+        assert self._parser
+        message = next(self._parser)
+        self._has_more = message is not None
+        return message
 
     def close(self) -> None:
         """Release what was read of an incomplete message. Idempotent."""
         self._head = self._parser = None
+        self._has_more = False
         self._buffer = bytearray()
         self._chunked = None
         self._in_body = False

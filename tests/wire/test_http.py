@@ -53,6 +53,34 @@ def test_heads_and_bodies_may_come_one_by_one(bodies: list[bytes], data: st.Data
     assert reader.is_idle
 
 
+def test_pipelined_messages_are_parsed_one_at_a_time() -> None:
+    reader = HttpReader()
+    good, bad = serialize_request("h", "/", b"a") * 2, b"nonsense\r\n\r\n"
+    first = reader.feed_one(good + bad)
+    assert first
+    assert first.body == b"a"
+    assert not reader.is_idle
+    assert reader.held == len(good) // 2 + len(bad)
+    second = reader.next_message()
+    assert second
+    assert second.body == b"a"
+    # The fault comes when it is its turn.
+    with pytest.raises(RpcProtocolError):
+        reader.next_message()
+
+
+def test_next_message_needs_bytes() -> None:
+    reader = HttpReader()
+    assert reader.next_message() is None
+    assert reader.feed_one(b"POST / HTTP/1.1\r\nContent-Length: 3\r\n\r\na") is None
+    assert reader.next_message() is None
+    message = reader.feed_one(b"bc")
+    assert message
+    assert message.body == b"abc"
+    assert reader.next_message() is None
+    assert reader.is_idle
+
+
 @pytest.mark.parametrize("step", [1, 7, 1000])
 def test_chunked_bodies(step: int) -> None:
     data = (

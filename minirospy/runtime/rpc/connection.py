@@ -85,6 +85,7 @@ class Connection:
         "_has_requested",
         "_held",
         "_loop",
+        "_message",
         "_moved",
         "_must_finish",
         "_out",
@@ -94,7 +95,6 @@ class Connection:
         "_sock",
         "_state",
         "_task",
-        "_waiting",
         "_work",
         "_work_bytes",
     )
@@ -108,7 +108,8 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        self._waiting: list[HttpMessage] = []
+        # The request that is answered next; further ones that came with it are bytes yet.
+        self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
         # Bytes since the time limit was set.
@@ -156,29 +157,37 @@ class Connection:
 
     def received(self, data: bytes) -> None:
         """Bytes of requests have come."""
-        try:
-            messages = self._reader.feed(data)
-        except RpcProtocolError as error:
-            self.refuse(error.status, str(error))
-            return
-
-        if self._held or not messages:
-            self._hold()
-            if not self._server.limit_held(self):
-                return
-            if self._reader.wants_continue:
-                self._write(self._reader.continue_line())
-
-        if self._has_deadline and messages:
-            self._has_deadline = False
-            self._server.deadlines.drop(self)
-
         self._moved += len(data)
-        self._waiting += messages
-        if messages:
-            self._has_requested = True
+        self._find_message(data)
         self._answer_waiting()
         self._set_deadline()
+
+    def _find_message(self, data: bytes = b"") -> bool:
+        """Take the next request out of what has come, with ``data``; return whether it is complete.
+
+        Only one: what a client pipelines takes longer to parse than a request of another client.
+        """
+        try:
+            message = self._reader.feed_one(data) if data else self._reader.next_message()
+        except RpcProtocolError as error:
+            self.refuse(error.status, str(error))
+            return False
+
+        if self._held or message is None or not self._reader.is_idle:
+            self._hold()
+            if not self._server.limit_held(self):
+                return False
+        if message is None:
+            if self._reader.wants_continue:
+                self._write(self._reader.continue_line())
+            return False
+
+        if self._has_deadline:
+            self._has_deadline = False
+            self._server.deadlines.drop(self)
+        self._message = message
+        self._has_requested = True
+        return True
 
     def _receive(self, most: int = _RECEIVE) -> bytes | None:
         """Return the bytes that have arrived; b"" at the end, None where there are none."""
@@ -248,14 +257,16 @@ class Connection:
 
     def _answer_waiting(self) -> None:
         left = _ANSWERS_AT_ONCE
-        while self._waiting and self._state is _OPEN:
+        while self._state is _OPEN and (self._message or self._find_message()):
             if self._is_answering or not left:
                 self._pause()
                 if not self._is_answering:
                     self._start(self._answer_rest())
                 return
             left -= 1
-            self._answer(self._waiting.pop(0))
+            message, self._message = self._message, None
+            assert message
+            self._answer(message)
 
     def _answer_rest(self) -> Steps[None]:
         """Answer many requests that came together, or rather those of them that come next."""
@@ -411,7 +422,7 @@ class Connection:
 
     def _drop_request(self) -> None:
         """Forget what was requested."""
-        self._waiting.clear()
+        self._message = None
         self._reader.close()
         self._work_bytes = 0
         self._hold()
@@ -438,7 +449,7 @@ class Connection:
 
     def _close(self) -> None:
         """Hang up once what is written has been taken."""
-        self._waiting.clear()
+        self._message = None
         if not self._out:
             self.end()
         elif self._state in (_OPEN, _BUSY, _FULL):
