@@ -9,7 +9,7 @@ from collections.abc import Generator
 from enum import Enum
 from typing import TypeVar
 
-__all__ = ["ALONE", "PAUSE", "Need", "Steps", "finish", "is_small"]
+__all__ = ["ALONE", "PAUSE", "SHORT_ITEMS", "SMALL_ITEMS", "Need", "Steps", "finish", "is_small"]
 
 _T = TypeVar("_T")
 
@@ -26,7 +26,12 @@ ALONE, PAUSE = Need
 Steps = Generator[Need | None, None, _T]
 """Work that yields between its steps and returns its result."""
 
-_SMALL = 2000
+SMALL_ITEMS = 2000
+"""What takes a few milliseconds to write."""
+
+SHORT_ITEMS = 300
+"""What takes some 0.1 ms: a thousand clients may request such a value at the same time."""
+
 _LETTERS_PER_ITEM = 16
 
 
@@ -40,8 +45,8 @@ def finish(steps: Steps[_T]) -> _T:
             return result
 
 
-def is_small(value: object, most: int = _SMALL) -> bool:
-    """Return whether a value of XML-RPC's types takes no more than a few milliseconds to walk through."""
+def is_small(value: object, most: int = SMALL_ITEMS) -> bool:
+    """Return whether a value of XML-RPC's types has no more than about ``most`` items, among which long texts count as many."""
     return _left(value, most) >= 0
 
 

@@ -35,7 +35,7 @@ from minirospy.graph.calls import (
 )
 from minirospy.graph.parameters import ParametersFullError, ParameterTree, ParameterUpdate, weigh_in_steps
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry, RegistryFullError
-from minirospy.steps import ALONE, Steps, finish, is_small
+from minirospy.steps import ALONE, SHORT_ITEMS, Steps, finish, is_small
 
 __all__ = ["PARAMETERS", "MasterApi", "Notice", "key_of_node", "nothing"]
 
@@ -269,12 +269,14 @@ class MasterApi(ABC):
 
     def get_param(self, caller_id: str, name: str) -> Answer | Steps[Answer]:
         """Return a parameter's value."""
-        if self.parameters.is_small_at(name):
+        if self.parameters.is_small_at(name, SHORT_ITEMS):
             return self._get(name)
 
         def get() -> Steps[Answer]:
-            # A value that clients wait for is copied whenever another one changes it.
-            yield ALONE
+            # Here, in a step: to count the items takes its time.
+            if not self.parameters.is_small_at(name):
+                # A value that clients wait for is copied whenever another one changes it.
+                yield ALONE
             return self._get(name)
 
         return get()

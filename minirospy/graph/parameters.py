@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from minirospy.errors import MinirospyError
 from minirospy.graph.shares import Excess, Shares, holder_of
 from minirospy.names import namespace_of
-from minirospy.steps import Steps, finish, is_small
+from minirospy.steps import SMALL_ITEMS, Steps, finish, is_small
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
@@ -40,7 +40,7 @@ MOST_SUBSCRIPTIONS, MOST_OF_ONE = 20_000, 10_000
 FEW_RESERVE, FEW = 5_000, 100
 """What is left of them to hosts and ports that have no more than FEW."""
 
-_FEW_BYTES, _MANY_BYTES = 200_000, 1_000_000
+_FEW_BYTES, _MANY_BYTES = 50_000, 1_000_000
 
 
 class ParametersFullError(MinirospyError):
@@ -112,9 +112,9 @@ class ParameterTree:
         """Return whether a list of their names takes so much memory that only one is made at a time."""
         return self._bytes > _MANY_BYTES
 
-    def is_small_at(self, key: str) -> bool:
-        """Return whether the value of a parameter or namespace is small, or not set."""
-        return is_small(self._find(_split(key)))
+    def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
+        """Return whether the value of a parameter or namespace is small, or not set; see :func:`is_small`."""
+        return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:
         """Return whether there surely is room for a value of ``weight`` bytes."""

@@ -28,7 +28,7 @@ from minirospy.graph.topic_types import TopicTypes
 __all__ = ["Action", "NodeShutdown", "PublisherUpdate", "Registered", "Registry", "RegistryFullError"]
 
 _ANY = "*"
-_FEW_BYTES, _MANY_BYTES = 200_000, 2_000_000
+_FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):

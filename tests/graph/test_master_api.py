@@ -408,6 +408,17 @@ def test_subscription_that_is_refused_leaves_nothing_behind(monkeypatch: pytest.
     assert master.done == []
 
 
+@pytest.mark.parametrize(("items", "is_short"), [(200, True), (400, False), (1900, False)])
+def test_answer_of_more_than_300_items_is_made_in_steps(items: int, is_short: bool) -> None:
+    # A thousand clients may request it at the same time.
+    master = Recorded()
+    master.parameters.set("/p", list(range(items)), "")
+    answer = master.dispatch("getParam", ("/n", "/p"))
+    assert isinstance(answer, Generator) is not is_short
+    found = finish(answer) if isinstance(answer, Generator) else answer
+    assert found == [1, "Parameter [/p]", list(range(items))]
+
+
 @pytest.mark.parametrize(
     "call",
     [

@@ -332,9 +332,9 @@ def test_namespace_is_copied_once_after_it_was_returned() -> None:
         assert tree._find(["a"]) is own
 
 
-def test_small_tree_is_one_of_less_than_200_kb() -> None:
+def test_small_tree_is_one_of_less_than_50_kb() -> None:
     tree = ParameterTree()
-    tree.set("/p", 1, "", 199_999 - 2 - 120)
+    tree.set("/p", 1, "", 49_999 - 2 - 120)
     assert tree.is_small
     tree.set("/p", 1, "", 1)
     assert not tree.is_small

@@ -424,7 +424,7 @@ class Master(MasterApi):
         A master of many registrations would stand still while it looks at them, and hardly ever has garbage in cycles.
         """
         gc.set_threshold(*_COLLECT)
-        if self.registry.is_small and self.parameters.is_small:
+        if not self.registry.is_large and not self.parameters.is_large:
             gc.collect()
         self._collecting = asyncio.get_running_loop().call_later(_COLLECT_SECONDS, self._collect)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.errors import RpcFault, RpcProtocolError
 from minirospy.runtime.rpc.outbox import MOST_UNREAD, Outbox
-from minirospy.steps import ALONE, Steps, is_small
+from minirospy.steps import ALONE, SHORT_ITEMS, Steps, is_small
 from minirospy.wire.http import (
     MAX_BODY,
     HttpMessage,
@@ -200,7 +200,7 @@ class Connection:
 
     def readable(self) -> None:
         """Read, as there is something, unless others come first: the loop calls this again in its next iteration."""
-        if self._server.admit() or self._has_requested:
+        if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 
     def read(self) -> None:
@@ -225,6 +225,7 @@ class Connection:
     def _stop_reading(self) -> None:
         """Read nothing for now. Idempotent."""
         self._loop.remove_reader(self._fd)
+        self._server.drop_late(self)
         self._reading = None
 
     def _start_reading(self) -> None:
@@ -311,7 +312,7 @@ class Connection:
             if type(value) is not list and isinstance(value, Awaitable):
                 self._task = asyncio.ensure_future(self._answer_later(value, keep_alive))
                 return
-            if isinstance(value, Generator) or not is_small(value):
+            if isinstance(value, Generator) or not is_small(value, SHORT_ITEMS):
                 self._start(self._serialize_in_steps(call.method, value, keep_alive))
                 return
             body = serialize_value(value)

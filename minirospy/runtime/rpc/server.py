@@ -48,11 +48,14 @@ _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 256, 0.006
 _READ_SECONDS = 0.003
 """Connections in one turn of the loop, how long that may take, and how long they are read from immediately."""
 
-_READS_AT_ONCE = 64
-"""Connections that are read from before new ones are accepted, some 2 ms: thousands may have data, or end, at a time."""
+_ACCEPTS_BETWEEN = 64
+"""Connections that are accepted between others that are read from."""
 
-_MOST_READS = 4
-"""As often in one iteration of the loop; after that, connections that have requested nothing yet wait for the next one."""
+_READS_AT_ONCE = 16
+"""Connections that are read from before new ones are accepted, some 1 ms: thousands may have data, or end, at a time."""
+
+_MOST_READS, _READS_SECONDS = 256, 0.01
+"""Connections in one iteration of the loop, and how long that may take; the others come first in the next one."""
 
 
 Dispatch = Callable[[str, list[Any]], object]
@@ -104,9 +107,13 @@ class RpcServer:
         self._listening: list[socket.socket] = []
         # Those at which nobody is accepted for a moment.
         self._resting: set[socket.socket] = set()
-        # Connections that were read from since new ones were accepted; how often that was in this iteration of the loop.
+        # Connections that were read from in this iteration of the loop, when the time for that ends, and whether it is over.
         self._reads = 0
-        self._rounds = 0
+        self._reads_end = 0.0
+        self._reads_over = False
+        # Those that wait for the next iteration: new ones, and those that have requested something before.
+        self._late_new: OrderedDict[Connection, None] = OrderedDict()
+        self._late: OrderedDict[Connection, None] = OrderedDict()
         self.deadlines: Deadlines[Connection] = Deadlines(Connection.end)
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
         self._limited_log = RateLimitedLogger(_log)
@@ -168,24 +175,51 @@ class RpcServer:
         self._listening.append(sock)
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
-    def admit(self) -> bool:
-        """Return whether a connection that has requested nothing yet is read from in this iteration of the loop.
+    def admit(self, connection: Connection, *, is_new: bool) -> bool:
+        """Return whether a connection that has data, or has ended, is read from now; else it is soon.
 
-        The caller is about to read from one. Now and then those that wait to be accepted come first.
+        ``is_new``: it has requested nothing yet.
         """
+        if self._may_read():
+            return True
+        (self._late_new if is_new else self._late).setdefault(connection)
+        return False
+
+    def drop_late(self, connection: Connection) -> None:
+        """Do not read from a connection that waits for it. Idempotent."""
+        self._late_new.pop(connection, None)
+        self._late.pop(connection, None)
+
+    def _may_read(self) -> bool:
+        """Return whether one more connection is read from in this iteration of the loop, after new ones were accepted."""
+        if self._reads_over:
+            return False
         self._reads += 1
-        if self._reads >= _READS_AT_ONCE and self._rounds < _MOST_READS:
-            if not self._rounds:
-                asyncio.get_running_loop().call_soon(self._start_iteration)
-            self._reads = 0
-            self._rounds += 1
-            for sock in list(self._listening):
-                if sock not in self._resting:
-                    self._accept(sock, _READS_AT_ONCE)
-        return self._rounds < _MOST_READS
+        if self._reads % _READS_AT_ONCE:
+            return True
+
+        if self._reads == _READS_AT_ONCE:
+            self._reads_end = time.perf_counter() + _READS_SECONDS
+            asyncio.get_running_loop().call_soon(self._start_iteration)
+        for sock in list(self._listening):
+            if sock not in self._resting:
+                self._accept(sock, _ACCEPTS_BETWEEN)
+        self._reads_over = self._reads >= _MOST_READS or time.perf_counter() >= self._reads_end
+        return not self._reads_over
 
     def _start_iteration(self) -> None:
-        self._reads = self._rounds = 0
+        """Read from those that could not be read from in the last iteration, before the loop gets to any others."""
+        self._reads, self._reads_over = 0, False
+        number = 0
+        while (self._late_new or self._late) and self._may_read():
+            # In turns, so that a crowd of one kind does not keep the others waiting: those that have said nothing for long
+            # and disconnect, those that connect, those that request much.
+            if self._late_new and (number % 3 or not self._late):
+                connection, _ = self._late_new.popitem(last=number % 2 == 0)
+            else:
+                connection, _ = self._late.popitem(last=False)
+            number += 1
+            connection.read()
 
     def _watch_again(self, sock: socket.socket) -> None:
         self._resting.discard(sock)

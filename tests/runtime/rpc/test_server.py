@@ -233,6 +233,83 @@ def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> Non
     assert left[-1] > crowd // 4
 
 
+class Late:
+    """A connection that waits to be read from."""
+
+    def __init__(self, name: str, log: list[str]) -> None:
+        self.name = name
+        self.log = log
+
+    def read(self) -> None:
+        self.log.append(self.name)
+
+
+def admit(server: RpcServer, late: Late, *, is_new: bool = False) -> bool:
+    """Do what the loop does where a connection has data."""
+    is_admitted = server.admit(late, is_new=is_new)  # type: ignore[arg-type]
+    if is_admitted:
+        late.read()
+    return is_admitted
+
+
+def test_connections_that_are_too_many_come_first_in_the_next_iteration(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=lambda: 1.0))
+
+    async def scene() -> tuple[list[str], list[str], list[str]]:
+        log: list[str] = []
+        server = RpcServer(lambda method, args: 0)
+        admitted = [name for name in map(str, range(300)) if admit(server, Late(name, log))]
+        gone = Late("gone", log)
+        assert not admit(server, gone)
+        server.drop_late(gone)  # type: ignore[arg-type]
+        assert not admit(server, Late("new", log), is_new=True)
+        first = list(log)
+        await asyncio.sleep(0)
+        await server.close()
+        return admitted, first, log[len(first) :]
+
+    admitted, first, then = asyncio.run(scene())
+    assert first == admitted == [str(number) for number in range(255)]
+    assert then == ["255", "new", *(str(number) for number in range(256, 300))]
+
+
+def test_new_connections_are_read_from_both_ends_of_the_queue() -> None:
+    async def scene() -> list[str]:
+        log: list[str] = []
+        server = RpcServer(lambda method, args: 0)
+        for number in range(8):
+            server._late_new[Late(str(number), log)] = None  # type: ignore[index]
+        server._start_iteration()
+        await server.close()
+        return log
+
+    # Who disconnects after it has said nothing for long is at one end, who has just connected at the other one.
+    assert set(asyncio.run(scene())[:4]) == {"7", "0", "6", "1"}
+
+
+def test_reading_ends_when_the_time_for_it_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+
+    def clock() -> float:
+        nonlocal now
+        now += 0.004
+        return now
+
+    async def scene() -> int:
+        log: list[str] = []
+        server = RpcServer(lambda method, args: 0)
+        while admit(server, Late("", log)):
+            pass
+        await server.close()
+        return len(log)
+
+    monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
+    # The clock is read after each 16 of them.
+    assert asyncio.run(scene()) == 3 * 16 - 1
+
+
 def test_connections_are_accepted_for_some_milliseconds_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
 
