@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import selectors
 import socket
 import threading
 import time
@@ -243,6 +244,26 @@ def pipelines(target: Target) -> None:
     target.hold(called("getParamNames", "/bad") * 1000, 300)
 
 
+def busy_connections(target: Target) -> None:
+    """1000 clients that request an array of 1,900 numbers again and again, each when it has its answer."""
+    target.exchange(valued(array(b"<value><int>1</int></value>", 1900), "/attack/middling"))
+    request = called("getParam", "/bad", "/attack/middling")
+    with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
+        for _ in range(1000):
+            with contextlib.suppress(OSError):
+                sock = stack.enter_context(target.connect())
+                sock.sendall(request)
+                selector.register(sock, selectors.EVENT_READ)
+        while not target.is_over:
+            for key, _ in selector.select(0.1):
+                assert isinstance(key.fileobj, socket.socket)
+                try:
+                    if key.fileobj.recv(MIB).endswith(b"</methodResponse>\n"):
+                        key.fileobj.send(request)
+                except OSError:
+                    selector.unregister(key.fileobj)
+
+
 def half_bodies(target: Target) -> None:
     """1000 clients that send 900 kB of a body of 60 MiB each."""
     request = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % HUGE + b"x" * 900_000
@@ -406,6 +427,7 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     names_of_parameters,
     slow_readers,
     pipelines,
+    busy_connections,
     half_bodies,
     endless_head,
     small_chunks,
