@@ -107,12 +107,8 @@ class Access:
 
     def check(self, request: Credentials) -> Grant | Refusal:
         """Return the rights of a request's sender, or why it is refused."""
-        if not self._knows_host(request.host):
-            return Refusal(
-                403,
-                f"Host '{request.host[:100]}' is not a name of this server: use its address, or start the bridge with "
-                "--host-name NAME",
-            )
+        if refusal := self.check_host(request.host):
+            return refusal
         grant = self._grant_of(request.token)
         if grant:
             # A page that knows the token was given it: it needs no other right.
@@ -128,6 +124,16 @@ class Access:
                 f"pages of '{(request.origin or '')[:100]}' may not connect: start the bridge with --origin PATTERN",
             )
         return Grant.READ if self.default_is_read else Grant.WRITE
+
+    def check_host(self, host: str) -> Refusal | None:
+        """Return why a request that names this host is refused, None where it is not."""
+        if self._knows_host(host):
+            return None
+        return Refusal(
+            403,
+            f"Host '{host[:100]}' is not a name of this server: use its address, or start the bridge with "
+            "--host-name NAME",
+        )
 
     def _grant_of(self, token: str) -> Grant | None:
         given = token.encode()

@@ -18,9 +18,10 @@ from minirospy.bridge.graph import Filters, SharedGraph
 from minirospy.bridge.rosbridge.client_topics import ClientTopics
 from minirospy.bridge.rosbridge.door import RosbridgeDoor, RosbridgeOptions
 from minirospy.bridge.video.pages import VideoPages
-from minirospy.bridge.web.connection import Door, Exchange, Limits
+from minirospy.bridge.web.connection import Door, Exchange, HttpHandler, Limits
 from minirospy.bridge.web.listener import Listener
 from minirospy.bridge.web.pipe import tls_context
+from minirospy.environment import DISTRO
 from minirospy.errors import BridgeError
 from minirospy.introspect.snapshot import fetch
 from minirospy.workspace.packages import Packages
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from minirospy.bridge.rosapi.services import Rosapi
     from minirospy.bridge.tf_republisher.republisher import Republisher
 
-__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOptions"]
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Addition", "Bridge", "BridgeOptions"]
 
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
@@ -65,13 +66,27 @@ class BridgeOptions:
     rosapi: bool = False
     transforms: bool = False
     """What clients of rosbridge want beside it: the services of rosapi, tf2_web_republisher."""
+    name: str = "minirospy bridge"
+    """The name of the Foxglove server."""
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What the listener of the Foxglove protocol serves in addition; ``pages`` are public: they need no token."""
+
+    doors: Sequence[Door] = ()
+    pages: Mapping[str, HttpHandler] = field(default_factory=dict)
 
 
 class Bridge:
     """Opens the graph of a node to browsers. On the node's loop."""
 
     def __init__(
-        self, node: Node, options: BridgeOptions | None = None, playback: Playback | None = None
+        self,
+        node: Node,
+        options: BridgeOptions | None = None,
+        playback: Playback | None = None,
+        addition: Addition | None = None,
     ) -> None:
         self.options = options or BridgeOptions()
         self.node = node
@@ -85,7 +100,10 @@ class Bridge:
             self.graph,
             Assets(Packages(), self.options.assets),
             FoxgloveOptions(
-                capabilities=self.options.capabilities, session_id=str(time.time_ns() // 1_000_000)
+                name=self.options.name,
+                capabilities=self.options.capabilities,
+                session_id=str(time.time_ns() // 1_000_000),
+                metadata={"ROS_DISTRO": DISTRO.strip(), "node": node.name},
             ),
             playback,
         )
@@ -95,6 +113,7 @@ class Bridge:
         self._beside: list[ClientTopics | Rosapi | Republisher] = []
         if self.options.rosbridge_port is not None:
             self._beside.append(client_topics)
+        self._addition = addition or Addition()
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -103,24 +122,28 @@ class Bridge:
         """Listen. Raises BridgeError."""
         tls = self._tls()
         served: list[tuple[str, list[Door], int | None]] = [
-            ("foxglove", [self.foxglove], self.options.foxglove_port),
+            ("foxglove", [self.foxglove, *self._addition.doors], self.options.foxglove_port),
             ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
             ("video", [], self.options.video_port),
         ]
         for name, doors, port in served:
             if port is not None:
-                self.listeners[name] = await self._listen(doors, port, tls)
+                public = self._addition.pages if name == "foxglove" else {}
+                self.listeners[name] = await self._listen(doors, port, tls, public)
         await self._start_beside()
         if self.options.diagnostics:
             self._reporting = asyncio.ensure_future(self._report())
 
-    async def _listen(self, doors: list[Door], port: int, tls: ssl.SSLContext | None) -> Listener:
+    async def _listen(
+        self, doors: list[Door], port: int, tls: ssl.SSLContext | None, public: Mapping[str, HttpHandler]
+    ) -> Listener:
         """Return a listener of a protocol. Raises BridgeError where the port is in use, unless it is to be tried again."""
         listener = Listener(
             doors,
             self.options.access,
             limits=self.options.limits,
             pages={**self._video.handlers, "/status": self._status_page},
+            public_pages=public,
             tls=tls,
         )
         while True:

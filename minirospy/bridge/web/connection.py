@@ -244,7 +244,8 @@ class Connection:
             header_items(headers, "sec-websocket-protocol"),
             request.path,
         )
-        grant = self._site.check(credentials)
+        is_page = headers.get("upgrade", "").lower() != "websocket"
+        grant = self._site.check(credentials, is_page=is_page)
         if isinstance(grant, Refusal):
             self._refuse(grant)
             return
@@ -252,7 +253,7 @@ class Connection:
         parts = urlsplit(request.path)
         query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
         seen = HttpRequest(unquote(parts.path), query, headers, self.peer)
-        if headers.get("upgrade", "").lower() != "websocket":
+        if is_page:
             self._serve_page(seen, grant)
             return
 

@@ -9,6 +9,7 @@ import logging
 import socket
 import ssl
 from collections.abc import Callable, Mapping, Sequence
+from urllib.parse import unquote, urlsplit
 
 from minirospy.bridge.access import Access, Credentials, Grant, Refusal
 from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
@@ -38,10 +39,11 @@ class Listener:
         *,
         limits: Limits | None = None,
         pages: Mapping[str, HttpHandler] | None = None,
+        public_pages: Mapping[str, HttpHandler] | None = None,
         tls: ssl.SSLContext | None = None,
         on_change: Callable[[int], object] = lambda _: None,
     ) -> None:
-        """``pages``: path -> what answers it. ``on_change`` is called with the number of connections."""
+        """``pages``: path -> what answers it; ``public_pages`` need no token. ``on_change`` gets the number of connections."""
         self.doors = doors
         self.limits = limits or Limits()
         self.connections: set[Connection] = set()
@@ -52,7 +54,8 @@ class Listener:
         self.host = ""
         self.port = 0
         self._access = access
-        self._pages = dict(pages or {})
+        self._public_pages = dict(public_pages or {})
+        self._pages = {**(pages or {}), **self._public_pages}
         self._tls = tls
         self._on_change = on_change
         self._socks: list[socket.socket] = []
@@ -111,8 +114,10 @@ class Listener:
 
     # --- Site
 
-    def check(self, credentials: Credentials) -> Grant | Refusal:
+    def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal:
         """Return a request's rights, or why it is refused."""
+        if is_page and unquote(urlsplit(credentials.target).path) in self._public_pages:
+            return self._access.check_host(credentials.host) or Grant.READ
         return self._access.check(credentials)
 
     def page(self, path: str) -> HttpHandler | None:
