@@ -1,0 +1,62 @@
+"""Refreshes the libraries of the dashboard's page from npm: `python tools/vendor_page.py`, then look at `git diff`.
+
+``versions.json`` in the folder names each package, its version, npm's digest of its archive, and the files that are taken, with
+the SHA-256 of each. A new version: change it there, delete its "integrity", and run this. npm has to be installed.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+
+FOLDER = Path(__file__).parents[1] / "minirospy" / "dashboard" / "page" / "vendor"
+
+
+def main() -> int:
+    """Fetch every package; return the exit status."""
+    packages = json.loads((FOLDER / "versions.json").read_text(encoding="utf-8"))
+    for folder, package in packages.items():
+        with tempfile.TemporaryDirectory() as scratch:
+            name = f"{package['name']}@{package['version']}"
+            done = subprocess.run(
+                ["npm", "pack", "--silent", name], cwd=scratch, check=True, capture_output=True, text=True
+            )
+            archive = Path(scratch, done.stdout.split()[-1])
+            digest = base64.b64encode(hashlib.sha512(archive.read_bytes()).digest()).decode()
+            integrity = f"sha512-{digest}"
+            if package.setdefault("integrity", integrity) != integrity:
+                print(f"{name}: the archive is not the one that versions.json names", file=sys.stderr)
+                return 1
+            with tarfile.open(archive) as tar:
+                for path in package["files"]:
+                    member = tar.extractfile(f"package/{path}")
+                    assert member, path
+                    body = _without_map(member.read())
+                    target = FOLDER / folder / _file_name(path)
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    target.write_bytes(body)
+                    package["files"][path] = hashlib.sha256(body).hexdigest()
+        print(f"{folder}: {name}")
+    (FOLDER / "versions.json").write_text(json.dumps(packages, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+def _file_name(path: str) -> str:
+    name = Path(path).name
+    return "LICENSE.txt" if name.startswith("LICENSE") else name
+
+
+def _without_map(body: bytes) -> bytes:
+    """Leave out the line that names a source map, which is not vendored: a browser would request it."""
+    kept = [line for line in body.split(b"\n") if not line.startswith(b"//# sourceMappingURL=")]
+    return b"\n".join(kept)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
