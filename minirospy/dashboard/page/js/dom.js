@@ -1,0 +1,76 @@
+// Elements. Text of topics, nodes and log lines always goes in by textContent: it never becomes HTML.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Return an element: h("button", {class: "x", onclick: f, title: "y"}, "text", child, ...). */
+export function h(tag, properties = {}, ...children) {
+  return filled(document.createElement(tag), properties, children);
+}
+
+/** Return an element of SVG. */
+export function svg(tag, properties = {}, ...children) {
+  return filled(document.createElementNS(SVG, tag), properties, children);
+}
+
+function filled(element, properties, children) {
+  for (const [name, value] of Object.entries(properties)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name === "value" || name === "checked") element[name] = value;
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  append(element, children);
+  return element;
+}
+
+function append(element, children) {
+  for (const child of children.flat(Infinity)) {
+    if (child === null || child === undefined || child === false) continue;
+    element.append(child instanceof Node ? child : document.createTextNode(String(child)));
+  }
+}
+
+/** Replace what is in an element. */
+export function fill(element, ...children) {
+  element.replaceChildren();
+  append(element, children);
+}
+
+/** Set an element's text where it differs. */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Return a value as one line of text for people; long arrays are cut. */
+export function shown(value, most = 120) {
+  let text;
+  if (typeof value === "string") text = value;
+  else if (typeof value === "number") text = number(value);
+  else if (value !== null && typeof value === "object" && value.length !== undefined) {
+    const some = Array.from({ length: Math.min(value.length, 12) }, (_, index) => shown(value[index], 20));
+    text = `[${some.join(", ")}${value.length > some.length ? ", …" : ""}] (${value.length})`;
+  } else if (value !== null && typeof value === "object") {
+    text = `{${Object.entries(value).map(([name, each]) => `${name}: ${shown(each, 30)}`).join(", ")}}`;
+  } else text = String(value);
+  return text.length > most ? `${text.slice(0, most - 1)}…` : text;
+}
+
+/** Return a number with seven digits at most. */
+export function number(value) {
+  if (Number.isInteger(value) || !Number.isFinite(value)) return String(value);
+  return String(Number(value.toPrecision(7)));
+}
+
+/** Return bytes a second for people. */
+export function bandwidth(bytes) {
+  if (bytes < 1000) return `${bytes.toFixed(0)} B/s`;
+  if (bytes < 1e6) return `${(bytes / 1e3).toFixed(1)} kB/s`;
+  return `${(bytes / 1e6).toFixed(1)} MB/s`;
+}
+
+/** Offer a file to be saved. */
+export function download(name, blob) {
+  const url = URL.createObjectURL(blob);
+  h("a", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 60_000);
+}

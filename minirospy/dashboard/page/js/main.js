@@ -1,0 +1,92 @@
+// The shell: views by the fragment of the address (#/plot?path=/a/b), the state of the connection, dark and light.
+
+import { Link } from "./link.js";
+import { fill, h, setText } from "./dom.js";
+import { Topics } from "./views/topics.js";
+
+const VIEWS = { topics: ["Topics", Topics] };
+const STATES = {
+  connecting: "connecting …",
+  open: "connected",
+  lost: "connection lost, trying again …",
+  refused: "no connection, trying again …",
+};
+
+const token = takeToken();
+const link = new Link(token);
+const tabs = document.getElementById("tabs");
+const main = document.getElementById("view");
+const notices = document.getElementById("notices");
+let current = null;
+
+/** Return the token of the address, which is kept for this tab, and removed from the address and the history. */
+function takeToken() {
+  const [path, query = ""] = location.hash.split("?");
+  const words = new URLSearchParams(query);
+  const given = words.get("token");
+  if (given) {
+    sessionStorage.setItem("token", given);
+    words.delete("token");
+    const rest = words.toString();
+    history.replaceState(null, "", `${path || "#/"}${rest ? `?${rest}` : ""}`);
+  }
+  return sessionStorage.getItem("token") ?? "";
+}
+
+function route() {
+  const [path, query = ""] = location.hash.slice(1).split("?");
+  const name = path.replace(/^\//, "");
+  const chosen = Object.hasOwn(VIEWS, name) ? name : "topics";
+  current?.close();
+  const [title, View] = VIEWS[chosen];
+  main.dataset.view = chosen;
+  fill(main);
+  current = new View(link, new URLSearchParams(query), main);
+  document.title = `${title} · minirospy`;
+  for (const tab of tabs.children) {
+    if (tab.dataset.view === chosen) tab.setAttribute("aria-current", "page");
+    else tab.removeAttribute("aria-current");
+  }
+}
+
+function showState() {
+  const element = document.getElementById("state");
+  setText(element, STATES[link.state] + (link.state === "open" && !link.mayWrite ? ", read-only" : ""));
+  element.dataset.state = link.state;
+}
+
+function showNotice({ message, level = 1, id = null }) {
+  const key = id ?? message;
+  const known = [...notices.children].find((each) => each.dataset.key === key);
+  const notice = h("div", { class: `notice level${level}` },
+    h("span", {}, message),
+    h("button", { type: "button", title: "Dismiss", onclick: () => notice.remove() }, "×"));
+  notice.dataset.key = key;
+  if (known) known.replaceWith(notice);
+  else notices.append(notice);
+  while (notices.children.length > 4) notices.firstChild.remove();
+}
+
+function switchTheme() {
+  const isDark = document.documentElement.dataset.theme
+    ? document.documentElement.dataset.theme === "dark"
+    : matchMedia("(prefers-color-scheme: dark)").matches;
+  document.documentElement.dataset.theme = isDark ? "light" : "dark";
+  localStorage.setItem("theme", document.documentElement.dataset.theme);
+  link.emit("theme");
+}
+
+if (localStorage.getItem("theme")) document.documentElement.dataset.theme = localStorage.getItem("theme");
+document.getElementById("theme").addEventListener("click", switchTheme);
+for (const [name, [title]] of Object.entries(VIEWS)) {
+  const tab = h("a", { href: `#/${name}` }, title);
+  tab.dataset.view = name;
+  tabs.append(tab);
+}
+link.watch(["state"], showState);
+link.addEventListener("notice", ({ detail }) => showNotice(detail));
+link.addEventListener("withdrawn", ({ detail }) => {
+  for (const notice of [...notices.children]) if (detail.includes(notice.dataset.key)) notice.remove();
+});
+addEventListener("hashchange", route);
+route();

@@ -1,0 +1,99 @@
+// Paths of fields: "/turtle1/pose/x", "/odom.pose.pose.position.x", "/scan/ranges[0]", "/scan/ranges[0:5]". Pure.
+
+import { isNumeric } from "./ros1.js";
+
+const MOST_VALUES = 50; // of one path, as of a whole array
+
+/** Return the topic of a path among those that are known, the longest that fits; null where none does. */
+export function topicOf(path, topics) {
+  let found = null;
+  for (const topic of topics) {
+    const next = path[topic.length];
+    const fits = path.startsWith(topic) && (next === undefined || "/.[".includes(next));
+    if (fits && (found === null || topic.length > found.length)) found = topic;
+  }
+  return found;
+}
+
+/** Return the steps of a path behind its topic: names, numbers, {from, to}. Throws Error. */
+export function parseSteps(text) {
+  const steps = [];
+  let rest = text;
+  while (rest) {
+    const match = /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]/.exec(rest);
+    if (!match) throw new Error(`"${rest}" is not a field, nor an index`);
+    if (match[1] !== undefined) steps.push(match[1]);
+    else if (match[2] !== undefined) steps.push(Number(match[2]));
+    else steps.push({ from: match[3] ? Number(match[3]) : 0, to: match[4] ? Number(match[4]) : Infinity });
+    rest = rest.slice(match[0].length);
+  }
+  return steps;
+}
+
+/** Call found(label, number) for each number that the steps lead to. */
+export function select(value, steps, found, label = "", depth = 0) {
+  if (depth === steps.length) {
+    leaves(value, found, label);
+    return;
+  }
+  const step = steps[depth];
+  if (typeof step === "string") {
+    if (value !== null && typeof value === "object" && Object.hasOwn(value, step)) {
+      select(value[step], steps, found, `${label}/${step}`, depth + 1);
+    }
+  } else if (value?.length === undefined || typeof value === "string") {
+    return;
+  } else if (typeof step === "number") {
+    const index = step < 0 ? value.length + step : step;
+    if (index in value) select(value[index], steps, found, `${label}[${step}]`, depth + 1);
+  } else {
+    const end = Math.min(step.to, value.length, step.from + MOST_VALUES);
+    for (let index = step.from; index < end; index++) select(value[index], steps, found, `${label}[${index}]`, depth + 1);
+  }
+}
+
+/** Return a value as a number, null where it is none. */
+export function numberOf(value) {
+  if (typeof value === "number") return value;
+  if (typeof value === "boolean") return value ? 1 : 0;
+  if (typeof value === "bigint") return Number(value);
+  if (value !== null && typeof value === "object" && "nsecs" in value && Object.keys(value).length === 2) {
+    return value.secs + value.nsecs * 1e-9;
+  }
+  return null;
+}
+
+function leaves(value, found, label) {
+  const number = numberOf(value);
+  if (number !== null) {
+    found(label, number);
+  } else if (value !== null && typeof value === "object") {
+    if (value.length !== undefined) {
+      for (let index = 0; index < Math.min(value.length, MOST_VALUES); index++) {
+        const each = numberOf(value[index]);
+        if (each !== null) found(`${label}[${index}]`, each);
+      }
+      return;
+    }
+    // As rqt_plot: of a message the numbers that are directly in it.
+    for (const [name, each] of Object.entries(value)) {
+      const inner = numberOf(each);
+      if (inner !== null) found(`${label}/${name}`, inner);
+    }
+  }
+}
+
+/** Return the paths of the numbers of a type, behind the topic's name; of arrays the first element. */
+export function numericPaths(definition, most = 200) {
+  const found = [];
+  const visit = (message, prefix) => {
+    for (const field of message.fields) {
+      if (found.length >= most) return;
+      const path = `${prefix}/${field.name}${field.isArray ? "[0]" : ""}`;
+      if (field.message) visit(field.message, path);
+      else if (isNumeric(field.type)) found.push(path);
+    }
+  };
+  visit(definition, "");
+  return found;
+}

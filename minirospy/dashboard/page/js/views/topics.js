@@ -1,0 +1,225 @@
+// All topics: type, rate, bandwidth, and the live values of those that are open.
+
+import { bandwidth, fill, h, setText, shown } from "../dom.js";
+import { numberOf } from "../paths.js";
+import { Rate } from "../rates.js";
+
+// Measuring these costs the bandwidth of a camera: only when opened.
+const HEAVY = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud",
+  "nav_msgs/OccupancyGrid", "theora_image_transport/Packet", "stereo_msgs/DisparityImage"]);
+const MOST_ITEMS = 100; // of one array that is opened
+const REFRESH_MS = 500;
+
+export class Topics {
+  constructor(link, words, main) {
+    this.link = link;
+    this.rows = new Map();
+    this.opened = new Set(words.getAll("open"));
+    this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", oninput: () => this.showFiltered() });
+    this.count = h("span", { class: "muted" });
+    this.list = h("div", { class: "topics", role: "tree", "aria-label": "Topics" });
+    this.empty = h("p", { class: "empty" });
+    main.append(h("div", { class: "bar" }, this.filter, this.count), this.list, this.empty);
+    this.ending = link.watch(["channels", "state"], () => this.update());
+    this.timer = setInterval(() => this.refresh(), REFRESH_MS);
+  }
+
+  close() {
+    this.ending();
+    clearInterval(this.timer);
+    for (const row of this.rows.values()) row.close();
+  }
+
+  update() {
+    const { channels } = this.link;
+    for (const [topic, row] of this.rows) {
+      if (channels.get(topic)?.schema !== row.channel.schema) {
+        // While the connection is lost the rows stay, with their last values.
+        if (this.link.state !== "open" && !channels.size) continue;
+        row.close();
+        row.element.remove();
+        this.rows.delete(topic);
+      }
+    }
+    let before = null;
+    for (const [topic, channel] of channels) {
+      let row = this.rows.get(topic);
+      if (!row) {
+        row = new Row(this.link, channel, this.opened.has(topic));
+        this.rows.set(topic, row);
+      }
+      const next = before ? before.nextSibling : this.list.firstChild;
+      if (row.element !== next) this.list.insertBefore(row.element, next);
+      before = row.element;
+    }
+    this.showFiltered();
+  }
+
+  showFiltered() {
+    const words = this.filter.value.toLowerCase().split(/\s+/);
+    let count = 0;
+    for (const row of this.rows.values()) {
+      const text = `${row.channel.topic} ${row.channel.type}`.toLowerCase();
+      row.element.hidden = !words.every((word) => text.includes(word));
+      count += !row.element.hidden;
+    }
+    setText(this.count, `${count} of ${this.rows.size} topics`);
+    setText(this.empty, this.rows.size ? (count ? "" : "No topic fits the filter.")
+      : this.link.state === "open" ? "Nothing is published yet. Start a node: its topics appear here." : "");
+  }
+
+  refresh() {
+    for (const row of this.rows.values()) row.refresh();
+  }
+}
+
+class Row {
+  constructor(link, channel, isOpen) {
+    this.link = link;
+    this.channel = channel;
+    this.rate = new Rate();
+    this.end = null;
+    this.isOpen = false;
+    this.message = null;
+    this.hz = h("span", { class: "num" });
+    this.bandwidth = h("span", { class: "num wide" });
+    this.preview = h("span", { class: "preview" });
+    this.fields = h("div", { class: "fields", role: "group", hidden: true });
+    this.button = h("button", { type: "button", class: "topic", "aria-expanded": "false", onclick: () => this.toggle() },
+      h("span", { class: "name" }, channel.topic), h("span", { class: "type" }, channel.type), this.hz, this.bandwidth, this.preview);
+    this.element = h("div", { class: "row", role: "treeitem" }, this.button, this.fields);
+    this.element.dataset.topic = channel.topic;
+    this.tree = null;
+    if (isOpen) this.toggle();
+    else if (!HEAVY.has(channel.type)) this.subscribe();
+  }
+
+  subscribe() {
+    this.end?.();
+    this.end = this.link.subscribe({ topic: this.channel.topic, mode: "latest", isCounted: HEAVY.has(this.channel.type) && !this.isOpen },
+      (item) => this.received(item));
+  }
+
+  toggle() {
+    this.isOpen = !this.isOpen;
+    this.button.setAttribute("aria-expanded", String(this.isOpen));
+    this.fields.hidden = !this.isOpen;
+    if (!this.end || HEAVY.has(this.channel.type)) this.subscribe();
+    this.show();
+  }
+
+  close() {
+    this.end?.();
+    this.end = null;
+  }
+
+  received(item) {
+    this.rate.add(performance.now() / 1000, item.count ?? 0, item.bytes ?? 0);
+    this.error = item.error ?? null;
+    if (item.message) this.message = item.message;
+    this.isStale = true;
+    if (this.isOpen) this.show();
+  }
+
+  refresh() {
+    const rate = this.rate.at(performance.now() / 1000);
+    setText(this.hz, rate ? `${rate.hz < 10 ? rate.hz.toFixed(2) : rate.hz.toFixed(1)} Hz` : HEAVY.has(this.channel.type) && !this.end ? "open to measure" : "–");
+    setText(this.bandwidth, rate ? bandwidth(rate.bytes) : "");
+    if (this.isStale && !this.isOpen) setText(this.preview, this.error ?? oneLine(this.message));
+    if (this.isOpen) setText(this.preview, "");
+    this.isStale = false;
+  }
+
+  show() {
+    if (!this.isOpen) return;
+    if (this.error) {
+      fill(this.fields, h("p", { class: "error" }, this.error));
+      this.tree = null;
+    } else if (!this.message) {
+      fill(this.fields, h("p", { class: "muted" }, "Waiting for a message …"));
+      this.tree = null;
+    } else {
+      if (!this.tree) {
+        this.tree = new Tree(this.channel.topic);
+        fill(this.fields, this.tree.element);
+      }
+      this.tree.show(this.message);
+    }
+  }
+}
+
+function oneLine(message) {
+  if (!message) return "";
+  const entries = Object.entries(message).filter(([name]) => name !== "header");
+  return entries.length === 1 ? `${entries[0][0]}: ${shown(entries[0][1])}` : shown(Object.fromEntries(entries));
+}
+
+// The fields of a message; elements are kept from one message to the next, so a person can select and click them.
+class Tree {
+  constructor(path) {
+    this.path = path;
+    this.element = h("ul", {});
+    this.items = new Map();
+  }
+
+  show(message) {
+    const isArray = message.length !== undefined;
+    const names = isArray ? Array.from({ length: Math.min(message.length, MOST_ITEMS) }, (_, index) => index) : Object.keys(message);
+    const wanted = new Set(names);
+    for (const [name, item] of this.items) {
+      if (!wanted.has(name)) {
+        item.element.remove();
+        this.items.delete(name);
+      }
+    }
+    for (const name of names) {
+      let item = this.items.get(name);
+      if (!item) {
+        item = new Field(isArray ? `[${name}]` : String(name), isArray ? `${this.path}[${name}]` : `${this.path}/${name}`);
+        this.items.set(name, item);
+        this.element.append(item.element);
+      }
+      item.show(message[name]);
+    }
+  }
+}
+
+class Field {
+  constructor(label, path) {
+    this.path = path;
+    this.value = h("span", { class: "value" });
+    this.plot = h("a", { class: "plot", href: `#/plot?path=${encodeURIComponent(path)}`, title: `Plot ${path}`, hidden: true }, "plot");
+    this.head = h("button", { type: "button", class: "field", disabled: true, onclick: () => this.toggle() }, h("span", { class: "key" }, label));
+    this.element = h("li", {}, this.head, this.value, this.plot);
+    this.tree = null;
+    this.isOpen = null;
+  }
+
+  show(value) {
+    this.last = value;
+    const isNested = value !== null && typeof value === "object" && numberOf(value) === null;
+    if (!isNested) {
+      setText(this.value, shown(numberOf(value) !== null && typeof value === "object" ? numberOf(value) : value, 2000));
+      this.plot.hidden = numberOf(value) === null;
+      return;
+    }
+    // Messages start open, arrays closed.
+    this.isOpen ??= value.length === undefined;
+    this.head.disabled = false;
+    this.head.setAttribute("aria-expanded", String(this.isOpen));
+    setText(this.value, this.isOpen ? (value.length === undefined ? "" : `${value.length} values${value.length > MOST_ITEMS ? `, the first ${MOST_ITEMS} are shown` : ""}`) : shown(value));
+    if (this.isOpen) {
+      if (!this.tree) {
+        this.tree = new Tree(this.path);
+        this.element.append(this.tree.element);
+      }
+      this.tree.show(value);
+    }
+    if (this.tree) this.tree.element.hidden = !this.isOpen;
+  }
+
+  toggle() {
+    this.isOpen = !this.isOpen;
+    this.show(this.last);
+  }
+}
