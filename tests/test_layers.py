@@ -15,6 +15,7 @@ LAYERS = [
     {"cli"},
     {"testing"},
     {"launch"},
+    {"dashboard"},
     {"bridge"},
     {"frames"},
     {
@@ -50,26 +51,30 @@ LAYERS = [
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = {"runtime", "wire"}
 PURE = {"graph", "wire", "idl", "images", "tf2", "urdf"}
-PURE_FILES = {
-    PACKAGE / "bridge" / name
-    for name in (
-        "access.py",
-        "foxglove/channels.py",
-        "foxglove/parsing.py",
-        "foxglove/protocol.py",
-        "foxglove/serializing.py",
-        "rosapi/typedefs.py",
-        "rosbridge/cbor.py",
-        "rosbridge/conversion.py",
-        "rosbridge/png.py",
-        "rosbridge/protocol.py",
-        "rosbridge/subscription.py",
-        "tf_republisher/pairs.py",
-        "video/options.py",
-        "video/pictures.py",
-        "web/queue.py",
-    )
-} | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
+PURE_FILES = (
+    {
+        PACKAGE / "bridge" / name
+        for name in (
+            "access.py",
+            "foxglove/channels.py",
+            "foxglove/parsing.py",
+            "foxglove/protocol.py",
+            "foxglove/serializing.py",
+            "rosapi/typedefs.py",
+            "rosbridge/cbor.py",
+            "rosbridge/conversion.py",
+            "rosbridge/png.py",
+            "rosbridge/protocol.py",
+            "rosbridge/subscription.py",
+            "tf_republisher/pairs.py",
+            "video/options.py",
+            "video/pictures.py",
+            "web/queue.py",
+        )
+    }
+    | {PACKAGE / "dashboard" / "views.py"}
+    | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
+)
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}
 
 FILES = sorted(

@@ -120,7 +120,7 @@ ROWS = {
     },
 }
 
-ELSEWHERE = re.compile(r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to")
+ELSEWHERE = re.compile(r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt")
 """Commands with their own matrices or tests."""
 
 USAGE_ERROR = 2
@@ -335,6 +335,7 @@ def test_the_other_name_of_each_command() -> None:
         "complete": "",
         "doctor": "",
         "bridge": "",
+        "dashboard": "",
         "python": "",
     }
     for noun in re.findall(r"^  minirospy (\w+) ", run("minirospy -h").out, re.M):

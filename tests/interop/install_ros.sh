@@ -7,6 +7,7 @@ set -eu
 packages="
 camera-calibration-parsers-tools
 catkin
+chromium
 cmake
 fish
 g++

@@ -511,6 +511,13 @@ def pins(cursor: Cursor) -> Iterable[str]:
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
+def dashboard_views(_: Cursor) -> Iterable[str]:
+    """Return the views of the dashboard."""
+    from minirospy.dashboard.views import VIEWS
+
+    return VIEWS
+
+
 def shells(_: Cursor) -> Iterable[str]:
     """Return what `minirospy shell` has something for."""
     from minirospy.workspace.setup_files import SHELLS

@@ -1,0 +1,217 @@
+"""`minirospy dashboard`, `rqt`: the graph in a browser. How to use it: docs/dashboard.md."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Command
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.bridge.tokens import Tokens
+
+__all__ = ["DASHBOARD", "RQT"]
+
+
+def dashboard(argv: Sequence[str] | None = None) -> int:
+    """Run `minirospy dashboard`; return its exit status."""
+    return DASHBOARD.main(argv)
+
+
+def rqt(argv: Sequence[str] | None = None) -> int:
+    """Run `rqt`; return its exit status."""
+    return RQT.main(argv)
+
+
+# --- the command lines
+
+
+def _parser(name: str, what: str) -> Parser:
+    parser = Parser(
+        name, f"{what} Only this machine can open the page, unless --listen is given. Ctrl-C ends it."
+    )
+    parser.add_argument(
+        "--port",
+        type=int,
+        help="port of the page (8766, or a free one if that is in use); 0 takes a free one",
+    )
+    parser.add_argument("--no-browser", action="store_true", help="print the link, and open no browser")
+    parser.add_argument(
+        "--listen", action="store_true", help="let other machines open the page, by links with a token"
+    )
+    parser.add_argument(
+        "--read-only", action="store_true", help="let nobody publish, call services or set parameters"
+    )
+    return parser
+
+
+def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None:
+    """Accept an option of rqt that has no meaning for a page."""
+    if takes_value:
+        parser.add_argument(
+            *words, dest="ignored", metavar="X", help="accepted, without effect", completer="nothing"
+        )
+    else:
+        parser.add_argument(*words, dest="ignored", action="store_true", help="accepted, without effect")
+
+
+def _dashboard_parser() -> Parser:
+    parser = _parser("minirospy dashboard", "Shows the graph in a browser.")
+    parser.add_argument(
+        "view", nargs="?", default="topics", help="the view to open", completer="dashboard_views"
+    )
+    return parser
+
+
+def _rqt_parser() -> Parser:
+    parser = _parser("rqt", "Shows the graph in a browser.")
+    parser.add_argument(
+        "-s",
+        "--standalone",
+        metavar="PLUGIN",
+        default="topics",
+        help="the view to open, as rqt_plot",
+        completer="nothing",
+    )
+    _add_ignored(parser, "--clear-config", "--force-discover", "--lock-perspective", "--on-top")
+    _add_ignored(parser, "-p", "--perspective", "--perspective-file", takes_value=True)
+    return parser
+
+
+def _dashboard(view: str, port: int | None, no_browser: bool, listen: bool, read_only: bool) -> int:
+    from minirospy.dashboard.views import VIEWS
+    from minirospy.errors import did_you_mean
+
+    if view not in VIEWS:
+        raise Misuse(f"there is no view '{view}'{did_you_mean(view, VIEWS)}: there are {', '.join(VIEWS)}")
+    return _serve(view, {}, port, no_browser, listen, read_only)
+
+
+def _rqt(
+    standalone: str, port: int | None, no_browser: bool, listen: bool, read_only: bool, ignored: object
+) -> int:
+    from minirospy.dashboard.views import view_of_plugin
+
+    return _serve(view_of_plugin(standalone), {}, port, no_browser, listen, read_only)
+
+
+# --- the page
+
+
+def _serve(
+    view: str,
+    fields: Mapping[str, Sequence[str]],
+    port: int | None,
+    no_browser: bool,
+    listen: bool,
+    read_only: bool,
+) -> int:
+    """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status."""
+    from minirospy.bridge.serve import require_libraries
+
+    if port is not None and not 0 <= port <= 65535:
+        raise Misuse(f"--port {port} is not between 0 and 65535")
+    require_libraries()
+
+    from minirospy.bridge.access import Access
+    from minirospy.bridge.addresses import host_names
+    from minirospy.bridge.bridge import BridgeOptions
+    from minirospy.bridge.serve import run
+    from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.dashboard.dashboard import PORT, Dashboard
+    from minirospy.environment import Environment
+    from minirospy.errors import BridgeError
+    from minirospy.names import anonymous_name
+
+    tokens = kept_tokens(Environment.read().home) if listen else Tokens("", "")
+    access = Access(
+        hosts=tuple(host_names()),
+        read_token=tokens.read,
+        write_token="" if read_only else tokens.write,
+        requires_token=listen,
+        default_is_read=read_only,
+    )
+
+    class Started:
+        """The dashboard at the first port that is free, of those that are wanted."""
+
+        dashboard: Dashboard
+
+        def __init__(self, node: Node) -> None:
+            self._node = node
+            self._opened: list[Dashboard] = []
+
+        async def start(self) -> None:
+            for each in (PORT, 0) if port is None else (port,):
+                options = BridgeOptions(
+                    address="0.0.0.0" if listen else "127.0.0.1",
+                    foxglove_port=each,
+                    access=access,
+                    diagnostics=False,
+                    name="minirospy dashboard",
+                )
+                self.dashboard = Dashboard(self._node, options)
+                self._opened.append(self.dashboard)
+                try:
+                    await self.dashboard.start()
+                except BridgeError:
+                    if each == PORT and port is None:
+                        continue
+                    raise
+                return
+
+        async def close(self) -> None:
+            for each in self._opened:
+                await each.close()
+
+    async def start(node: Node) -> Started:
+        return Started(node)
+
+    def announce(started: Started) -> None:
+        _announce(
+            started.dashboard.port,
+            view,
+            fields,
+            tokens,
+            no_browser=no_browser,
+            listen=listen,
+            read_only=read_only,
+        )
+
+    return run(anonymous_name("minirospy_dashboard"), (), start, announce)
+
+
+def _announce(
+    port: int,
+    view: str,
+    fields: Mapping[str, Sequence[str]],
+    tokens: Tokens,
+    *,
+    no_browser: bool,
+    listen: bool,
+    read_only: bool,
+) -> None:
+    from minirospy.bridge.addresses import own_addresses, qr_code
+    from minirospy.dashboard.browser import open_link
+    from minirospy.dashboard.views import link
+
+    # The person at this machine gets the rights of its programs.
+    own = tokens.read if read_only else tokens.write
+    here = link("localhost", port, view, fields, token=own)
+    is_opened = not no_browser and open_link(here)
+    print(f"{'The browser opens' if is_opened else 'Open in a browser:'} {here}", flush=True)
+    if listen:
+        for rights, token in (("read-only", tokens.read), ("read-write", "" if read_only else tokens.write)):
+            for address in own_addresses() if token else ():
+                print(f"from other machines, {rights}: {link(address, port, view, fields, token=token)}")
+        addresses = own_addresses()
+        if addresses and sys.stdout.isatty():
+            print(qr_code(link(addresses[0], port, view, fields, token=tokens.read)), end="")
+        sys.stdout.flush()
+
+
+DASHBOARD = Command("minirospy dashboard", _dashboard_parser, _dashboard)
+RQT = Command("rqt", _rqt_parser, _rqt)

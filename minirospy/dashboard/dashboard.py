@@ -1,0 +1,35 @@
+"""The dashboard as a whole: a bridge at one port, with the page and the board's door in it."""
+
+from __future__ import annotations
+
+from minirospy.aio.node import Node
+from minirospy.bridge.bridge import Addition, Bridge, BridgeOptions
+from minirospy.dashboard.board_door import BoardDoor
+from minirospy.dashboard.files import handlers, read_folder
+
+__all__ = ["PORT", "Dashboard"]
+
+PORT = 8766
+
+
+class Dashboard:
+    """Serves the page. On the node's loop."""
+
+    def __init__(self, node: Node, options: BridgeOptions) -> None:
+        """``options.foxglove_port`` is the port of the page and of its data."""
+        self._board = BoardDoor()
+        self.bridge = Bridge(node, options, addition=Addition((self._board,), handlers(read_folder())))
+
+    @property
+    def port(self) -> int:
+        """Return the port of the page, once it is served."""
+        return self.bridge.listeners["foxglove"].port
+
+    async def start(self) -> None:
+        """Listen. Raises BridgeError."""
+        await self.bridge.start()
+
+    async def close(self) -> None:
+        """Disconnect all clients. Idempotent."""
+        await self.bridge.close()
+        await self._board.close()

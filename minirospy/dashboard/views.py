@@ -1,0 +1,83 @@
+"""The views of the page, and the links to them. Pure.
+
+A view and what it shows are in the fragment of the link, which no request carries: neither does the token there get into logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from urllib.parse import quote, urlencode
+
+from minirospy.errors import UsageError
+
+__all__ = ["VIEWS", "link", "plotted_fields", "view_of_plugin"]
+
+VIEWS = ("topics",)
+"""The names of the views, as in links; the page has one module for each."""
+
+_PLUGINS = {
+    "rqt_topic": "topics",
+}
+"""rqt's plug-ins -> the view that shows the same."""
+
+
+def view_of_plugin(plugin: str) -> str:
+    """Return the view for a name that `rqt --standalone` takes. Raise UsageError where there is none."""
+    name = plugin.rpartition("/")[0] or plugin
+    for known, view in _PLUGINS.items():
+        # rqt itself accepts a part of the name.
+        if name.lower().replace(".", "/").split("/")[0] == known:
+            return view
+    if name in VIEWS:
+        return name
+    raise UsageError(f"there is no view for the plug-in '{plugin}': there are {', '.join(_PLUGINS)}")
+
+
+def link(
+    host: str,
+    port: int,
+    view: str,
+    fields: Mapping[str, Iterable[str]] | None = None,
+    *,
+    token: str = "",
+    encrypted: bool = False,
+) -> str:
+    """Return the address of a view; ``fields`` are its settings, each may have several values."""
+    words = [(name, value) for name, values in (fields or {}).items() for value in values]
+    if token:
+        words.append(("token", token))
+    query = f"?{urlencode(words, quote_via=quote, safe='/[]:')}" if words else ""
+    scheme = "https" if encrypted else "http"
+    name = f"[{host}]" if ":" in host else host
+    return f"{scheme}://{name}:{port}/#/{view}{query}"
+
+
+def plotted_fields(words: Iterable[str]) -> list[str]:
+    """Return the paths that rqt_plot's words mean: ``/a/x,/b/y`` are two, ``/pose/x:y`` is /pose/x and /pose/y.
+
+    Raise UsageError on what is not a path.
+    """
+    found: list[str] = []
+    for word in (part for each in words for part in each.split(",") if part):
+        # A colon inside of brackets is a slice.
+        head, *others = _split_colons(word)
+        base = head.rpartition("/")[0]
+        if not base and not head.startswith("/"):
+            raise UsageError(f"'{word}' is not a topic and a field, as /turtle1/pose/x")
+        if others and not base:
+            raise UsageError(f"'{word}' has no field in front of its colon: write /topic/field:field")
+        found.append(head if head.startswith("/") else f"/{head}")
+        found += [f"{base if base.startswith('/') else f'/{base}'}/{field}" for field in others if field]
+    return found
+
+
+def _split_colons(word: str) -> list[str]:
+    parts = [""]
+    depth = 0
+    for character in word:
+        depth += (character == "[") - (character == "]")
+        if character == ":" and not depth:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts

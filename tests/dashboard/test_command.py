@@ -1,0 +1,114 @@
+"""`minirospy dashboard` and rqt's commands: as processes, and their usage."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from http.client import HTTPConnection
+
+import pytest
+
+from minirospy.cli import dashboard as command
+from minirospy.dashboard import browser
+from minirospy.dashboard.browser import has_screen, open_link
+
+
+@pytest.fixture
+def started(master: str) -> Iterator[list[subprocess.Popen[str]]]:
+    """Return a list of processes that are ended with the test."""
+    processes: list[subprocess.Popen[str]] = []
+    yield processes
+    for each in processes:
+        if each.poll() is None:
+            each.terminate()
+        each.communicate(timeout=60)
+
+
+def link_of(started: list[subprocess.Popen[str]], *words: str) -> str:
+    started.append(
+        subprocess.Popen(
+            [sys.executable, "-m", "minirospy", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+    )
+    stdout = started[-1].stdout
+    assert stdout
+    line = stdout.readline()
+    assert line.startswith("Open in a browser: "), line + stdout.read()
+    return line.removeprefix("Open in a browser: ").strip()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another process")
+def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
+    started: list[subprocess.Popen[str]],
+) -> None:
+    link = link_of(started, "dashboard", "topics", "--no-browser", "--port", "0")
+    found = re.fullmatch(r"http://localhost:(\d+)/#/topics", link)
+    assert found
+    connection = HTTPConnection("localhost", int(found[1]), timeout=60)
+    connection.request("GET", "/")
+    assert connection.getresponse().status == 200
+    connection.close()
+    started[0].send_signal(signal.SIGINT)
+    assert started[0].wait(60) == 0
+
+
+def test_second_dashboard_takes_another_port(started: list[subprocess.Popen[str]]) -> None:
+    links = {link_of(started, "dashboard", "--no-browser") for _ in range(2)}
+    assert len(links) == 2
+
+
+def test_port_in_use_is_one_line(
+    started: list[subprocess.Popen[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    link = link_of(started, "dashboard", "--no-browser", "--port", "0")
+    port = link.rpartition(":")[2].partition("/")[0]
+    assert command.dashboard(["--no-browser", "--port", port]) == 1
+    error = capsys.readouterr().err
+    assert f"cannot listen at 127.0.0.1:{port}" in error
+    assert error.count("\n") == 1
+
+
+def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.Popen[str]]) -> None:
+    link = link_of(started, "dashboard", "--no-browser", "--port", "0", "--listen")
+    assert re.fullmatch(r"http://localhost:\d+/#/topics\?token=[\w-]{22}", link)
+
+
+@pytest.mark.parametrize(
+    ("run", "words", "text"),
+    [
+        (command.dashboard, ["tpics"], "there is no view 'tpics'"),
+        (command.dashboard, ["--port", "70000"], "--port 70000 is not between 0 and 65535"),
+        (command.rqt, ["-s", "rqt_moveit"], "there is no view for the plug-in 'rqt_moveit'"),
+    ],
+)
+def test_usage_error_has_status_2(
+    run: object, words: list[str], text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert callable(run)
+    assert run(words) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_browser_is_opened_where_there_is_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    import queue
+
+    opened: queue.Queue[str] = queue.Queue()
+    monkeypatch.setattr(browser.webbrowser, "open", opened.put)
+    monkeypatch.setattr(browser, "has_screen", lambda environ: True)
+    assert open_link("http://localhost:1/#/topics")
+    assert opened.get(timeout=60) == "http://localhost:1/#/topics"
+    monkeypatch.setattr(browser, "has_screen", lambda environ: False)
+    assert not open_link("http://localhost:1/")
+
+
+def test_screen_is_known_by_the_environment() -> None:
+    assert not has_screen({}, "linux")
+    assert has_screen({"DISPLAY": ":0"}, "linux")
+    assert has_screen({"BROWSER": "firefox"}, "linux")
+    assert has_screen({}, "darwin")

@@ -1,0 +1,56 @@
+"""Links to views, and the words of rqt's commands."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from minirospy.dashboard.files import FOLDER
+from minirospy.dashboard.views import VIEWS, link, plotted_fields, view_of_plugin
+from minirospy.errors import UsageError
+
+
+def test_page_has_the_views_that_links_name() -> None:
+    table = re.search(r"const VIEWS = \{(.*?)\};", (FOLDER / "js" / "main.js").read_text(), re.DOTALL)
+    assert table
+    assert tuple(re.findall(r"(\w+): \[", table[1])) == VIEWS
+
+
+def test_link_has_its_settings_and_token_in_the_fragment() -> None:
+    assert link("localhost", 8766, "topics") == "http://localhost:8766/#/topics"
+    assert (
+        link("::1", 1, "plot", {"path": ["/a/b[0:2]", "/c d"]}, token="t-1", encrypted=True)
+        == "https://[::1]:1/#/plot?path=/a/b[0:2]&path=/c%20d&token=t-1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "paths"),
+    [
+        (["/turtle1/pose/x"], ["/turtle1/pose/x"]),
+        (["/turtle1/pose/x:y:theta"], ["/turtle1/pose/x", "/turtle1/pose/y", "/turtle1/pose/theta"]),
+        (["/a/x,/b/y", "/c/z"], ["/a/x", "/b/y", "/c/z"]),
+        (["pose/x:y"], ["/pose/x", "/pose/y"]),
+        (["/scan/ranges[0:5]"], ["/scan/ranges[0:5]"]),
+        (["/button_state"], ["/button_state"]),
+        ([], []),
+    ],
+)
+def test_words_of_rqt_plot_become_paths(words: list[str], paths: list[str]) -> None:
+    assert plotted_fields(words) == paths
+
+
+@pytest.mark.parametrize("word", ["x", "/x:y"])
+def test_word_that_is_not_a_path_is_refused(word: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(word)):
+        plotted_fields([word])
+
+
+def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
+    assert view_of_plugin("topics") == "topics"
+    assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
+    with pytest.raises(
+        UsageError, match=r"there is no view for the plug-in 'rqt_moveit': there are .*rqt_topic"
+    ):
+        view_of_plugin("rqt_moveit")

@@ -1,0 +1,201 @@
+"""Debian's chromium for tests, driven by the DevTools protocol over its WebSocket: act as a person does, wait for what is seen.
+
+Source: https://chromedevtools.github.io/devtools-protocol.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import itertools
+import json
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+CHROMIUM = shutil.which("chromium")
+PATIENCE = 60.0
+"""Seconds for a state to come; a loaded machine needs some of them."""
+
+_FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--remote-debugging-port=0",
+    "--hide-scrollbars",
+)
+
+_WAIT = """
+new Promise((resolve, reject) => {
+  const end = performance.now() + %d;
+  const look = () => {
+    let found;
+    try { found = (() => { %s })(); } catch (error) { found = undefined; }
+    if (found) resolve(found);
+    else if (performance.now() > end) reject(new Error("not reached; the page shows: " + document.body.innerText.slice(0, 2000)));
+    else setTimeout(look, 30);
+  };
+  look();
+})
+"""
+
+
+class Page:
+    """A tab. ``script`` is JavaScript; ``find`` is a selector of CSS."""
+
+    def __init__(self, url: str, *, width: int = 1200, height: int = 760, dark: bool = False) -> None:
+        assert CHROMIUM
+        self._folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [
+                CHROMIUM,
+                *_FLAGS,
+                f"--user-data-dir={self._folder.name}",
+                f"--window-size={width},{height}",
+                "about:blank",
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        self._numbers = itertools.count(1)
+        self.errors: list[str] = []
+        """What the page logged as errors: exceptions, and what its Content-Security-Policy refused."""
+        try:
+            self._stack = contextlib.ExitStack()
+            self._socket = self._stack.enter_context(self._connect())
+            for domain in ("Page", "Runtime", "Log"):
+                self.call(f"{domain}.enable")
+            self.call(
+                "Emulation.setDeviceMetricsOverride",
+                width=width,
+                height=height,
+                deviceScaleFactor=1,
+                mobile=False,
+            )
+            self.call(
+                "Emulation.setEmulatedMedia",
+                features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+            )
+            self.open(url)
+        except BaseException:
+            self.close()
+            raise
+
+    def open(self, url: str) -> None:
+        """Load an address."""
+        self.call("Page.navigate", url=url)
+        self.wait("return document.readyState === 'complete'")
+
+    def call(self, method: str, **params: Any) -> Any:
+        """Call a method of the protocol; return its result."""
+        number = next(self._numbers)
+        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
+        while True:
+            answer = json.loads(self._socket.recv(timeout=PATIENCE * 2))
+            if answer.get("id") == number:
+                assert "error" not in answer, answer
+                return answer["result"]
+            self._event(answer)
+
+    def _event(self, event: dict[str, Any]) -> None:
+        params = event.get("params", {})
+        if event["method"] == "Runtime.exceptionThrown":
+            details = params["exceptionDetails"]
+            self.errors.append(details.get("exception", {}).get("description") or details["text"])
+        elif event["method"] == "Log.entryAdded" and params["entry"]["level"] == "error":
+            self.errors.append(params["entry"]["text"])
+
+    def evaluate(self, script: str) -> Any:
+        """Return the value of an expression; a promise is waited for."""
+        result = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
+
+    def wait(self, script: str) -> Any:
+        """Return what a function's body returns, once that is true."""
+        return self.evaluate(_WAIT % (PATIENCE * 1000, script))
+
+    def wait_text(self, find: str, text: str) -> str:
+        """Wait until a visible element has this text in it; return all of its text."""
+        return str(self.wait(f"const e = {_finding(find, text)}; return e && e.textContent"))
+
+    def click(self, find: str, text: str = "") -> None:
+        """Click the first element that is visible, has this text, once it is there; as a mouse does."""
+        for kind in ("mousePressed", "mouseReleased"):
+            self.mouse(kind, find, text)
+
+    def mouse(self, kind: str, find: str, text: str = "") -> None:
+        """Press (mousePressed) or release (mouseReleased) the mouse over an element."""
+        x, y = self.wait(
+            f"const e = {_finding(find, text)}; if (!e || e.disabled) return null; e.scrollIntoView({{block: 'nearest'}});"
+            "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]"
+        )
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def type(self, find: str, text: str) -> None:
+        """Replace the text of an input, as by keys."""
+        self.wait(f"const e = {_finding(find)}; if (!e) return false; e.focus(); e.select(); return true")
+        self.call("Input.insertText", text=text)
+
+    def choose(self, find: str, value: str) -> None:
+        """Choose an entry of a <select>, once it is there."""
+        choice = json.dumps(value)
+        self.wait(
+            f"const e = {_finding(find)}; if (!e || ![...e.options].some(o => o.value === {choice})) return false;"
+            f"e.value = {choice}; e.dispatchEvent(new Event('change', {{bubbles: true}})); return true"
+        )
+
+    def screenshot(self, path: Path) -> None:
+        """Save what is seen as PNG."""
+        data = self.call("Page.captureScreenshot", format="png")["data"]
+        path.write_bytes(base64.b64decode(data))
+
+    def close(self) -> None:
+        """End the browser and all of its processes."""
+        socket = getattr(self, "_socket", None)
+        if socket:
+            with contextlib.suppress(ConnectionClosed):  # it may be faster than its answer
+                self.call("Browser.close")
+            self._stack.close()
+        else:
+            self._process.terminate()
+        try:
+            self._process.wait(30)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def _connect(self) -> contextlib.AbstractContextManager[ClientConnection]:
+        file = Path(self._folder.name, "DevToolsActivePort")
+        end = time.monotonic() + PATIENCE
+        while not (file.exists() and len(file.read_text().splitlines()) == 2):
+            assert self._process.poll() is None, "chromium has ended"
+            assert time.monotonic() < end, "chromium does not start"
+            time.sleep(0.05)
+        port, path = file.read_text().splitlines()
+        with connect(f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None) as whole:
+            whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
+            while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
+                pass
+        target = next(each["targetId"] for each in answer["result"]["targetInfos"] if each["type"] == "page")
+        return connect(f"ws://127.0.0.1:{port}/devtools/page/{target}", max_size=None, compression=None)
+
+
+def _finding(find: str, text: str = "") -> str:
+    """Return the expression of the first element that is visible and has this text in it."""
+    return (
+        f"[...document.querySelectorAll({json.dumps(find)})].find("
+        f"e => e.getClientRects().length && e.textContent.includes({json.dumps(text)}))"
+    )
