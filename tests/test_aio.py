@@ -462,7 +462,7 @@ def test_node_shutdown_ends_waiting_for_peers(master: str) -> None:
             node.shutdown()
             for wait in waits:
                 with pytest.raises(ROSInterruptException):
-                    await asyncio.wait_for(wait, 5)
+                    await asyncio.wait_for(wait, 30)
 
     run(main)
 

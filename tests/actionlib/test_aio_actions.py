@@ -174,7 +174,7 @@ def test_concurrent_goals_each_end() -> None:
         await client.wait_for_server()
         await client.send(msg.TestGoal(1))
         goals = [client.send(msg.TestGoal(1)) for _ in range(5)]
-        ends = await asyncio.wait_for(asyncio.gather(*goals, return_exceptions=True), 5)
+        ends = await asyncio.wait_for(asyncio.gather(*goals, return_exceptions=True), SECONDS)
         assert ends[-1].result == 1  # type: ignore[union-attr]
         assert {goal.state for goal in goals[:-1]} <= {GoalState.PREEMPTED, GoalState.RECALLED}
 

@@ -416,7 +416,7 @@ def join_late(*args):
     join(*args)
 SubscribedTopic.join = join_late
 rospy.Subscriber("/t", String, lambda _: second.set())
-print(second.wait(5))
+print(second.wait(30))
 """)
     )
     assert output == "True\n"
