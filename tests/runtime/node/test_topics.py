@@ -293,7 +293,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
             await b.subscribe(subscription)
             await eventually(lambda: publication.links)
             publication.publish(serialize_frame(b"0000" + bytes(1_000_000)))
-            await asyncio.get_running_loop().run_in_executor(None, started.wait, 10)
+            await asyncio.get_running_loop().run_in_executor(None, started.wait, 30)
             for number in range(1, 101):
                 publication.publish(serialize_frame(b"%04d" % number + bytes(1_000_000)))
             # 100 MB were published; what waits is bounded by the queue.
@@ -476,22 +476,25 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
         async with graph("/a", "/b") as (_, (a, b)):
             await publish(a, "/t")
             subscription = b.make_subscription("/t", STRING, Box())
-            open_link, opened = subscription._open_link, 0
+            open_link, opening, opened = subscription._open_link, 0, 0
+            is_named_again = asyncio.Event()
 
             async def open_all_the_same(uri: str) -> Any:
-                nonlocal opened
+                nonlocal opening, opened
+                opening += 1
                 # As asyncio.wait_for before Python 3.12 may do.
                 with contextlib.suppress(asyncio.CancelledError):
-                    await asyncio.sleep(0.01)
+                    await is_named_again.wait()
                 link = await open_link(uri)
                 opened += 1
                 return link
 
             monkeypatch.setattr(subscription, "_open_link", open_all_the_same)
             await b.subscribe(subscription)
-            await asyncio.sleep(0)
+            await eventually(lambda: opening)
             subscription.publishers_changed([])
             subscription.publishers_changed([a.uri])
+            is_named_again.set()
             await eventually(lambda: opened == 2)
             await eventually(lambda: len(a.publications["/t"].links) == len(subscription.links) == 1)
 
@@ -724,7 +727,8 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
-            await eventually(lambda: publication.links)
+            # The publisher's end is open a moment before the subscriber's.
+            await eventually(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])
             await eventually(lambda: subscription._settling is None)
