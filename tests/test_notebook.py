@@ -9,14 +9,25 @@ import subprocess
 import sys
 
 KERNEL = """
-import asyncio, os, signal, threading
+import asyncio, os, signal, sys, threading, time
 
-def cell(code, interrupted=False):
+def interrupt(function):
+    "Press Ctrl-C while the cell waits in this function of minirospy: spin() takes no interrupt that comes before."
+    names = set()
+    while not {"threading.wait", function} <= names:
+        time.sleep(0.01)
+        frame, names = sys._current_frames()[threading.main_thread().ident], set()
+        while frame:
+            names.add(frame.f_globals["__name__"] + "." + frame.f_code.co_name)
+            frame = frame.f_back
+    os.kill(os.getpid(), signal.SIGINT)
+
+def cell(code, interrupted=None):
     "Blocking code in the loop's thread, with Python's own handler for Ctrl-C, as ipykernel runs a cell."
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         if interrupted:
-            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+            threading.Thread(target=interrupt, args=[interrupted]).start()
         print(eval(code, globals()), flush=True)
     except KeyboardInterrupt:
         print("interrupted", flush=True)
@@ -31,16 +42,19 @@ async def kernel():
     cell("rospy.init_node('notebook')")
     cell("rospy.Subscriber('/t', String, lambda message: got.append(message.data)) and None")
     cell("globals().update(p=rospy.Publisher('/t', String, queue_size=1)) or p.wait_for_subscribers(timeout=30)")
-    for code in ("rospy.sleep(30)", "rospy.wait_for_message('/none', String)", "rospy.wait_for_service('/none')",
-                 "rospy.Rate(0.01).sleep()"):
-        cell(code, interrupted=True)
+    cell("rospy.sleep(30)", interrupted="minirospy.client.time.sleep")
+    cell("rospy.wait_for_message('/none', String)", interrupted="minirospy.client.subscriber.wait_for_message")
+    cell("rospy.wait_for_service('/none')", interrupted="minirospy.client.services.wait_for_service")
+    cell("rospy.Rate(0.01).sleep()", interrupted="minirospy.client.time.sleep")
     cell("rospy.is_shutdown(), p.publish('still here')")
     async with Node("cells") as node:
         publisher = await node.advertise("/async", String, latch=True)
         await publisher.publish("from a cell")
         async with Node("others") as others:
             print((await others.wait_for_message("/async", String, timeout=30)).data)
-    cell("rospy.spin()", interrupted=True)
+    while not got:
+        await asyncio.sleep(0.01)
+    cell("rospy.spin()", interrupted="minirospy.clock.wait_for_event")
     cell("rospy.is_shutdown(), got")
     await asyncio.sleep(0.01)
     print("the kernel goes on")
