@@ -6,6 +6,7 @@ import asyncio
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from actionlib_msgs.msg import GoalID
 
 from minirospy import Node
 from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError, ServerGoal
+from minirospy.actionlib.aio import server as server_module
 from minirospy.actionlib.spec import ActionException
 from minirospy.errors import ROSException, ROSInterruptException
 from minirospy.graph.goals import GoalState
@@ -264,11 +266,18 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A goal of a client that is not minirospy's waits a moment before it is taken."""
-    monkeypatch.setattr("minirospy.actionlib.aio.server.SEND_SECONDS", 0.1)
-    monkeypatch.setattr("minirospy.actionlib.aio.server.CANCEL_SECONDS", 0.3)
+    """A goal of a client that is not minirospy's waits a moment before it is taken, and a cancel waits longer."""
 
     async def main(_: Client, server: Server) -> None:
+        pauses: list[float] = []
+
+        async def sleep(seconds: float) -> None:
+            # Both have come by now; the one whose pause is shorter is done before the other goes on.
+            pauses.append(seconds)
+            while len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server._goals):
+                await asyncio.sleep(0.001)
+
+        monkeypatch.setattr(server_module, "asyncio", SimpleNamespace(**{**vars(asyncio), "sleep": sleep}))
         async with (
             Node("other", rosout=False) as other,
             other.advertise("act/goal", msg.TestActionGoal) as goals,
@@ -277,6 +286,7 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
             await goals.publish(goal_id=GoalID(id="other-1"), goal=msg.TestGoal(3))
             await server._take_cancel(GoalID())
             assert server._goals["other-1"].is_cancel_requested
+            monkeypatch.undo()
 
     run(main)
 

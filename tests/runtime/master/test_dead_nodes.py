@@ -32,10 +32,13 @@ async def until(condition: Callable[[], object]) -> None:
 def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(masters, "_SWEEP_SECONDS", 0.01)
     monkeypatch.setattr(dead_nodes, "_SECONDS", 0.1)
-    notified: list[str] = []
+    called: list[str] = []
+    publishers: list[object] = []
 
     def answer(method: str, args: list[object]) -> object:
-        notified.append(method)
+        called.append(method)
+        if method == "publisherUpdate":
+            publishers[:] = args[2]  # type: ignore[call-overload]
         return [1, "", 0]
 
     async def scene() -> None:
@@ -55,10 +58,11 @@ def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pyt
             master.dispatch("registerPublisher", ["/dead", "/t0", "a/B", dead_uri])
             for number in range(10):
                 master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
+            await until(lambda: publishers == [slow_uri, dead_uri, dead_uri])
             await asyncio.sleep(0.05)
             # There is room: nobody is called.
             assert len(master.registry.nodes()) == 13
-            assert "getPid" not in notified
+            assert "getPid" not in called
 
             for number in range(10, 100):
                 master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
@@ -66,7 +70,7 @@ def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pyt
             await until(lambda: len(master.registry.nodes()) == 2)
             assert master.registry.nodes() == {"/live": live_uri, "/slow": slow_uri}
             assert master.registry.publishers() == {"/t0": ["/slow"]}
-            await until(lambda: "publisherUpdate" in notified[notified.index("getPid") :])
+            await until(lambda: publishers == [slow_uri])
         await live.close()
         await master.close()
 

@@ -80,9 +80,12 @@ def test_a_call_that_was_late_on_a_kept_connection_is_not_made_again() -> None:
 
         server = RpcServer(dispatch)
         await server.start()
-        client = RpcClient(f"http://127.0.0.1:{server.port}/", 0.2)
+        client = RpcClient(f"http://127.0.0.1:{server.port}/", 30.0)
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(None, client.call, "quick")
+        client._timeout = 0.2
+        for kept in client._idle:
+            kept.settimeout(0.2)
         with pytest.raises(RpcUnreachable, match=r"timed out after 0\.2 s"):
             await loop.run_in_executor(None, client.call, "late")
         assert made == ["quick", "late"]
