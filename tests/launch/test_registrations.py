@@ -21,7 +21,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
-from tests.launch.conftest import Start
+from tests.launch.conftest import Running, Start
 
 NODE = """import signal, sys, rospy
 from std_msgs.msg import String
@@ -132,8 +132,9 @@ def wait_until(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def process_of(name: str) -> psutil.Process:
-    return next(p for p in psutil.process_iter(["cmdline"]) if f"__name:={name}" in (p.info["cmdline"] or ()))
+def process_of(launch: Running, name: str) -> psutil.Process:
+    # Of another test's roslaunch there may be a node of the same name.
+    return next(child for child in launch.children() if f"__name:={name}" in child.cmdline())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals between processes")
@@ -144,7 +145,7 @@ def test_roslaunch_unregisters_a_node_that_was_killed(start: Start, master: str,
     )
     launch.read_until("ready")
     assert "/killed" in registered(master)
-    process_of("killed").kill()
+    process_of(launch, "killed").kill()
     wait_until(lambda: "/killed" not in registered(master))
     assert launch.process.poll() is None
 
@@ -161,7 +162,7 @@ def test_roslaunch_or_its_guardian_unregisters_the_nodes_it_kills(
         "--sigterm-timeout=0.1",
     )
     launch.read_until("ready")
-    node = process_of("ignores")
+    node = process_of(launch, "ignores")
     launch.process.send_signal(getattr(signal, number))
     launch.process.wait(30)
     node.wait(30)

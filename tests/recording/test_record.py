@@ -325,6 +325,14 @@ def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Pa
         "from minirospy.recording.disk import QueuedFile\n"
         "write = QueuedFile._write_all\n"
         "QueuedFile._write_all = lambda self, data: (sys.stdin.read(), write(self, data))\n"
+        "from minirospy.recording.recorder import Recorder\n"
+        "receive, received = Recorder._receive, []\n"
+        "def count(*args):\n"
+        "    receive(*args)\n"
+        "    received.append(1)\n"
+        "    if len(received) == 30:\n"
+        "        print('all have come', flush=True)\n"
+        "Recorder._receive = count\n"
     )
     process = start(
         "record",
@@ -341,6 +349,7 @@ def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Pa
     connected(chatter)
     for i in range(30):
         say(chatter, f"{i:02}" + "x" * 99_998)
+    read_until(process, "all have come")
     read_until(process, "rosbag record buffer exceeded.  Dropped messages: /chatter", process.stderr)
     process.send_signal(signal.SIGINT)
     assert process.stdin
