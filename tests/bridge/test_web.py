@@ -8,6 +8,7 @@ import socket
 import ssl
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -207,10 +208,17 @@ def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[...
     assert_alive(other)
 
 
-def test_pings_are_answered(bridge: Running) -> None:
+def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(ping_seconds=0.05))
     client = bridge.client()
     client.next("serverInfo")
-    assert client.socket.ping().wait(30)
+    client.socket.ping().wait(30)
+    (connection,) = bridge.bridge.listeners["foxglove"].connections
+    # It sends nothing of its own from now on.
+    heard = connection._received
+    while connection._received <= heard:
+        time.sleep(0.01)
+    assert_alive(client)
 
 
 def test_clients_that_answer_no_ping_are_disconnected(run_bridge: Callable[..., Running]) -> None:
@@ -222,7 +230,7 @@ def test_clients_that_answer_no_ping_are_disconnected(run_bridge: Callable[..., 
 
 
 def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Running]) -> None:
-    bridge = run_bridge(limits=Limits(connections=20))
+    bridge = run_bridge(limits=Limits(connections=20, handshake_seconds=1000.0))
     first = bridge.client()
     held = [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(19)]
     for _ in range(200):
@@ -239,7 +247,8 @@ def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Runn
     assert_alive(bridge.client())
 
 
-def test_thousand_connections_leave_the_first_ones_unaffected(bridge: Running) -> None:
+def test_thousand_connections_leave_the_first_ones_unaffected(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(limits=Limits(handshake_seconds=1000.0))
     first = bridge.client()
     first.next("serverInfo")
     socks = []
@@ -264,7 +273,10 @@ def test_thousand_connections_leave_the_first_ones_unaffected(bridge: Running) -
 
 def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(handshake_seconds=0.1))
-    assert raw_answer(bridge.port, b"GET / HTTP/1.1\r\n") == b""
+    assert raw_answer(bridge.port, b"") == b""
+    # Where it has closed before this comes, it resets the connection.
+    with contextlib.suppress(ConnectionError):
+        assert raw_answer(bridge.port, b"GET / HTTP/1.1\r\n") == b""
 
 
 def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> None:
@@ -292,14 +304,18 @@ def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> 
 
 def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(messages_a_second=50))
+    start_time, all_sent = time.monotonic(), threading.Event()
     client, other = bridge.client(), bridge.client()
+    bridge._loop.post(all_sent.wait)
     for number in range(120):
         client.send(op="getParameters", parameterNames=["/none"], id=str(number))
+    all_sent.set()
     assert_alive(other)
     answers = [client.next("parameterValues")["id"] for _ in range(120)]
+    assert time.monotonic() - start_time >= 2.0
     assert sorted(answers, key=int) == [str(number) for number in range(120)]
     (state,) = [each for each in bridge.bridge.status()["clients"] if each["received"] >= 120]  # type: ignore[attr-defined]
-    assert state["held_back"] >= 2
+    assert state["held_back"] >= 1
 
 
 def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callable[..., Running]) -> None:
