@@ -54,7 +54,7 @@ def start(master: str) -> Iterator[Start]:
 
 def finished(program: subprocess.Popen[str]) -> tuple[str, str]:
     """Return what a program printed on stdout and on stderr; it ends by itself, with status 0."""
-    output, errors = program.communicate(timeout=30)
+    output, errors = program.communicate(timeout=60)
     assert program.returncode == 0, errors
     return output, errors
 
