@@ -154,6 +154,8 @@ def test_a_node_that_hangs_is_not_killed(
         assert err.startswith(
             f"rosnode: ERROR: node [/hung] does not answer at {uri} (timed out after 0.1 s): "
         )
+        # The robot has time to answer.
+        monkeypatch.setattr("minirospy.introspect.nodes._SHUTDOWN_SECONDS", 3.0)
         status, out, err = command("rosnode", "kill", "-a")
         assert (status, out) == (1, "killing:\n * /hung\n * /robot\nkilled\n")
     assert robot.stopped

@@ -87,6 +87,8 @@ def test_frames_of_several_threads_stay_whole(
     data = receive_all(pair[1], sum(map(len, frames)) * 5)
     for thread in threads:
         thread.join()
+    # What the peer has may not be counted yet.
+    loop.run(link.drain(30))
     seen = []
 
     while data:
