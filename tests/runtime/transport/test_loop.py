@@ -51,6 +51,8 @@ def test_a_second_close_does_not_interrupt_the_end() -> None:
     thread.close()
     with pytest.raises(LoopClosedError):
         wait(10)
+    # close() gives up on a thread that stalls.
+    thread._thread.join(30)
     assert thread.loop.is_closed()
     assert ended == ["task"]
 
