@@ -1,12 +1,13 @@
-"""The mark of a shutdown hook that runs in the middle of another call, which a signal has interrupted."""
+"""Which signals mean Ctrl-C, and the mark of a shutdown hook that runs in the middle of another call, interrupted by one."""
 
 from __future__ import annotations
 
 import contextlib
+import signal
 import threading
 from collections.abc import Iterator
 
-__all__ = ["dispatching_signal", "is_dispatching_signal"]
+__all__ = ["dispatching_signal", "interrupt_signals", "is_dispatching_signal"]
 
 _this_thread = threading.local()
 
@@ -24,3 +25,9 @@ def dispatching_signal() -> Iterator[None]:
 def is_dispatching_signal() -> bool:
     """Return whether this thread handles a signal, in the middle of whatever else it does."""
     return getattr(_this_thread, "is_dispatching", False)
+
+
+def interrupt_signals() -> list[signal.Signals]:
+    """Return the signals of Ctrl-C: SIGINT, and on Windows SIGBREAK, the only one that reaches a separate process group."""
+    found = (getattr(signal, name, None) for name in ("SIGINT", "SIGBREAK"))
+    return [number for number in found if number is not None]

@@ -34,6 +34,7 @@ LAYERS = [
     {"runtime"},
     {"graph", "wire", "idl", "images", "tf2", "gpio", "bag", "urdf"},
     {
+        "child_lifetime",
         "clock",
         "environment",
         "keyboard",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from minirospy.aio.node import Node
 from minirospy.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.runtime.transport.loop import new_event_loop
+from minirospy.signal_dispatch import interrupt_signals
 
 if TYPE_CHECKING:
     from minirospy.bridge.bridge import Bridge
@@ -112,7 +113,7 @@ async def _run(
 
     before = {
         number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in (*interrupt_signals(), signal.SIGTERM)
     }
     # On Windows a signal is noticed when the loop next wakes up.
     ticking = asyncio.ensure_future(_tick())

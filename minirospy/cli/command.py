@@ -118,6 +118,7 @@ def run(
     SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
     """
     _open_streams()
+    _heed_break()
     if heeds_interrupts and not interrupted:
         _heed_interrupts()
     try:
@@ -140,6 +141,19 @@ def run(
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
         return interrupted
+
+
+def _heed_break() -> None:
+    """On Windows, end at Ctrl-Break as at Ctrl-C: it is what a launcher sends, and else ends a process without its clean-up."""
+    import signal
+    import threading
+
+    from minirospy.signal_dispatch import interrupt_signals
+
+    if threading.current_thread() is threading.main_thread():
+        for number in interrupt_signals()[1:]:
+            if signal.getsignal(number) == signal.SIG_DFL:
+                signal.signal(number, signal.default_int_handler)
 
 
 def _heed_interrupts() -> None:

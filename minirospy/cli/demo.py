@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from minirospy.child_lifetime import guard_children
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.errors import MinirospyError
@@ -56,7 +57,12 @@ def _demo(presses: int | None) -> int:
     if presses is None and not sys.stdout.isatty():
         presses = 3
 
-    with _own_world() as folder, _launched(folder / "roslaunch.log") as launch, Board() as board:
+    with (
+        guard_children(),
+        _own_world() as folder,
+        _launched(folder / "roslaunch.log") as launch,
+        Board() as board,
+    ):
         _wait_until_ready(board, launch, folder / "roslaunch.log")
         show = _Picture(board) if sys.stdout.isatty() and not _is_dumb() else _Lines()
         failures = 0

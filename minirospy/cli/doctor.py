@@ -16,6 +16,7 @@ from pathlib import Path
 from minirospy.cli.parser import AssignmentParser, Misuse, Parser
 from minirospy.cli.verbs import Command
 from minirospy.introspect.doctor import Examination, Finding, Status, ok, problem
+from minirospy.signal_dispatch import interrupt_signals
 
 __all__ = ["DOCTOR", "ROSWTF", "main", "roswtf"]
 
@@ -105,7 +106,7 @@ def _is_file(word: str) -> bool:
 def _wait_for_signal() -> None:
     """Wait for Ctrl-C or SIGTERM, so that a listener unregisters before it exits."""
     stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     # In slices: on Windows a wait without a timeout is not interrupted by signals.
     while not stop.wait(0.5):

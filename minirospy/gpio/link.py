@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy import private_files
+from minirospy.child_lifetime import start_outside_of_job
 from minirospy.errors import BoardError
 from minirospy.gpio.model import Function, Operation, Pin, Position, Setup, Write
 from minirospy.gpio.place import Place
@@ -335,7 +336,7 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
     with private_files.open_text(place.log_path, "a") as log:
-        process = subprocess.Popen(
+        process = start_outside_of_job(
             [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

@@ -2,8 +2,9 @@
 
 From its input it reads a line for each process group: ``+PID NAME`` has started, a node; ``*PID`` has started and is to end
 last (the master); ``-PID`` has ended. Where the input ends, roslaunch has exited, for any reason: the groups that are left get
-SIGINT, SIGTERM, SIGKILL, and what their nodes leave registered with a master that goes on is unregistered. Nothing but the
-standard library is imported, and little of that: it starts while the first nodes do.
+SIGINT, SIGTERM, SIGKILL, and what their nodes leave registered with a master that goes on is unregistered. On Windows the
+system has ended them with roslaunch, and only the last is left to do. Nothing but the standard library is imported, and little of
+that: it starts while the first nodes do.
 """
 
 from __future__ import annotations
@@ -12,13 +13,22 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 _UNREGISTER_SECONDS = 60.0
 
+SYSTEM_ENDS_THEM = "system-ends-them"
+"""The last argument where the system ends the processes of a killed roslaunch, as Windows does."""
 
-def watch(lines: Iterable[str], interrupt_seconds: float, terminate_seconds: float, master_uri: str) -> None:
-    """Keep a list of the groups until ``lines`` end; then end those that are left."""
+
+def watch(
+    lines: Iterable[str],
+    interrupt_seconds: float,
+    terminate_seconds: float,
+    master_uri: str,
+    end: Callable[[list[int], float, float], object],
+) -> None:
+    """Keep a list of the groups until ``lines`` end; then ``end`` those that are left."""
     nodes: dict[int, str] = {}
     masters: dict[int, str] = {}
     for line in lines:
@@ -29,14 +39,14 @@ def watch(lines: Iterable[str], interrupt_seconds: float, terminate_seconds: flo
         else:
             (masters if line[0] == "*" else nodes)[int(pid)] = name
 
-    end_groups(list(nodes), interrupt_seconds, terminate_seconds)
+    end(list(nodes), interrupt_seconds, terminate_seconds)
     names = [name for name in nodes.values() if name]
     if names and not masters:
         import subprocess
 
         command = [sys.executable, "-m", "minirospy.launch.registrations", master_uri, *names]
         subprocess.run(command, check=False, timeout=_UNREGISTER_SECONDS)
-    end_groups(list(masters), interrupt_seconds, terminate_seconds)
+    end(list(masters), interrupt_seconds, terminate_seconds)
 
 
 def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: float) -> None:
@@ -82,4 +92,12 @@ def is_running(pid: int) -> bool:
 
 
 if __name__ == "__main__":
-    watch(sys.stdin, float(sys.argv[1]), float(sys.argv[2]), sys.argv[3])
+    leaves_them = SYSTEM_ENDS_THEM in sys.argv[4:]
+    watch(
+        sys.stdin,
+        float(sys.argv[1]),
+        float(sys.argv[2]),
+        sys.argv[3],
+        # Their numbers may be other processes' already.
+        (lambda *_: None) if leaves_them else end_groups,
+    )

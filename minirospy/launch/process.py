@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, TypedDict
 
 from minirospy import private_files
+from minirospy.child_lifetime import guard_children, start_outside_of_job
 from minirospy.errors import MinirospyError
 from minirospy.launch import guardian
 from minirospy.launch.spec import NodeSpec
@@ -74,12 +75,17 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Is notified of each process that starts and ends; where this process is killed, it ends those that are left."""
+    """Is notified of each process that starts and ends; where this process is killed, it ends those that are left.
+
+    On Windows the system ends them (`minirospy.child_lifetime`); what they leave registered is the guardian's in any case.
+    """
 
     def __init__(self, timeouts: Timeouts, master_uri: str) -> None:
+        self._children = guard_children()
         words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate), master_uri]
+        words += [guardian.SYSTEM_ENDS_THEM] if self._children.is_guarded else []
         self._guard = threading.Lock()
-        self._popen = subprocess.Popen(
+        self._popen = start_outside_of_job(
             [sys.executable, "-I", "-S", *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
@@ -101,6 +107,7 @@ class Guardian:
             if self._popen.stdin:
                 self._popen.stdin.close()
         self._popen.wait()
+        self._children.close()
 
     def _write(self, line: str) -> None:
         # Without a guardian (it was killed) all goes on.
@@ -156,14 +163,17 @@ def end_processes(
         running = [process for process in processes if process.is_running]
         if step is _kill:
             killed = running
+        notified = []
         for process in running:
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
+            # It fails where the process has exited, or on Windows without a console: there is nothing to wait for.
             with contextlib.suppress(OSError):
                 step(process.popen)
+                notified.append(process)
         end = time.monotonic() + seconds
-        for process in running:
+        for process in notified:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.popen.wait(max(0.0, end - time.monotonic()))
 

@@ -13,8 +13,10 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from minirospy.child_lifetime import guard_children
 from minirospy.clock import SignalSafeEvent
 from minirospy.errors import MinirospyError
+from minirospy.signal_dispatch import interrupt_signals
 from minirospy.testing.junit import Result, TestCaseResult, TestError, TestFailure, read
 from minirospy.testing.unit import XML_OUTPUT_FLAG
 
@@ -29,11 +31,12 @@ _TERMINATE_SECONDS = 2.0
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
     """Let Ctrl-C set the event meanwhile. An exception could come just when a process has started, and leave it behind."""
     noted = SignalSafeEvent()
-    before = signal.signal(signal.SIGINT, lambda *_: noted.set())
+    before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
         yield noted
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def run_bare(
@@ -78,7 +81,7 @@ def run_bare(
 
 def _run(command: list[str], seconds: float) -> int | None:
     """Return the exit status; None after the time limit. Raises MinirospyError at Ctrl-C."""
-    with interrupt_noted() as interrupted, subprocess.Popen(command) as popen:
+    with interrupt_noted() as interrupted, guard_children(), subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:
             interrupted.wait(POLL_SECONDS)

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+from minirospy.child_lifetime import guard_children
 from minirospy.cli.catkin.test_results import Counts, results_below
 from minirospy.errors import BuildError, MinirospyError, NotFoundError
 from minirospy.testing.bare import POLL_SECONDS, interrupt_noted
@@ -70,7 +71,11 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
     """Run a test; return its exit status. Raises MinirospyError at Ctrl-C, after the test has ended its nodes."""
-    with interrupt_noted() as interrupted, subprocess.Popen(command, env=environment, cwd=folder) as popen:
+    with (
+        interrupt_noted() as interrupted,
+        guard_children(),
+        subprocess.Popen(command, env=environment, cwd=folder) as popen,
+    ):
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:

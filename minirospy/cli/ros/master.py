@@ -34,6 +34,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.rpc.server import is_address_in_use
 from minirospy.runtime.transport.access import Access, listening_lines
 from minirospy.runtime.transport.loop import new_event_loop
+from minirospy.signal_dispatch import interrupt_signals
 
 __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
@@ -394,10 +395,10 @@ def _most_clients() -> int:
 
 
 def _stop_event() -> asyncio.Event:
-    """Return an event that SIGINT, SIGTERM or a closed terminal sets (SIGHUP not under nohup)."""
+    """Return an event that Ctrl-C, SIGTERM or a closed terminal sets (SIGHUP not under nohup)."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
-    numbers = [signal.SIGINT, signal.SIGTERM]
+    numbers = [*interrupt_signals(), signal.SIGTERM]
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         numbers.append(signal.SIGHUP)
     for number in numbers:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from minirospy.child_lifetime import guard_children
 from minirospy.cli.command import RosText, WordedError, run, warn
 from minirospy.environment import export_local
 from minirospy.errors import NotFoundError, UsageError
@@ -136,11 +137,11 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Become the program: its signals and its exit status are this process's."""
+    """Become the program: its signals, its exit status and its end are this process's."""
     if sys.platform == "win32":
         # Windows has no exec that keeps the console: wait, and let Ctrl-C be the program's.
         try:
-            with subprocess.Popen(command) as popen:
+            with guard_children(), subprocess.Popen(command) as popen:
                 while True:
                     try:
                         return popen.wait()

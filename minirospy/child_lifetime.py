@@ -1,0 +1,197 @@
+"""Children that do not outlive a process that is ended by force: on Windows by a job object, which the system closes.
+
+Elsewhere a launcher's guardian process ends them (`launch/guardian.py`), and nothing is done here.
+Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import threading
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import subprocess
+
+__all__ = ["ChildLifetime", "JobSystem", "ProcessJob", "guard_children", "start_outside_of_job"]
+
+_KILL_ON_JOB_CLOSE = 0x2000
+_BREAKAWAY_OK = 0x0800
+_EXTENDED_LIMIT_INFORMATION = 9
+_CREATE_BREAKAWAY_FROM_JOB = 0x01000000
+
+
+class JobSystem(Protocol):
+    """The calls of the system. Each raises OSError where it fails."""
+
+    def create(self) -> int:
+        """Create a job; return its handle."""
+
+    def set_limits(self, job: int, flags: int) -> None:
+        """Set the limits of a job."""
+
+    def add_this_process(self, job: int) -> None:
+        """Put this process into a job: what it starts from now on is in it, too."""
+
+
+class ProcessJob:
+    """The job of this process and of its children. A process cannot leave its job, so there is one for all guards."""
+
+    def __init__(self, system: JobSystem) -> None:
+        self._system = system
+        self._lock = threading.Lock()
+        self._job: int | None = None
+        self._guards = 0
+
+    def guard(self) -> bool:
+        """Have the children end with this process; return whether the system does it."""
+        with self._lock:
+            try:
+                if self._job is None:
+                    # Never closed here: the system does it when the process has exited, in whichever way.
+                    job = self._system.create()
+                    self._system.set_limits(job, _BREAKAWAY_OK)
+                    self._system.add_this_process(job)
+                    self._job = job
+                if self._guards == 0:
+                    self._system.set_limits(self._job, _BREAKAWAY_OK | _KILL_ON_JOB_CLOSE)
+            except OSError:
+                return False
+            self._guards += 1
+            return True
+
+    def release(self) -> None:
+        """Undo one :meth:`guard`: after the last one, children may outlive this process again."""
+        with self._lock:
+            self._guards -= 1
+            if self._guards == 0 and self._job is not None:
+                try:
+                    self._system.set_limits(self._job, _BREAKAWAY_OK)
+                except OSError:
+                    return
+
+
+class ChildLifetime:
+    """Ends the children of this process with it until :meth:`close`; ``is_guarded``: whether the system does it.
+
+    A context manager.
+    """
+
+    def __init__(self, job: ProcessJob | None) -> None:
+        self._job = job if job is not None and job.guard() else None
+        self.is_guarded = self._job is not None
+
+    def close(self) -> None:
+        """Let children outlive this process. Idempotent."""
+        job, self._job = self._job, None
+        self.is_guarded = False
+        if job is not None:
+            job.release()
+
+    def __enter__(self) -> ChildLifetime:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def guard_children() -> ChildLifetime:
+    """Have all that this process starts end with it, on Windows, until the result is closed."""
+    return ChildLifetime(_process_job())
+
+
+def start_outside_of_job(
+    command: Sequence[str],
+    *,
+    creationflags: int = 0,
+    **options: Any,
+) -> subprocess.Popen[bytes]:
+    """Start a process that may outlive this one, also where the children of this one are guarded.
+
+    ``options`` as in subprocess.Popen. Raises OSError.
+    """
+    import subprocess
+
+    if sys.platform == "win32":
+        try:
+            return subprocess.Popen(
+                command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
+            )
+        except PermissionError:
+            # Somebody else's job, which keeps all its processes: an IDE's, a service's.
+            pass
+    return subprocess.Popen(command, creationflags=creationflags, **options)
+
+
+@functools.cache
+def _process_job() -> ProcessJob | None:
+    if sys.platform == "win32":
+        return ProcessJob(_Windows())
+    return None
+
+
+if sys.platform == "win32":
+    import ctypes
+    from ctypes import wintypes
+
+    class _BasicLimits(ctypes.Structure):
+        _fields_ = [
+            ("PerProcessUserTimeLimit", wintypes.LARGE_INTEGER),
+            ("PerJobUserTimeLimit", wintypes.LARGE_INTEGER),
+            ("LimitFlags", wintypes.DWORD),
+            ("MinimumWorkingSetSize", ctypes.c_size_t),
+            ("MaximumWorkingSetSize", ctypes.c_size_t),
+            ("ActiveProcessLimit", wintypes.DWORD),
+            ("Affinity", ctypes.c_size_t),
+            ("PriorityClass", wintypes.DWORD),
+            ("SchedulingClass", wintypes.DWORD),
+        ]
+
+    class _ExtendedLimits(ctypes.Structure):
+        _fields_ = [
+            ("BasicLimitInformation", _BasicLimits),
+            ("IoInfo", ctypes.c_ulonglong * 6),
+            ("MemoryLimits", ctypes.c_size_t * 4),
+        ]
+
+    class _Windows:
+        """JobSystem by kernel32."""
+
+        def __init__(self) -> None:
+            self._kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+            self._kernel.CreateJobObjectW.restype = wintypes.HANDLE
+            self._kernel.CreateJobObjectW.argtypes = [wintypes.LPVOID, wintypes.LPCWSTR]
+            self._kernel.GetCurrentProcess.restype = wintypes.HANDLE
+            self._kernel.AssignProcessToJobObject.argtypes = [wintypes.HANDLE, wintypes.HANDLE]
+            self._kernel.SetInformationJobObject.argtypes = [
+                wintypes.HANDLE,
+                ctypes.c_int,
+                wintypes.LPVOID,
+                wintypes.DWORD,
+            ]
+
+        def create(self) -> int:
+            job: int | None = self._kernel.CreateJobObjectW(None, None)
+            self._check(job)
+            assert job is not None
+            return job
+
+        def set_limits(self, job: int, flags: int) -> None:
+            limits = _ExtendedLimits()
+            limits.BasicLimitInformation.LimitFlags = flags
+            size = ctypes.sizeof(limits)
+            self._check(
+                self._kernel.SetInformationJobObject(
+                    job, _EXTENDED_LIMIT_INFORMATION, ctypes.byref(limits), size
+                )
+            )
+
+        def add_this_process(self, job: int) -> None:
+            self._check(self._kernel.AssignProcessToJobObject(job, self._kernel.GetCurrentProcess()))
+
+        @staticmethod
+        def _check(result: int | None) -> None:
+            if not result:
+                raise ctypes.WinError(ctypes.get_last_error())

@@ -1,0 +1,50 @@
+"""How processes of a launch are ended, and what a guardian does where the system ends them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from minirospy.launch import guardian, process
+from minirospy.launch.process import Timeouts, end_processes, start_process
+
+FOREVER = [sys.executable, "-c", "import time; time.sleep(600)"]
+
+
+def test_a_process_that_no_interrupt_reaches_is_terminated_immediately(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As on Windows without a console: there is nothing that its 600 seconds would be for."""
+
+    def refuse(_: object) -> None:
+        raise OSError("Invalid handle")
+
+    monkeypatch.setattr(process, "_interrupt", refuse)
+    started = start_process("a", FOREVER, environ=os.environ)
+    warnings: list[str] = []
+    assert end_processes([started], Timeouts(600.0, 60.0), warnings.append) == []
+    assert not started.is_running
+    assert warnings == ["[a] escalating to SIGTERM"]
+
+
+def test_the_guardian_leaves_processes_alone_that_the_system_ends() -> None:
+    """Their numbers may be those of other processes by then."""
+    words = [sys.executable, "-I", "-S", str(guardian.__file__), "0", "0", "http://localhost:1"]
+    with subprocess.Popen(FOREVER) as other:
+        try:
+            subprocess.run(
+                [*words, guardian.SYSTEM_ENDS_THEM], input=f"+{other.pid}\n".encode(), check=True, timeout=100
+            )
+            assert other.poll() is None
+        finally:
+            other.kill()
+
+
+def test_the_guardian_ends_nodes_before_their_master() -> None:
+    ended: list[list[int]] = []
+    lines = ["*5\n", "+6 /a\n", "+7 /b\n", "-6\n"]
+    guardian.watch(lines, 1.0, 1.0, "http://localhost:1", lambda pids, *_: ended.append(pids))
+    assert ended == [[7], [5]]
