@@ -30,8 +30,8 @@ BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
 """In the middle between two looks at the button, of which there are ten a second: then the LED takes its usual time."""
 _FOLLOW_SECONDS = 10.0
-_START_SECONDS = 40.0
-"""A machine that does something else meanwhile may stand still for some."""
+_START_SECONDS = 180.0
+"""A Windows with a virus scanner, or a Raspberry Pi, takes long; a launch that has failed ends the wait."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
