@@ -1,14 +1,14 @@
 @rem roscd, rosls, rosed, roscat, roscp, rosmv, rospd and rosd for cmd.exe: `call ros.bat` once in a window.
 @rem Each becomes a doskey macro, which calls this file with its name: a called file may change the window's folder.
 @if not "%~1"=="" goto %~1
-@doskey roscd=call "%~f0" roscd $*
-@doskey rosls=call "%~f0" rosls $*
-@doskey rosed=call "%~f0" rosed $*
-@doskey roscat=call "%~f0" roscat $*
-@doskey rosmv=call "%~f0" rosmv $*
-@doskey roscp=call "%~f0" roscp $*
-@doskey rospd=call "%~f0" rospd $*
-@doskey rosd=pushd
+@doskey roscd=call "%~f0" roscd $* 2>nul
+@doskey rosls=call "%~f0" rosls $* 2>nul
+@doskey rosed=call "%~f0" rosed $* 2>nul
+@doskey roscat=call "%~f0" roscat $* 2>nul
+@doskey rosmv=call "%~f0" rosmv $* 2>nul
+@doskey roscp=call "%~f0" roscp $* 2>nul
+@doskey rospd=call "%~f0" rospd $* 2>nul
+@doskey rosd=pushd 2>nul
 @exit /b 0
 
 :roscd
