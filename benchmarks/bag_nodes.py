@@ -3,36 +3,40 @@
 record: a publisher that waits for its subscriber sends images of 6 MB, then messages of 1 kB, as fast as it takes them;
 measured are the bytes a second that are in the bag when the recorder has ended, with the messages that are missing in
 it, its CPU time and its peak memory. play: how much later than stored each message arrives, from the earliest one on, at
-one subscriber for all players. `--rounds 3` repeats all, in turns, and prints the medians of the rounds; `--folder` is where
-the bags go: the disk that is measured.
+plain sockets, which are the same for all players. `--rounds 3` repeats all, in turns, and prints the medians of the rounds;
+`--folder` is where the bags go: the disk that is measured.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import gc
 import os
 import random
+import selectors
 import signal
+import socket
 import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import xmlrpc.client
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from minirospy.bag.reader import open_bag
 from minirospy.bag.writer import BagWriter
 from minirospy.environment import Environment
-from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.framing import LargeFrame
-from minirospy.wire.header import Header
+from minirospy.wire.header import serialize_header
 from minirospy.wire.tcpros import InterfaceType
 
 CPP = Path("/usr/lib/rosbag")
@@ -110,42 +114,113 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     )
 
 
-def make_bag(path: Path, hz: float, seconds: float, size: int) -> list[int]:
-    """Write a bag of numbered messages at irregular times; return those."""
+class Stream(NamedTuple):
+    """Messages of a bag on one topic: how many a second, and their size."""
+
+    hz: float
+    size: int
+
+
+PLAYED = {
+    "100 Hz of 100 B": [Stream(100, 100)],
+    "1000 Hz of 100 B": [Stream(1000, 100)],
+    "30 Hz of 1 MB": [Stream(30, 1_000_000)],
+    "all three": [Stream(100, 100), Stream(1000, 100), Stream(30, 1_000_000)],
+}
+
+
+def make_bag(path: Path, streams: list[Stream], seconds: float) -> list[int]:
+    """Write a bag of messages at irregular times, numbered through; return those times. Stream N is /bench/N."""
     chance = random.Random(3)
-    times = []
-    with path.open("wb") as stream:
-        writer = BagWriter(stream)
-        header = {
-            "topic": "/bench",
-            "type": IMAGE.name,
-            "md5sum": IMAGE.md5sum,
-            "message_definition": IMAGE.definition,
-        }
-        number = writer.add_connection("/bench", header)
+    due = []
+    for topic, stream in enumerate(streams):
         now = 10**18
-        for i in range(int(hz * seconds)):
-            now += int(chance.uniform(0.5, 1.5) * SECOND / hz)
-            data = b"%08d" % i + bytes(size - 8)
-            writer.write(number, now, len(data).to_bytes(4, "little") + data)
-            times.append(now)
+        for _ in range(int(stream.hz * seconds)):
+            now += int(chance.uniform(0.5, 1.5) * SECOND / stream.hz)
+            due.append((now, topic))
+    due.sort()
+    with path.open("wb") as file:
+        writer = BagWriter(file)
+        header = {"type": IMAGE.name, "md5sum": IMAGE.md5sum, "message_definition": IMAGE.definition}
+        numbers = [
+            writer.add_connection(f"/bench/{topic}", header | {"topic": f"/bench/{topic}"})
+            for topic in range(len(streams))
+        ]
+        for i, (now, topic) in enumerate(due):
+            data = (b"%08d" % i).ljust(streams[topic].size, b"\0")
+            writer.write(numbers[topic], now, len(data).to_bytes(4, "little") + data)
         writer.close()
-    return times
+    return [now for now, _ in due]
+
+
+def subscribe(topic: str) -> socket.socket:
+    """Return a connection to the publisher of a topic, which may be about to start."""
+    master: Any = xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"])
+    end = time.monotonic() + 30
+    while topic not in (published := dict(master.getSystemState("/bench")[2][0])):
+        if time.monotonic() > end:
+            raise TimeoutError(f"nobody publishes {topic}")
+        time.sleep(0.01)
+    publisher: Any = xmlrpc.client.ServerProxy(master.lookupNode("/bench", published[topic][0])[2])
+    _, _, (_, host, port) = publisher.requestTopic("/bench", topic, [["TCPROS"]])
+    sock = socket.create_connection((host, port))
+    fields = {
+        "callerid": "/bench",
+        "topic": topic,
+        "type": IMAGE.name,
+        "md5sum": IMAGE.md5sum,
+        "tcp_nodelay": "1",
+    }
+    sock.sendall(serialize_header(fields | {"message_definition": IMAGE.definition}))
+    return sock
+
+
+def receive(socks: list[socket.socket]) -> dict[int, int]:
+    """Return when each message came, by its number, until the publisher has ended."""
+    arrived: dict[int, int] = {}
+    received = [bytearray() for _ in socks]
+    space = bytearray(1 << 22)
+    is_header = [True] * len(socks)
+    with selectors.DefaultSelector() as selector:
+        for number, sock in enumerate(socks):
+            selector.register(sock, selectors.EVENT_READ, number)
+        while selector.get_map():
+            for key, _ in selector.select():
+                try:
+                    count = key.fileobj.recv_into(space)  # type: ignore[union-attr]
+                except ConnectionResetError:
+                    count = 0
+                now = time.monotonic_ns()
+                if not count:
+                    selector.unregister(key.fileobj)
+                    continue
+
+                data = received[key.data]
+                data += memoryview(space)[:count]
+                while len(data) >= 4 and len(data) >= (end := 4 + int.from_bytes(data[:4], "little")):
+                    if not is_header[key.data]:
+                        # Behind the sizes of the message and of its text.
+                        arrived[int(data[8:16])] = now
+                    is_header[key.data] = False
+                    del data[:end]
+    return arrived
 
 
 def play(stack: str, path: Path, times: list[int], what: str) -> Measured:
     """Play a bag; return how many microseconds later than stored its messages came."""
-    arrived: dict[int, int] = {}
-
-    def deliver(body: memoryview | bytes, _: Header) -> None:
-        now = time.monotonic_ns()
-        arrived[int(bytes(body[4:12]))] = now
-
-    with ToolNode(Environment.read(), "bench") as node:
-        node.listen("/bench", deliver)
-        command = [*program(stack, "play"), str(path), "-d", "2", "-q"]
-        subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=120)
-        node.wait(0.5)
+    command = [*program(stack, "play"), str(path), "-d", "1", "-q"]
+    with contextlib.ExitStack() as opened:
+        process = opened.enter_context(
+            subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
+        )
+        socks = [opened.enter_context(subscribe(f"/bench/{topic}")) for topic in range(len(PLAYED[what]))]
+        gc.disable()
+        arrived = receive(socks)
+        gc.enable()
+    if process.returncode:
+        raise RuntimeError(f"{stack} play ended with status {process.returncode}")
     late = sorted(arrived[i] - times[i] for i in arrived)
     errors = [(each - late[0]) / 1000 for each in late]
 
@@ -180,11 +255,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> Iterator[Measured]:
                 for stack in stacks():
                     yield record(stack, size, count, folder)
         if "play" in arguments.cases:
-            for hz, seconds, size in ((100, 5, 100), (1000, 5, 100), (30, 5, 1_000_000)):
+            for what, streams in PLAYED.items():
                 path = folder / "play.bag"
-                times = make_bag(path, hz, seconds, size)
+                times = make_bag(path, streams, arguments.seconds)
                 for stack in stacks():
-                    yield play(stack, path, times, f"{hz} Hz of {size} B")
+                    yield play(stack, path, times, what)
                 path.unlink()
 
 
@@ -195,6 +270,7 @@ def main() -> None:
     )
     parser.add_argument("--cases", default="record,play", help="record, play, or both")
     parser.add_argument("--megabytes", type=int, default=600, help="what is recorded of each size")
+    parser.add_argument("--seconds", type=float, default=3, help="the length of the bags that are played")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=None)
     arguments = parser.parse_args()

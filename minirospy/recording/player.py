@@ -36,6 +36,9 @@ _TICK = _SECOND // 10
 _SWITCH_SECONDS = 0.00005
 """How long the thread that reads ahead may keep the GIL when a message is due."""
 
+_LEAD = _SECOND // 500
+"""The first message is due so much later: the threads that start meanwhile do not delay it."""
+
 _STAMP = struct.Struct("<4xII")
 """A message that starts with a Header: its sequence number, then the stamp."""
 
@@ -214,7 +217,7 @@ class Player:
         now = time.perf_counter_ns()
         schedule, self._is_started = self._schedule, True
         if schedule is None:
-            self._schedule = Schedule(self._options, *span, now)
+            self._schedule = Schedule(self._options, *span, now + _LEAD)
         elif not self._starts_paused:
             schedule.set_paused(False, now)
 
@@ -313,7 +316,7 @@ class Player:
                     # With the rate that was set meanwhile.
                     self._schedule.seek(span[0], time.perf_counter_ns())
                 else:
-                    self._schedule = Schedule(self._options, *span, time.perf_counter_ns())
+                    self._schedule = Schedule(self._options, *span, time.perf_counter_ns() + _LEAD)
 
     def _wait_at_end(self) -> None:
         """Wait for a seek; the keys and the clock work as ever."""
