@@ -133,6 +133,8 @@ class Player:
         self._clock = client.Publisher("clock", frame_class(*_clock_type()), queue_size=1)
         for number, connection in self._bags.connections(selection):
             self._advertise(number, connection)
+        if not options.quiet:
+            self._say("")
         self._offer_services()
         last = self._bags.last_time(selection) if options.topics or end else times[1]
         latched = self._bags.last_latched(selection) if options.start else []

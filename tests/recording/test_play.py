@@ -124,9 +124,16 @@ def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_pa
     ear.expect("1", "2", "3", "4")
     assert ear.heard[-1].at - ear.heard[0].at > 0.25
     lines = output.replace("\r", "\n").splitlines()
-    assert lines[:2] == ["Opening one.bag", "Opening two.bag"]
-    assert "Waiting 0.2 seconds after advertising topics... done." in lines
-    assert "Hit space to toggle paused, or 's' to step." in lines
+    assert lines[:8] == [
+        "Opening one.bag",
+        "Opening two.bag",
+        "",
+        "Waiting 0.2 seconds after advertising topics... done.",
+        "",
+        "Hit space to toggle paused, or 's' to step.",
+        "Waiting for subscribers.",
+        "Finished waiting for subscribers.",
+    ]
     assert any(line.startswith(" [RUNNING]  Bag Time:   1000.") for line in lines), lines
     assert lines[-1] == "Done."
 
