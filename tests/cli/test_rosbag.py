@@ -249,6 +249,8 @@ def test_filter_refuses_in_one_line(
     Path("x.txt").write_text("text", encoding="utf-8")
     found = command("rosbag", "filter", *words)
     assert (found.status, found.err) == (status, said)
+    # The error is not behind the progress, in the same line.
+    assert found.out[-1:] in ("", "\n")
     assert len(messages(bag)) == 100
 
 

@@ -37,20 +37,13 @@ def _convert(source: str, target: str, compression: str, force: bool, quiet: boo
 
     if not os.path.exists(source):
         raise NotFoundError("bag", source)
-    is_started = False
     try:
         check(source, target, compression=compression, force=force)
-        is_started = not quiet
         with showing_progress(target, os.path.getsize(source), quiet=quiet) as step:
             convert(source, target, compression=compression, force=force, step=step)
     except BagUnindexedError as error:
         raise BagError(f"{source}: {error}. Run `rosbag reindex {source}`") from error
-    except (BagError, OSError) as error:
-        if is_started:
-            # The line behind that of the progress.
-            print()
-        if isinstance(error, OSError):
-            raise
+    except BagError as error:
         raise BagError(f"{source}: {error}") from error
 
 

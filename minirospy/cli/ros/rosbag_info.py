@@ -153,7 +153,6 @@ def _filter(words: list[str], print: str | None) -> int:
         with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:
-        sys.stdout.write("\n")
         why = error if isinstance(error, MinirospyError) else MinirospyError(str(error))
         return complain("rosbag", why)
     return 0

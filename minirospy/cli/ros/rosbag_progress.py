@@ -19,7 +19,10 @@ _BESIDE_PATH = 37
 
 @contextlib.contextmanager
 def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function that is called with the bytes that are done, of ``total``."""
+    """Yield a function that is called with the bytes that are done, of ``total``.
+
+    What is printed ends with the end of a line, whatever the block raises.
+    """
     if quiet:
         yield lambda done: None
     elif sys.stdout.isatty():
@@ -27,7 +30,12 @@ def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable
             yield step
     else:
         meter = _Meter(path, total)
-        yield meter.step
+        try:
+            yield meter.step
+        except BaseException:
+            # What is reported next is a line below.
+            print()
+            raise
         meter.finish()
 
 
