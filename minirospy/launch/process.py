@@ -77,24 +77,24 @@ class _Group(TypedDict, total=False):
 class Guardian:
     """Is notified of each process that starts and ends; where this process is killed, it ends those that are left.
 
-    On Windows the system ends them (`minirospy.child_lifetime`); what they leave registered is the guardian's in any case.
+    On Windows the system ends them (`minirospy.child_lifetime`). There a guardian only unregisters nodes, from a master that
+    this launch has not started, and else no process is started for it.
     """
 
     def __init__(self, timeouts: Timeouts, master_uri: str) -> None:
         self._children = guard_children()
-        words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate), master_uri]
-        words += [guardian.SYSTEM_ENDS_THEM] if self._children.is_guarded else []
+        self._words = [str(guardian.__file__), str(timeouts.interrupt), str(timeouts.terminate), master_uri]
+        self._words += [guardian.SYSTEM_ENDS_THEM] if self._children.is_guarded else []
         self._guard = threading.Lock()
-        self._popen = start_outside_of_job(
-            [sys.executable, "-I", "-S", *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            **_own_group(),
-        )
+        self._has_master = False
+        self._popen = None if self._children.is_guarded else self._start()
 
     def add(self, process: Process) -> None:
         """Note that a process has started."""
+        if process.node is None:
+            self._has_master = True
+        elif self._popen is None and not self._has_master:
+            self._popen = self._start()
         self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
@@ -103,13 +103,26 @@ class Guardian:
 
     def close(self) -> None:
         """End the guardian: no process is left. Idempotent."""
-        with self._guard, contextlib.suppress(OSError):
-            if self._popen.stdin:
-                self._popen.stdin.close()
-        self._popen.wait()
+        if self._popen:
+            with self._guard, contextlib.suppress(OSError):
+                if self._popen.stdin:
+                    self._popen.stdin.close()
+            self._popen.wait()
         self._children.close()
 
+    def _start(self) -> subprocess.Popen[bytes]:
+        # A process that is killed just while it starts one outside of its job leaves that one behind, suspended.
+        return start_outside_of_job(
+            [sys.executable, "-I", "-S", *self._words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            **_own_group(),
+        )
+
     def _write(self, line: str) -> None:
+        if self._popen is None:
+            return
         # Without a guardian (it was killed) all goes on.
         with self._guard, contextlib.suppress(OSError, ValueError):
             assert self._popen.stdin
