@@ -73,6 +73,7 @@ PURE_FILES = (
             "web/queue.py",
         )
     }
+    | {PACKAGE / "bridge" / "ros2" / name for name in ("layouts.py", "links.py", "rules.py", "statics.py")}
     | {PACKAGE / "dashboard" / "views.py"}
     | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 )

@@ -1,0 +1,197 @@
+"""Which type of ROS 2 is which type of ROS 1, and which of its fields are which. Pure.
+
+Most types have the same name and fields on both sides. What differs is listed here; a user's own exceptions come from a
+file in the format of ros1_bridge's mapping rules.
+Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import yaml
+
+from minirospy.errors import BridgeError
+
+__all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
+
+
+@dataclass(frozen=True)
+class TypeRule:
+    """What is special about a type of ROS 1.
+
+    ``names``: what it may be in ROS 2, ``pkg/Name``. ``fields``: its fields -> those of ROS 2, all that are passed on; None:
+    each goes to the field of its name, but for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``: a
+    field, whose own fields ROS 2 has in its place.
+    """
+
+    names: tuple[str, ...] = ()
+    fields: Mapping[str, str] | None = None
+    only_ros1: frozenset[str] = frozenset()
+    only_ros2: frozenset[str] = frozenset()
+    inlined: str = ""
+
+
+_NO_RULE = TypeRule()
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Rules by type: of messages ``pkg/Name``, of services the same in ``services``, of their halves with the suffix of ROS 1."""
+
+    messages: Mapping[str, TypeRule] = field(default_factory=dict)
+    services: Mapping[str, TypeRule] = field(default_factory=dict)
+
+    def message(self, ros1_type: str) -> TypeRule:
+        """Return the rule of a message type, an empty one where there is none."""
+        return self.messages.get(ros1_type, _NO_RULE)
+
+    def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
+        """Return the names that a message type may have in ROS 2."""
+        return self.message(ros1_type).names or (ros1_type,)
+
+    def ros2_services(self, ros1_type: str) -> tuple[str, ...]:
+        """Return the names that a service type may have in ROS 2."""
+        return self.services.get(ros1_type, _NO_RULE).names or (ros1_type,)
+
+    def ros1_services(self, ros2_type: str) -> tuple[str, ...]:
+        """Return the names that a service type of ROS 2 may have in ROS 1."""
+        renamed = [name for name, rule in self.services.items() if ros2_type in rule.names]
+        kept = ros2_type if not self.services.get(ros2_type, _NO_RULE).names else ""
+        return (*([kept] if kept else []), *renamed)
+
+    def with_(self, other: Rules) -> Rules:
+        """Return these rules, where ``other`` has none for a type."""
+        return Rules({**self.messages, **other.messages}, {**self.services, **other.services})
+
+
+def snake_case(name: str) -> str:
+    """Return a field's name as ROS 2 writes it: ``seqNumber`` -> ``seq_number``."""
+    parts = re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name)
+    return re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1_\2", parts).lower()
+
+
+def _only(*, ros1: tuple[str, ...] = (), ros2: tuple[str, ...] = ()) -> TypeRule:
+    return TypeRule(only_ros1=frozenset(ros1), only_ros2=frozenset(ros2))
+
+
+BUILT_IN = Rules(
+    MappingProxyType(
+        {
+            "std_msgs/Header": _only(ros1=("seq",)),
+            "std_msgs/Time": TypeRule(names=("builtin_interfaces/Time",), inlined="data"),
+            "std_msgs/Duration": TypeRule(names=("builtin_interfaces/Duration",), inlined="data"),
+            "rosgraph_msgs/Log": TypeRule(
+                names=("rcl_interfaces/Log",),
+                only_ros1=frozenset({"seq", "frame_id", "topics"}),
+                inlined="header",
+            ),
+            "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
+            "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
+            # Fields that ROS 2 has added: ROS 1 sends none, and drops them.
+            "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
+            "sensor_msgs/Range": _only(ros2=("variance",)),
+            "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),
+            "visualization_msgs/Marker": _only(
+                ros2=("texture_resource", "texture", "uv_coordinates", "mesh_file")
+            ),
+            "visualization_msgs/InteractiveMarkerInit": _only(),
+        }
+    ),
+    MappingProxyType(
+        {
+            "roscpp_tutorials/TwoInts": TypeRule(names=("example_interfaces/AddTwoInts",)),
+            "rospy_tutorials/AddTwoInts": TypeRule(names=("example_interfaces/AddTwoInts",)),
+        }
+    ),
+)
+"""The rules of the usual packages."""
+
+_TYPE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_KEYS = {
+    "ros1_package_name",
+    "ros1_message_name",
+    "ros1_service_name",
+    "ros2_package_name",
+    "ros2_message_name",
+    "ros2_service_name",
+    "fields_1_to_2",
+    "request_fields_1_to_2",
+    "response_fields_1_to_2",
+    "enable_foreign_mappings",
+}
+
+
+def parse_rules(text: str, where: str) -> Rules:
+    """Return the rules of a file. Raise BridgeError with what is wrong, and in which rule."""
+    try:
+        loaded = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        problem = " ".join(str(error).split())
+        raise BridgeError(f"{where}: is not YAML: {problem}") from error
+    if loaded is None:
+        return Rules()
+    if not isinstance(loaded, list):
+        raise BridgeError(f"{where}: is not a list of rules: start each with '- ros1_package_name: ...'")
+
+    messages: dict[str, TypeRule] = {}
+    services: dict[str, TypeRule] = {}
+    for number, rule in enumerate(loaded, 1):
+        _add_rule(rule, f"{where}: rule {number}", messages, services)
+    return Rules(messages, services)
+
+
+def _add_rule(rule: object, where: str, messages: dict[str, TypeRule], services: dict[str, TypeRule]) -> None:
+    if not isinstance(rule, dict):
+        raise BridgeError(f"{where}: is not a mapping such as 'ros1_package_name: my_msgs'")
+    unknown = [str(key) for key in rule if key not in _KEYS]
+    if unknown:
+        raise BridgeError(f"{where}: has an unknown key [{unknown[0]}]")
+    kind = "service" if "ros1_service_name" in rule else "message"
+    if kind == "message" and "ros1_message_name" not in rule:
+        raise BridgeError(
+            f"{where}: names neither a message nor a service: rules for whole packages do not exist, name each type"
+        )
+    ros1 = _type_name(rule, "ros1", kind, where)
+    ros2 = _type_name(rule, "ros2", kind, where)
+    if kind == "message":
+        fields = _field_names(rule, "fields_1_to_2", where)
+        messages[ros1] = TypeRule((ros2,), fields)
+        return
+    services[ros1] = TypeRule((ros2,))
+    for half, suffix in (("request", "Request"), ("response", "Response")):
+        fields = _field_names(rule, f"{half}_fields_1_to_2", where)
+        if fields is not None:
+            messages[f"{ros1}{suffix}"] = TypeRule((), fields)
+
+
+def _type_name(rule: dict[object, object], side: str, kind: str, where: str) -> str:
+    parts = []
+    for key in (f"{side}_package_name", f"{side}_{kind}_name"):
+        value = rule.get(key)
+        if not isinstance(value, str) or not _TYPE_NAME.fullmatch(value):
+            raise BridgeError(f"{where}: {key} is missing, or not a name")
+        parts.append(value)
+    return "/".join(parts)
+
+
+def _field_names(rule: dict[object, object], key: str, where: str) -> Mapping[str, str] | None:
+    found = rule.get(key)
+    if found is None:
+        return None
+    if not isinstance(found, dict):
+        raise BridgeError(f"{where}: {key} is not a mapping of fields, 'ros1_name: ros2_name'")
+    names: dict[str, str] = {}
+    for ros1, ros2 in found.items():
+        for name in (ros1, ros2):
+            if not isinstance(name, str) or not _TYPE_NAME.fullmatch(name):
+                raise BridgeError(
+                    f"{where}: {key}: [{name}] is not the name of a field; a field of a field cannot be named"
+                )
+        if ros2 in names.values():
+            raise BridgeError(f"{where}: {key}: two fields become [{ros2}]")
+        names[ros1] = ros2
+    return names
