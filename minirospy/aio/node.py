@@ -63,6 +63,7 @@ class Node:
     parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
     default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
     for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
+    ``simulated_time``: whether the node follows /clock where /use_sim_time is set.
 
     Entering waits for a master. All methods belong to the event loop that entered, but for :meth:`shutdown`.
     Source: http://wiki.ros.org/Nodes.
@@ -78,6 +79,7 @@ class Node:
         master_uri: str = "",
         host: str = "",
         rosout: bool = True,
+        simulated_time: bool = True,
     ) -> None:
         """Create the node. Raises ValueError on a name that is empty or has a namespace."""
         if not name:
@@ -100,6 +102,7 @@ class Node:
 
         self._remappings = self._arguments.resolved_remappings(self.name)
         self._rosout = rosout
+        self._simulated_time = simulated_time
         self._handlers: list[logging.Handler] = []
         self._runtime: RuntimeNode | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -156,7 +159,7 @@ class Node:
             self._start_logging()
             await self._wait_for_master()
             await self._set_private_parameters()
-            if await self.get_param("/use_sim_time", False):
+            if self._simulated_time and await self.get_param("/use_sim_time", False):
                 self._simulated = SimulatedTime(self._stopping)
                 self._spawn(self._follow_clock(self._simulated))
             if self._rosout:

@@ -76,28 +76,30 @@ def run(
     argv: Sequence[str] | None,
     start: Callable[[Node], Awaitable[_P]],
     on_started: Callable[[_P], None],
+    *,
+    imports_messages: bool = True,
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
     ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
-    ``on_started`` shows its addresses.
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
+    it would import message classes.
     """
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv
-        return loop.run_until_complete(_run(name, words, start, on_started))
+        node = Node(name, argv=words, rosout=imports_messages, simulated_time=imports_messages)
+        return loop.run_until_complete(_run(node, start, on_started))
     finally:
         loop.close()
 
 
 async def _run(
-    name: str,
-    argv: Sequence[str],
+    node: Node,
     start: Callable[[Node], Awaitable[_P]],
     on_started: Callable[[_P], None],
 ) -> int:
     loop = asyncio.get_running_loop()
-    node = Node(name, argv=argv)
     main = asyncio.current_task()
     assert main
     interrupted = False

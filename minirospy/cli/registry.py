@@ -80,6 +80,7 @@ COMMANDS = (
     Entry("catkin.make", "catkin_make", "MAKE", "catkin_make", "make", "build a workspace (as catkin_make)"),
     Entry("bridge", "main", "COMMAND", "", "bridge",
           "see the graph in Foxglove, Lichtblick and browsers"),
+    Entry("ros2_bridge", "main", "COMMAND", "", "ros2-bridge", "pass topics between ROS 1 and ROS 2"),
     Entry("dashboard", "dashboard", "DASHBOARD", "", "dashboard",
           "see topics live in a browser (as rqt)"),
     Entry("doctor", "main", "DOCTOR", "", "doctor",

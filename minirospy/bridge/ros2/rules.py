@@ -53,6 +53,14 @@ class Rules:
         """Return the names that a message type may have in ROS 2."""
         return self.message(ros1_type).names or (ros1_type,)
 
+    def ros1_message(self, ros2_type: str) -> str:
+        """Return the type of ROS 1 that a message type of ROS 2 is: of its own name, unless that has another one in ROS 2."""
+        if not self.message(ros2_type).names:
+            kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
+            other = [name for name in kept if name.partition("/")[0] != "tf"]
+            return other[0] if other else ros2_type
+        return ros2_type
+
     def ros2_services(self, ros1_type: str) -> tuple[str, ...]:
         """Return the names that a service type may have in ROS 2."""
         return self.services.get(ros1_type, _NO_RULE).names or (ros1_type,)

@@ -1,0 +1,368 @@
+"""The bridge as a whole: looks at both graphs, opens links where each side has an end, and closes them again."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from minirospy.aio.raw import RawSubscription, raw_class
+from minirospy.aio.topics import Publisher
+from minirospy.bridge.access import NameFilter
+from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, links, marker
+from minirospy.bridge.ros2.rules import BUILT_IN, Rules
+from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
+from minirospy.bridge.types import TypeTexts
+from minirospy.errors import (
+    DefinitionError,
+    DeserializationError,
+    MasterUnreachableError,
+    MinirospyError,
+    NotFoundError,
+    ROSException,
+    RpcError,
+)
+from minirospy.idl.cdr import Transcoder
+from minirospy.idl.codec import keeps_buffer
+from minirospy.idl.digest import Lookup, full_text, message_md5
+from minirospy.idl.load import Catalogue, specs_of_text
+from minirospy.idl.protocols import Message
+from minirospy.idl.spec import MessageSpec
+from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
+from minirospy.wire.framing import Frame
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.bridge.ros2.side import Ros2Publisher, Ros2Side, Ros2Subscription
+
+__all__ = ["Pair", "Ros2Bridge", "Ros2Options"]
+
+_ORIGIN = "ros2_domain"
+"""Field of the connection header of what comes from ROS 2, so that no bridge to the same domain sends it back."""
+_FASTEST_LOOK = 0.25
+_JOIN_SECONDS = 2.0
+_JOIN_LOOK = 0.02
+_DEPTH = 100
+_DEPTH_OF_LARGE = 5
+_ROS1_QUEUE = 100
+
+
+@dataclass(frozen=True)
+class Ros2Options:
+    """``topics``: which may be bridged. ``slowest_look``: seconds between looks at graphs that do not change."""
+
+    topics: NameFilter = field(default_factory=NameFilter)
+    rules: Rules = BUILT_IN
+    slowest_look: float = 1.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A link, and why it is not open: nothing where it is."""
+
+    link: Link
+    reason: str = ""
+
+
+class _Types:
+    """Specs, interface types and transcoders by the names of both types."""
+
+    def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
+        self._side = side
+        self._rules = rules
+        self._catalogue = catalogue
+        self._ros2 = lru_cache(maxsize=None)(self._ros2_spec)
+
+    def interface(self, spec: MessageSpec, lookup: Lookup) -> InterfaceType:
+        """Return what a connection header says of a type."""
+        return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
+
+    def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
+        """Return a message type of the packages here. Raise TypesDiffer."""
+        try:
+            return self._catalogue.message(name), self._catalogue.message
+        except (NotFoundError, DefinitionError) as error:
+            raise TypesDiffer(
+                f"[{name}] is not defined here: put its package on ROS_PACKAGE_PATH ({error})"
+            ) from error
+
+    def of_text(self, name: str, text: str) -> tuple[MessageSpec, Lookup]:
+        """Return the type that a publisher's full text defines. Raise TypesDiffer."""
+        try:
+            specs = specs_of_text(name, text)
+        except DefinitionError as error:
+            raise TypesDiffer(str(error)) from error
+
+        def lookup(inner: str) -> MessageSpec:
+            if inner not in specs:
+                raise TypesDiffer(f"the publisher's definition of [{name}] lacks [{inner}]")
+            return specs[inner]
+
+        return specs[name], lookup
+
+    def transcoder(self, spec: MessageSpec, lookup: Lookup, ros2_type: str) -> Transcoder:
+        """Return the functions that convert. Raise TypesDiffer."""
+        allowed = self._rules.ros2_messages(spec.full_name)
+        if ros2_type not in allowed:
+            raise TypesDiffer(f"no rule makes [{spec.full_name}] a [{ros2_type}]: write one for --rules")
+        return transcoder(spec, lookup, self._ros2(ros2_type), self._ros2, self._rules)
+
+    def _ros2_spec(self, name: str) -> MessageSpec:
+        return ros2_spec(name, self._side.fields(name))
+
+
+class Ros2Bridge:
+    """Bridges topics while both sides have an end. On the node's loop; messages of ROS 2 pass in its executor's thread."""
+
+    def __init__(self, node: Node, side: Ros2Side, options: Ros2Options, catalogue: Catalogue) -> None:
+        self.node = node
+        self.side = side
+        self.options = options
+        self.links: dict[Link, _OpenLink] = {}
+        self.refused: dict[Link, str] = {}
+        self.header = marker("")
+        self._types = _Types(side, options.rules, catalogue)
+        self._texts = TypeTexts(node)
+        self._headers: dict[tuple[str, str], Header] = {}
+        self._watching: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+
+    async def start(self) -> None:
+        """Bridge until :meth:`close`. Raises MasterUnreachableError, RpcError."""
+        await self.look()
+        self._watching = asyncio.ensure_future(self._watch())
+
+    async def close(self) -> None:
+        """Close all links, and the side of ROS 2. Idempotent."""
+        watching, self._watching = self._watching, None
+        if watching:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+        for link in list(self.links):
+            await self._close_link(link)
+        await self._texts.close()
+        await asyncio.get_running_loop().run_in_executor(None, self.side.close)
+
+    async def pairs(self) -> list[Pair]:
+        """Return what would be bridged, and why something is not; opens nothing. Raises as :meth:`look`."""
+        found = []
+        for link in await self._wanted():
+            try:
+                await self._converter(link)
+            except TypesDiffer as error:
+                found.append(Pair(link, str(error)))
+            else:
+                found.append(Pair(link))
+        return found
+
+    async def wait_for(self, condition: Callable[[], bool]) -> None:
+        """Return when ``condition`` holds after a look."""
+        while not condition():
+            await self._changed.wait()
+
+    async def look(self) -> bool:
+        """Open and close links as the graphs are now; whether any changed. Raises MasterUnreachableError, RpcError."""
+        wanted = await self._wanted()
+        gone = [link for link in self.links if link not in wanted]
+        for link in gone:
+            await self._close_link(link)
+        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
+        new = [link for link in wanted if link not in self.links and link not in self.refused]
+        for link in new:
+            try:
+                await self._open_link(link)
+            except (TypesDiffer, ROSException, ValueError) as error:
+                self.refused[link] = str(error)
+                self.node.log.warning("%s is not bridged (%s): %s", link.topic, link.direction.value, error)
+        self._changed.set()
+        self._changed = asyncio.Event()
+        return bool(gone or new)
+
+    async def _watch(self) -> None:
+        pause = _FASTEST_LOOK
+        is_reported = False
+        while True:
+            await asyncio.sleep(pause)
+            changed = False
+            try:
+                changed = await self.look()
+                is_reported = False
+            except (MasterUnreachableError, RpcError) as error:
+                if not is_reported:
+                    self.node.log.warning("the graph cannot be read: %s. Will keep trying.", error)
+                is_reported = True
+            slowest = max(self.options.slowest_look, _FASTEST_LOOK)
+            pause = _FASTEST_LOOK if changed else min(pause * 1.5, slowest)
+
+    async def _wanted(self) -> list[Link]:
+        """Return what the graphs have to be bridged."""
+        snapshot = await fetch(self.node._node.master)
+        run_id = await self.node.get_param("/run_id", "")
+        self.header = marker(str(run_id))
+        names = self.side.topics()
+        ros2 = {
+            name: self.side.ends(name)
+            for name in names
+            if name in snapshot.topics and self.options.topics(name)
+        }
+        await self._look_at_publishers(snapshot, ros2)
+        return links(snapshot, ros2, self.node.name, self._is_latched, self.options.rules.ros1_message)
+
+    async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
+        """Learn from each new publisher of ROS 1, of a topic with subscribers in ROS 2, its definition and if it latches."""
+        present = {
+            (topic, node)
+            for topic, ends in ros2.items()
+            if ends.subscribers
+            for node in snapshot.publishers.get(topic, ())
+            if node != self.node.name
+        }
+        self._headers = {key: header for key, header in self._headers.items() if key in present}
+        for topic, node in sorted(present - self._headers.keys()):
+            with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
+                self._headers[topic, node] = await self._texts._header_of(topic, node)
+
+    def _is_latched(self, topic: str, node: str) -> bool:
+        return self._headers.get((topic, node), {}).get("latching") == "1"
+
+    async def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
+        """Return the functions of a link's types. Raise TypesDiffer."""
+        texts = [
+            header.get("message_definition", "")
+            for (topic, _), header in self._headers.items()
+            if topic == link.topic and header.get("type") == link.ros1_type
+        ]
+        text = next(filter(None, texts), "") if link.direction is Direction.TO_ROS2 else ""
+        if text:
+            spec, lookup = self._types.of_text(link.ros1_type, text)
+        else:
+            spec, lookup = self._types.installed(link.ros1_type)
+        return self._types.transcoder(spec, lookup, link.ros2_type), spec, lookup
+
+    async def _open_link(self, link: Link) -> None:
+        made, spec, lookup = await self._converter(link)
+        depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
+        opened: _OpenLink
+        if link.direction is Direction.TO_ROS2:
+            publisher = self.side.publisher(
+                link.topic, link.ros2_type, depth=1 if link.is_latched else depth, is_latched=link.is_latched
+            )
+            await self._joined(publisher)
+            opened = _ToRos2(self, link, made, publisher)
+        else:
+            interface = self._types.interface(spec, lookup)
+            ros1 = self.node.advertise(
+                link.topic,
+                raw_class(interface),
+                queue_size=_ROS1_QUEUE,
+                latch=link.is_latched,
+                headers={_ORIGIN: self.side.domain},
+            )
+            await ros1._wait_for_expected()
+            opened = _ToRos1(self, link, made, ros1, depth)
+        self.links[link] = opened
+        self.node.log.info(
+            "bridging %s (%s): [%s] and [%s]",
+            link.topic,
+            link.direction.value,
+            link.ros1_type,
+            link.ros2_type,
+        )
+
+    @staticmethod
+    async def _joined(publisher: Ros2Publisher) -> None:
+        """Wait for the subscribers that are there: a message that is published before does not reach them."""
+        loop = asyncio.get_running_loop()
+        end = loop.time() + _JOIN_SECONDS
+        while not publisher.subscribers and loop.time() < end:
+            await asyncio.sleep(_JOIN_LOOK)
+
+    async def _close_link(self, link: Link) -> None:
+        await self.links.pop(link).close()
+        self.node.log.info("no longer bridging %s (%s)", link.topic, link.direction.value)
+
+
+class _OpenLink:
+    """A link that passes messages; ``passed`` counts them."""
+
+    def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
+        self.link = link
+        self.passed = 0
+        self._bridge = bridge
+        self._made = made
+        self._misfits = RateLimitedLogger(bridge.node.log)
+        is_static = link.is_latched and link.ros1_type in TF_TYPES
+        self._statics = StaticTransforms() if is_static else None
+
+    async def close(self) -> None:
+        raise NotImplementedError
+
+    def _report(self, error: Exception) -> None:
+        self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
+
+
+class _ToRos2(_OpenLink):
+    def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, publisher: Ros2Publisher) -> None:
+        super().__init__(bridge, link, made)
+        self._publisher = publisher
+        self._subscription: RawSubscription = bridge.node.subscribe_raw(link.topic, self._deliver)
+
+    async def close(self) -> None:
+        await self._subscription.close()
+        self._publisher.close()
+
+    def _deliver(self, frame: Frame, header: Header) -> None:
+        bridge = self._bridge
+        if header.get("callerid") == bridge.node.name or header.get(_ORIGIN) == bridge.side.domain:
+            return
+        try:
+            if self._statics:
+                frame = self._statics.merged(frame)
+            self._publisher.publish(self._made.to_cdr(frame, bridge.header))
+        except DeserializationError as error:
+            self._report(error)
+        else:
+            self.passed += 1
+
+
+class _ToRos1(_OpenLink):
+    def __init__(
+        self, bridge: Ros2Bridge, link: Link, made: Transcoder, publisher: Publisher[Message], depth: int
+    ) -> None:
+        super().__init__(bridge, link, made)
+        self._publisher = publisher
+        self._subscription: Ros2Subscription = bridge.side.subscribe(
+            link.topic,
+            link.ros2_type,
+            self._deliver,
+            depth=_DEPTH if link.is_latched else depth,
+            is_reliable=link.is_reliable,
+            is_latched=link.is_latched,
+        )
+
+    async def close(self) -> None:
+        self._subscription.close()
+        await self._publisher.close()
+
+    def _deliver(self, data: bytes) -> None:
+        """Pass a message on. In the executor's thread, which writes to the sockets of ROS 1 itself."""
+        if data[2:4] == self._bridge.header[2:4]:
+            return  # sent by the bridge: the same graph of ROS 1 has it
+        try:
+            body = self._made.to_ros1(data)
+            if self._statics:
+                body = self._statics.merged(body)
+            self._publisher.publish_raw(body)
+        except DeserializationError as error:
+            self._report(error)
+        except ROSException:
+            return  # it has been closed meanwhile
+        else:
+            self.passed += 1

@@ -1,0 +1,316 @@
+"""The side of ROS 2, by rclpy: its topics, publishers and subscriptions of serialized messages.
+
+All of rclpy is behind this file, so that a test can put another side in its place. ROS 2 calls back in a thread of its
+executor.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import threading
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Protocol, cast
+
+from minirospy.bridge.ros2.layouts import TypesDiffer
+from minirospy.bridge.ros2.links import Ros2End, Ros2Topic
+from minirospy.errors import BridgeError
+
+__all__ = ["RclpySide", "Ros2Publisher", "Ros2Side", "Ros2Subscription", "require_rclpy"]
+
+_DRAINED = 200
+"""Messages that are read at one call of the executor, which costs more than reading one."""
+
+
+# --- what is used of rclpy, which has no types where it is not installed
+
+
+class _MessageClass(Protocol):
+    @staticmethod
+    def get_fields_and_field_types() -> dict[str, str]: ...
+
+
+class _Profile(Protocol):
+    reliability: object
+    durability: object
+
+
+class _Info(Protocol):
+    node_name: str
+    topic_type: str
+    qos_profile: _Profile
+
+
+class _RclpyPublisher(Protocol):
+    def publish(self, data: bytes) -> None: ...
+
+    def get_subscription_count(self) -> int: ...
+
+
+class _Handle(Protocol):
+    def __enter__(self) -> object: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def take_message(self, class_: _MessageClass, raw: bool, /) -> tuple[bytes, object] | None: ...
+
+
+class _RclpySubscription(Protocol):
+    handle: _Handle
+
+
+class _Node(Protocol):
+    def create_publisher(self, class_: _MessageClass, topic: str, profile: _Profile) -> _RclpyPublisher: ...
+
+    def create_subscription(
+        self,
+        class_: _MessageClass,
+        topic: str,
+        callback: Callable[[bytes], None],
+        profile: _Profile,
+        *,
+        raw: bool,
+    ) -> _RclpySubscription: ...
+
+    def destroy_publisher(self, publisher: _RclpyPublisher) -> bool: ...
+
+    def destroy_subscription(self, subscription: _RclpySubscription) -> bool: ...
+
+
+# --- the side
+
+
+class Ros2Publisher(Protocol):
+    """A publisher of serialized messages."""
+
+    @property
+    def subscribers(self) -> int:
+        """The number of subscribers that are connected."""
+
+    def publish(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Ros2Subscription(Protocol):
+    """A subscription, which calls back until it is closed."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Side(Protocol):
+    """What the bridge needs of ROS 2. Types are ``pkg/Name``."""
+
+    @property
+    def domain(self) -> str: ...
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """Return all topics and their types."""
+
+    def ends(self, topic: str) -> Ros2Topic: ...
+
+    def fields(self, type_: str) -> dict[str, str]:
+        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
+
+    def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
+
+    def subscribe(
+        self,
+        topic: str,
+        type_: str,
+        deliver: Callable[[bytes], None],
+        *,
+        depth: int,
+        is_reliable: bool,
+        is_latched: bool,
+    ) -> Ros2Subscription: ...
+
+    def close(self) -> None: ...
+
+
+def require_rclpy() -> None:
+    """Raise BridgeError with what to do where ROS 2 cannot be imported."""
+    try:
+        importlib.import_module("rclpy")
+    except ImportError as error:
+        raise BridgeError(
+            f"ROS 2 cannot be imported ({' '.join(str(error).split())}): source its setup file first, "
+            "as /opt/ros/jazzy/setup.bash, and run minirospy with the Python for which ROS 2 was built"
+        ) from error
+
+
+class RclpySide:
+    """ROS 2 by rclpy: one node, one executor, in one thread."""
+
+    def __init__(self, name: str) -> None:
+        """Start the node. Raises BridgeError."""
+        require_rclpy()
+        rclpy = importlib.import_module("rclpy")
+        self._qos = importlib.import_module("rclpy.qos")
+        executors = importlib.import_module("rclpy.executors")
+        self._shutdown_error: type[Exception] = executors.ExternalShutdownException
+        self._context = importlib.import_module("rclpy.context").Context()
+        no_signals = importlib.import_module("rclpy.signals").SignalHandlerOptions.NO
+        try:
+            # Ctrl-C is the bridge's own.
+            rclpy.init(args=[], context=self._context, signal_handler_options=no_signals)
+            self._node = rclpy.create_node(
+                name,
+                context=self._context,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+        except Exception as error:  # rclpy's own errors have no common base but this
+            with contextlib.suppress(Exception):
+                self._context.try_shutdown()
+            raise BridgeError(f"ROS 2 does not start: {' '.join(str(error).split())}") from error
+        self._executor = executors.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="ros2-executor", daemon=True)
+        self._thread.start()
+        self._is_closed = False
+
+    @property
+    def domain(self) -> str:
+        """The domain of ROS 2."""
+        return os.environ.get("ROS_DOMAIN_ID") or "0"
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """Return all topics and their types."""
+        found = self._node.get_topic_names_and_types()
+        return {str(name): tuple(_short(type_) for type_ in types) for name, types in found}
+
+    def ends(self, topic: str) -> Ros2Topic:
+        """Return the publishers and subscribers of a topic."""
+        return Ros2Topic(
+            tuple(self._end(each) for each in self._node.get_publishers_info_by_topic(topic)),
+            tuple(self._end(each) for each in self._node.get_subscriptions_info_by_topic(topic)),
+        )
+
+    def fields(self, type_: str) -> dict[str, str]:
+        """Return the fields of a message type. Raise TypesDiffer where it is not installed."""
+        return dict(self._class(type_).get_fields_and_field_types())
+
+    def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
+        """Return a publisher, which is reliable: so it suits every subscriber. Raise TypesDiffer."""
+        profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
+        return _Publisher(self._node, self._node.create_publisher(self._class(type_), topic, profile))
+
+    def subscribe(
+        self,
+        topic: str,
+        type_: str,
+        deliver: Callable[[bytes], None],
+        *,
+        depth: int,
+        is_reliable: bool,
+        is_latched: bool,
+    ) -> Ros2Subscription:
+        """Call ``deliver`` with each serialized message, in the executor's thread. Raise TypesDiffer."""
+        profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
+        return _Subscription(self._node, self._class(type_), topic, deliver, profile)
+
+    def close(self) -> None:
+        """End the node and its thread. Idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        self._executor.shutdown()
+        self._thread.join()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _spin(self) -> None:
+        with contextlib.suppress(self._shutdown_error):
+            self._executor.spin()
+
+    def _end(self, info: _Info) -> Ros2End:
+        profile = info.qos_profile
+        return Ros2End(
+            str(info.node_name),
+            _short(str(info.topic_type)),
+            profile.reliability == self._qos.ReliabilityPolicy.RELIABLE,
+            profile.durability == self._qos.DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+
+    def _profile(self, depth: int, *, is_reliable: bool, is_latched: bool) -> _Profile:
+        qos = self._qos
+        profile: _Profile = qos.QoSProfile(
+            depth=depth,
+            reliability=qos.ReliabilityPolicy.RELIABLE if is_reliable else qos.ReliabilityPolicy.BEST_EFFORT,
+            durability=qos.DurabilityPolicy.TRANSIENT_LOCAL if is_latched else qos.DurabilityPolicy.VOLATILE,
+        )
+        return profile
+
+    @staticmethod
+    def _class(type_: str) -> _MessageClass:
+        package, _, name = type_.partition("/")
+        try:
+            found = getattr(importlib.import_module(f"{package}.msg"), name, None)
+        except ImportError:
+            found = None
+        # minirospy's own packages of ROS 1 have classes, too.
+        if not hasattr(found, "get_fields_and_field_types"):
+            raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
+        return cast("_MessageClass", found)
+
+
+class _Publisher:
+    def __init__(self, node: _Node, publisher: _RclpyPublisher) -> None:
+        self._node = node
+        self._publisher = publisher
+
+    @property
+    def subscribers(self) -> int:
+        return int(self._publisher.get_subscription_count())
+
+    def publish(self, data: bytes) -> None:
+        self._publisher.publish(data)
+
+    def close(self) -> None:
+        self._node.destroy_publisher(self._publisher)
+
+
+class _Subscription:
+    def __init__(
+        self,
+        node: _Node,
+        class_: _MessageClass,
+        topic: str,
+        deliver: Callable[[bytes], None],
+        profile: _Profile,
+    ) -> None:
+        self._node = node
+        self._class = class_
+        self._deliver = deliver
+        self._is_closed = False
+        self._subscription = node.create_subscription(class_, topic, self._arrived, profile, raw=True)
+
+    def close(self) -> None:
+        self._is_closed = True
+        self._node.destroy_subscription(self._subscription)
+
+    def _arrived(self, data: bytes) -> None:
+        """Deliver a message, and those that have come after it: the executor brings one at a time, slowly."""
+        handle = self._subscription.handle
+        for _ in range(_DRAINED):
+            if self._is_closed:
+                return
+            self._deliver(data)
+            with handle:
+                taken = handle.take_message(self._class, True)
+            if taken is None:
+                return
+            data = taken[0]
+        self._deliver(data)
+
+
+def _short(type_: str) -> str:
+    """Return ``pkg/Name`` of ``pkg/msg/Name``."""
+    package, _, rest = type_.partition("/")
+    return f"{package}/{rest.rpartition('/')[2]}"

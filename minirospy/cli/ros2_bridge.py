@@ -1,0 +1,116 @@
+"""`minirospy ros2-bridge`: topics of ROS 1 for ROS 2, and back, beside an installed ROS 2. How to use it: docs/ros2.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge
+
+__all__ = ["COMMAND", "main"]
+
+_QUIET_LOOKS = 3
+_LOOK_SECONDS = 0.5
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return COMMAND.main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        "minirospy ros2-bridge",
+        "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports. "
+        "A topic is bridged while it has a publisher on one side and a subscriber on the other.",
+    )
+    parser.add_argument(
+        "--topics",
+        action="append",
+        default=[],
+        metavar="GLOB",
+        help="topics that are bridged (all)",
+        completer="topics",
+    )
+    parser.add_argument(
+        "--rules",
+        default="",
+        metavar="FILE",
+        help="which types and fields are which, in the format of ros1_bridge",
+        completer="files",
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="print what would be bridged, and why something is not, and exit"
+    )
+    return parser
+
+
+def _ros2_bridge(topics: Sequence[str], rules: str, list: bool) -> int:
+    from minirospy.bridge.access import NameFilter
+    from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
+    from minirospy.bridge.ros2.links import BRIDGE_PREFIX
+    from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
+    from minirospy.bridge.ros2.side import RclpySide, require_rclpy
+    from minirospy.bridge.serve import run
+    from minirospy.idl.load import Catalogue
+    from minirospy.workspace.packages import Packages
+
+    known = BUILT_IN
+    if rules:
+        known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
+    require_rclpy()
+    options = Ros2Options(NameFilter.of(topics), known)
+    catalogue = Catalogue(Packages().folders())
+
+    async def start(node: Node) -> Ros2Bridge | _Listing:
+        bridge = Ros2Bridge(node, RclpySide(BRIDGE_PREFIX), options, catalogue)
+        return _Listing(bridge, node) if list else bridge
+
+    name = f"{BRIDGE_PREFIX}_list" if list else BRIDGE_PREFIX
+    # No message class of ROS 1 can be imported where those of ROS 2 have the same names.
+    return run(name, (), start, lambda _: None, imports_messages=False)
+
+
+class _Listing:
+    """Prints what would be bridged once ROS 2 has found its nodes, and ends the node."""
+
+    def __init__(self, bridge: Ros2Bridge, node: Node) -> None:
+        self._bridge = bridge
+        self._node = node
+
+    async def start(self) -> None:
+        import asyncio
+
+        quiet, before = 0, None
+        while quiet < _QUIET_LOOKS:
+            await asyncio.sleep(_LOOK_SECONDS)
+            found = await self._bridge.pairs()
+            quiet = quiet + 1 if found == before else 0
+            before = found
+        for line in _table(before or []):
+            print(line)
+        self._node.shutdown()
+
+    async def close(self) -> None:
+        await self._bridge.close()
+
+
+def _table(pairs: Sequence[Pair]) -> list[str]:
+    if not pairs:
+        return ["no topic has a publisher on one side and a subscriber on the other"]
+    lines = []
+    for pair in pairs:
+        link = pair.link
+        head = f"{link.topic}  {link.direction.value}  ROS 1 {link.ros1_type}  ROS 2 {link.ros2_type}"
+        kept = "  latched" if link.is_latched else ""
+        lines.append(f"{head}  not bridged: {pair.reason}" if pair.reason else f"{head}{kept}")
+    return lines
+
+
+COMMAND = Command("minirospy ros2-bridge", _parser, _ros2_bridge)
