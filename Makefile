@@ -41,6 +41,7 @@ test: $(STAMP)
 interop: $(STAMP)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pip install -q foxglove-sdk || echo "foxglove-sdk cannot be installed: its server is not compared"
+	@$(BIN)/python tests/interop/install_ros2.py
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop
 	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck" tests/workspace
 

@@ -1,0 +1,370 @@
+"""`minirospy ros2-bridge` next to real ROS 2: bytes of both ways, late joiners, ends that leave, no loops."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import queue
+import subprocess
+import threading
+from collections.abc import Callable, Coroutine, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from minirospy import Node
+from minirospy.aio.raw import raw_class
+from minirospy.idl.load import message_class
+from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.runtime.transport.loop import LoopThread
+from minirospy.wire.tcpros import InterfaceType
+from tests.interop.conftest import running_master
+from tests.interop.install_ros2 import PYTHON, STAMP
+
+_T = TypeVar("_T")
+HERE = Path(__file__).parent
+LIMIT = 90.0
+"""Seconds after which a wait for a state fails: far more than a busy machine takes."""
+
+pytestmark = [
+    pytest.mark.skipif(not STAMP.exists(), reason="ROS 2 is not installed: tests/interop/install_ros2.py"),
+    pytest.mark.timeout(400),
+]
+
+TYPES = [
+    "std_msgs/Bool", "std_msgs/Byte", "std_msgs/Char", "std_msgs/ColorRGBA", "std_msgs/Empty", "std_msgs/Float64",
+    "std_msgs/Float64MultiArray", "std_msgs/Header", "std_msgs/Int64", "std_msgs/String", "std_msgs/UInt8MultiArray",
+    "geometry_msgs/PointStamped", "geometry_msgs/PoseArray", "geometry_msgs/PoseWithCovarianceStamped",
+    "geometry_msgs/TransformStamped", "geometry_msgs/Twist", "sensor_msgs/CameraInfo", "sensor_msgs/CompressedImage",
+    "sensor_msgs/Image", "sensor_msgs/Imu", "sensor_msgs/JointState", "sensor_msgs/Joy", "sensor_msgs/LaserScan",
+    "sensor_msgs/NavSatFix", "sensor_msgs/PointCloud2", "nav_msgs/OccupancyGrid", "nav_msgs/Odometry", "nav_msgs/Path",
+    "diagnostic_msgs/DiagnosticArray",
+]  # fmt: skip
+
+
+class Peer:
+    """ros2_peer.py, in a process of real ROS 2."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._said: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._kept: list[dict[str, Any]] = []
+        self._program = subprocess.Popen(
+            [str(PYTHON), str(HERE / "ros2_peer.py")],
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        self._reading = threading.Thread(target=self._read)
+        self._reading.start()
+        self.wait(lambda each: each["op"] == "ready")
+
+    def do(self, op: str, topic: str, **fields: Any) -> None:
+        """Do something and wait until it is done."""
+        self.start(op, topic, **fields)
+        self.wait(lambda each: (each["op"], each.get("of"), each.get("topic")) == ("done", op, topic))
+
+    def start(self, op: str, topic: str, **fields: Any) -> None:
+        assert self._program.stdin
+        print(json.dumps({"op": op, "topic": topic, **fields}), file=self._program.stdin, flush=True)
+
+    def message(self, topic: str) -> bytes:
+        """Return the next message of a topic: its CDR without the header."""
+        found = self.wait(lambda each: each["op"] == "message" and each["topic"] == topic)
+        return bytes.fromhex(found["data"])[4:]
+
+    def wait(self, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        for number, each in enumerate(self._kept):
+            if accepts(each):
+                return self._kept.pop(number)
+        while True:
+            each = self._said.get(timeout=LIMIT)
+            if accepts(each):
+                return each
+            assert each["op"] != "ended", "the peer has ended: see its error"
+            self._kept.append(each)
+
+    def has_said(self, topic: str, data: bytes) -> bool:
+        """Return whether a message has come, after waiting a moment for one; forget those that came."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._kept.append(self._said.get(timeout=0.5))
+                if self._kept[-1]["op"] == "message":
+                    break
+        of_topic = [each for each in self._kept if each.get("topic") == topic and each["op"] == "message"]
+        self._kept = [each for each in self._kept if each not in of_topic]
+        return any(bytes.fromhex(each["data"])[4:].startswith(data) for each in of_topic)
+
+    def close(self) -> None:
+        assert self._program.stdin
+        assert self._program.stdout
+        self._program.stdin.close()
+        try:
+            self._program.wait(LIMIT)
+        except subprocess.TimeoutExpired:
+            self._program.kill()
+            self._program.wait()
+        self._reading.join()
+        self._program.stdout.close()
+
+    def _read(self) -> None:
+        assert self._program.stdout
+        for line in self._program.stdout:
+            self._said.put(json.loads(line))
+        self._said.put({"op": "ended"})
+
+
+class Scene:
+    """A master, the bridge, a node of ROS 1 in this process, a node of ROS 2 in another."""
+
+    def __init__(self, uri: str, environment: dict[str, str], parts: contextlib.ExitStack) -> None:
+        self._loop = LoopThread("test-ros2")
+        parts.callback(self._loop.close)
+        self.environment = environment
+        self.node: Node = self.run(self._start(uri))
+        parts.callback(lambda: self.run(self.node.close()))
+        self.peer = Peer(environment)
+        parts.callback(self.peer.close)
+
+    def run(self, work: Coroutine[object, object, _T]) -> _T:
+        return self._loop.run(work, LIMIT + 30)
+
+    async def _start(self, uri: str) -> Node:
+        node = Node("tester", master_uri=uri, rosout=False)
+        await node.start()
+        return node
+
+    def advertise(self, topic: str, type_: str, *, latch: bool = False) -> Any:
+        async def advertise() -> Any:
+            interface = InterfaceType.of(message_class(type_))
+            return await self.node.advertise(topic, raw_class(interface), latch=latch)
+
+        return self.run(advertise())
+
+    def publish(self, publisher: Any, data: bytes) -> None:
+        async def publish() -> None:
+            publisher.publish_raw(data)
+
+        self.run(publish())
+
+    def subscribe(self, topic: str) -> tuple[Any, queue.Queue[bytes]]:
+        came: queue.Queue[bytes] = queue.Queue()
+
+        async def subscribe() -> Any:
+            return await self.node.subscribe_raw(topic, lambda frame, _: came.put(bytes(frame)))
+
+        return self.run(subscribe()), came
+
+    def end(self, handle: Any) -> None:
+        self.run(handle.close())
+
+    def until(self, condition: Callable[[Snapshot], bool]) -> None:
+        """Wait until the graph of ROS 1 is as wanted."""
+
+        async def wait() -> None:
+            while not condition(await fetch(self.node._node.master)):
+                await asyncio.sleep(0.05)
+
+        self.run(asyncio.wait_for(wait(), LIMIT))
+
+
+@pytest.fixture(scope="module")
+def scene() -> Iterator[Scene]:
+    with contextlib.ExitStack() as parts:
+        uri = parts.enter_context(running_master("ours"))
+        # A domain that no other test has: from the port, which is this test's alone.
+        domain = str(1 + int(uri.rpartition(":")[2]) % 100)
+        environment = {
+            # With minirospy's packages of ROS 1 on it, those of ROS 2 could not be imported.
+            **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+            "ROS_MASTER_URI": uri,
+            "ROS_DOMAIN_ID": domain,
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        }
+        code = "import sys; from minirospy.cli.main import main; sys.exit(main(['ros2-bridge']))"
+        bridge = subprocess.Popen([str(PYTHON), "-c", code], env=environment)
+
+        def end() -> None:
+            bridge.terminate()
+            assert bridge.wait(LIMIT) == 0
+
+        parts.callback(end)
+        yield Scene(uri, environment, parts)
+
+
+def sample(type_: str) -> bytes:
+    """Return a message of ROS 1 with something in it."""
+    message = message_class(type_)()
+    _fill(message, 1)
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def _fill(message: Any, number: int) -> None:
+    for place, (name, type_) in enumerate(zip(message.__slots__, message._slot_types, strict=True), number):
+        base, bracket, length = type_.partition("[")
+        count = int(length[:-1]) if length.rstrip("]") else 3
+        values = [_value(base, place + each) for each in range(count if bracket else 1)]
+        if bracket and base in ("uint8", "char"):
+            setattr(message, name, bytes(values))
+        else:
+            setattr(message, name, values if bracket else values[0])
+
+
+def _value(base: str, number: int) -> Any:
+    from minirospy.times import Duration, Time
+
+    if base == "string":
+        return "x" * (number % 9)
+    if base == "time":
+        return Time(number, number)
+    if base == "duration":
+        return Duration(number, number)
+    if base == "bool":
+        return bool(number % 2)
+    if base.startswith("float"):
+        return number / 2
+    if "/" not in base:
+        return number % 100
+    inner = message_class(base)()
+    _fill(inner, number)
+    return inner
+
+
+def test_messages_are_those_that_rosbags_converts(scene: Scene) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    there: list[tuple[str, bytes, bytes]] = []
+    for type_ in TYPES:
+        data = sample(type_)
+        topic = "/there/" + type_.replace("/", "_").lower()
+        there.append((topic, data, bytes(store.ros1_to_cdr(data, type_.replace("/", "/msg/")))))
+        scene.peer.do("subscribe", topic, type=type_, latched=True)
+        scene.publish(scene.advertise(topic, type_, latch=True), data)
+    for topic, _, cdr in there:
+        # DDS pads to four bytes.
+        assert scene.peer.message(topic) == cdr[4:] + bytes(-len(cdr) % 4), topic
+
+    # A subscription that nothing refers to ends.
+    subscriptions = []
+    back: list[tuple[str, queue.Queue[bytes], bytes]] = []
+    for type_, (name, _, cdr) in zip(TYPES, there, strict=True):
+        topic = name.replace("/there/", "/back/")
+        subscription, came = scene.subscribe(topic)
+        subscriptions.append(subscription)
+        back.append((topic, came, bytes(store.cdr_to_ros1(cdr, type_.replace("/", "/msg/")))))
+        scene.peer.do("publish", topic, type=type_, latched=True, data=cdr.hex())
+    for topic, came, data in back:
+        assert came.get(timeout=LIMIT) == data, topic
+    for subscription in subscriptions:
+        scene.end(subscription)
+
+
+def test_who_joins_later_gets_what_was_latched(scene: Scene) -> None:
+    data = sample("std_msgs/String")
+    publisher = scene.advertise("/late/to_ros2", "std_msgs/String", latch=True)
+    scene.publish(publisher, data)
+    scene.peer.do("subscribe", "/late/to_ros2", type="std_msgs/String", latched=True)
+    first = scene.peer.message("/late/to_ros2")
+    other = Peer(scene.environment)
+    try:
+        other.do("subscribe", "/late/to_ros2", type="std_msgs/String", latched=True)
+        assert other.message("/late/to_ros2") == first
+    finally:
+        other.close()
+
+    scene.peer.do(
+        "publish", "/late/to_ros1", type="std_msgs/String", latched=True, data="000100000300000061620000"
+    )
+    for _ in range(2):
+        subscription, came = scene.subscribe("/late/to_ros1")
+        assert came.get(timeout=LIMIT) == b"\2\0\0\0ab"
+        scene.end(subscription)
+
+
+def test_the_bridge_leaves_a_topic_with_its_last_end(scene: Scene) -> None:
+    bridge = "/minirospy_ros2_bridge"
+    publisher = scene.advertise("/left/there", "std_msgs/Int64")
+    scene.peer.do("subscribe", "/left/there", type="std_msgs/Int64")
+    scene.until(lambda graph: bridge in graph.subscribers.get("/left/there", ()))
+    scene.peer.do("close", "/left/there")
+    scene.until(lambda graph: bridge not in graph.subscribers.get("/left/there", ()))
+    scene.end(publisher)
+
+    subscription, came = scene.subscribe("/left/back")
+    scene.peer.do("publish", "/left/back", type="std_msgs/Int64", data="000100000500000000000000")
+    assert came.get(timeout=LIMIT) == b"\5" + bytes(7)
+    scene.end(subscription)
+    scene.until(lambda graph: bridge not in graph.publishers.get("/left/back", ()))
+    scene.peer.do("close", "/left/back")
+
+
+def test_no_message_comes_back_where_both_sides_publish_and_subscribe(scene: Scene) -> None:
+    bridge = "/minirospy_ros2_bridge"
+    topic = "/both"
+    publisher = scene.advertise(topic, "std_msgs/Int8")
+    subscription, came = scene.subscribe(topic)
+    scene.peer.do("subscribe", topic, type="std_msgs/Int8")
+    # Its publisher is there with its own subscriber alone.
+    scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000007")
+    scene.until(
+        lambda graph: bridge in graph.subscribers.get(topic, ()) and bridge in graph.publishers.get(topic, ())
+    )
+
+    # Both directions work, whichever messages were sent before they did.
+    _until_received(
+        came, b"\1", lambda: scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000001")
+    )
+    while not scene.peer.has_said(topic, b"\2"):
+        scene.publish(publisher, b"\2")
+
+    # One more from each side, and then a last one: what came between them came once.
+    scene.publish(publisher, b"\3")
+    scene.publish(publisher, b"\4")
+    received = []
+    while not received or received[-1] != 4:
+        received.append(scene.peer.message(topic)[0])
+    assert received.count(3) == 1
+    scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000005")
+    scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000006")
+    values = []
+    while not values or values[-1] != 6:
+        values.append(came.get(timeout=LIMIT)[0])
+    assert values.count(5) == 1
+    # What ROS 1 sent came to its own subscriber directly, and not again from ROS 2.
+    assert values.count(3) <= 1
+    scene.end(subscription)
+
+
+def _until_received(came: queue.Queue[bytes], value: bytes, send: Callable[[], None]) -> None:
+    """Send until it is received: before the ends are connected, nothing is."""
+    while True:
+        send()
+        with contextlib.suppress(queue.Empty):
+            while came.get(timeout=1.0) != value:
+                pass
+            return
+
+
+def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
+    scene.advertise("/listed", "std_msgs/Time")
+    scene.peer.do("subscribe", "/listed", type="std_msgs/Float32")
+    code = "import sys; from minirospy.cli.main import main; sys.exit(main(['ros2-bridge', '--list', '--topics', '/listed']))"
+    done = subprocess.run(
+        [str(PYTHON), "-c", code],
+        env=scene.environment,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == (
+        "/listed  1 -> 2  ROS 1 std_msgs/Time  ROS 2 std_msgs/Float32  "
+        "not bridged: no rule makes [std_msgs/Time] a [std_msgs/Float32]: write one for --rules\n"
+    )
