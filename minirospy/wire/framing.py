@@ -164,22 +164,31 @@ class FrameReader:
     """Bytes in, frames out.
 
     A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
-    than CHUNK comes in a separate buffer, which is not written again. With ``gathers`` false such a frame is
-    left to the caller instead: :attr:`unfinished` has what has come of it.
+    than ``chunk`` comes in a separate buffer, which is not written again. With ``gathers`` false such a frame is
+    left to the caller instead: :attr:`unfinished` has what has come of it. A frame of more than ``limit`` bytes is a
+    WireError, or left out with ``skips``, and counted in :attr:`skipped`.
     """
 
-    def __init__(self, limit: int = MAX_FRAME, *, gathers: bool = True) -> None:
+    def __init__(
+        self, limit: int = MAX_FRAME, *, gathers: bool = True, skips: bool = False, chunk: int = CHUNK
+    ) -> None:
+        self.skipped = 0
+        """Frames that were left out."""
         self.unfinished: tuple[int, bytes] | None = None
         """The length in front of a large frame, and the bytes that came with it; to be set to None by the caller."""
         self._gathers = gathers
         self._limit = limit
-        self._small = memoryview(bytearray(CHUNK))
+        self._skips = skips
+        self._chunk = chunk
+        self._small = memoryview(bytearray(chunk))
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # Of the large frame: the bytes that have come, and those that are to come.
+        # Of the large frame: the bytes that have come, and all that belong to it.
         self._filled: int
         self._wanted: int
+        # Bytes of a frame that is left out, which are still to come.
+        self._left_out = 0
 
     def put_back(self, data: bytes) -> None:
         """Begin with these few bytes, where nothing is held."""
@@ -195,6 +204,8 @@ class FrameReader:
                 grown[: self._filled] = self._large
                 self._large = grown
             return memoryview(self._large)[self._filled :]
+        if self._left_out:
+            return self._small[: self._left_out]
         if self._start:
             rest = self._end - self._start
             self._small[:rest] = self._small[self._start : self._end]
@@ -209,6 +220,9 @@ class FrameReader:
                 frame, self._large = memoryview(self._large), None
                 yield frame
             return
+        if self._left_out:
+            self._left_out -= count
+            return
 
         self._end += count
         small, unpack, end = self._small, _LENGTH.unpack_from, self._end
@@ -218,7 +232,7 @@ class FrameReader:
             (length,) = unpack(small, at)
             stop = at + 4 + length
             if stop > end:
-                if length > CHUNK - 4:
+                if length > self._chunk - 4:
                     if self._gathers:
                         self._begin_large(length, at + 4)
                     else:
@@ -234,6 +248,11 @@ class FrameReader:
             self._start = self._end = 0
 
     def _begin_large(self, length: int, at: int) -> None:
+        if length > self._limit and self._skips:
+            self.skipped += 1
+            self._left_out = length - (self._end - at)
+            self._start = self._end = 0
+            return
         if length > self._limit:
             raise WireError(f"a message of {length} bytes is over the limit of {self._limit}")
         self._large = bytearray(min(length, _FIRST_CLAIM))

@@ -73,6 +73,24 @@ def test_a_length_over_the_limit_is_refused() -> None:
         feed(reader, struct.pack("<I", (1 << 20) + 1), 4)
 
 
+@pytest.mark.parametrize("step", [1, 7, 99, 1000, 100_000])
+def test_a_frame_over_the_limit_is_left_out(step: int) -> None:
+    reader = FrameReader(limit=3000, skips=True, chunk=1000)
+    bodies = [b"a" * 10, b"b" * 3000, b"c" * 3001, b"d" * 5000, b"e" * 996, b"f" * 997, b""]
+    data = b"".join(map(serialize_frame, bodies))
+    assert feed(reader, data, step) == [bodies[0], bodies[1], *bodies[4:]]
+    assert reader.skipped == 2
+
+
+def test_a_frame_that_is_left_out_costs_no_memory() -> None:
+    reader = FrameReader(limit=3000, skips=True, chunk=1000)
+    feed(reader, struct.pack("<I", 1 << 31), 4)
+    for _ in range(10):
+        space = reader.space()
+        assert len(space) == 1000
+        assert list(reader.received(len(space))) == []
+
+
 def test_a_claimed_length_costs_no_memory_before_the_bytes_come() -> None:
     reader = FrameReader()
     feed(reader, struct.pack("<I", 1 << 30), 4)

@@ -20,6 +20,8 @@ from minirospy.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
+_MOST_PENDING = 64 * 1024
+"""Characters that are collected at most: to write megabytes in one go would stop the master for as long."""
 
 
 class LogFileHandler(RotatingFileHandler):
@@ -45,6 +47,7 @@ class LogFile(LogFileHandler):
         self.setFormatter(_Formatter(self._stamp))
         self._line_head = f"[{name}][INFO] "
         self._lines: list[str] = []
+        self._pending = 0
         self._guard = threading.Lock()
         self._timer: asyncio.TimerHandle | None = None
         self._second = (0, "")
@@ -56,7 +59,9 @@ class LogFile(LogFileHandler):
     def text(self, text: str) -> None:
         """Add a line that has its time and level already (on the loop)."""
         self._add(text + "\n")
-        if self._timer is None:
+        if self._pending > _MOST_PENDING:
+            self._write_out()
+        elif self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -82,6 +87,7 @@ class LogFile(LogFileHandler):
     def _add(self, line: str) -> None:
         with self._guard:
             self._lines.append(line)
+            self._pending += len(line)
 
     def _stamp(self, now: float) -> str:
         second, stamp = self._second
@@ -96,7 +102,7 @@ class LogFile(LogFileHandler):
 
     def _write_out(self) -> None:
         with self._guard:
-            lines, self._lines = self._lines, []
+            lines, self._lines, self._pending = self._lines, [], 0
             if not lines:
                 return
 

@@ -19,7 +19,7 @@ from minirospy.errors import (
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi
-from minirospy.runtime.node.topics import Deliver, Publication, Subscription
+from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, tcp
@@ -208,7 +208,7 @@ class Node:
         self,
         topic: str,
         type_: InterfaceType,
-        deliver: Deliver,
+        deliver: Deliver | InTurns,
         *,
         newest: int = 0,
         tcp_nodelay: bool = False,

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from minirospy.environment import split_uri
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadLimitError, WireError
@@ -20,9 +21,16 @@ from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
-from minirospy.runtime.transport.links import OutLink, ReaderSet, read_frames, watch_frames
+from minirospy.runtime.transport.links import (
+    OutLink,
+    ReaderSet,
+    read_frames,
+    watch_frames,
+    watch_frames_in_turns,
+)
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.workers import Workers
+from minirospy.steps import Steps
 from minirospy.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.wire.header import Header, serialize_header
 from minirospy.wire.tcpros import (
@@ -33,7 +41,7 @@ from minirospy.wire.tcpros import (
     subscriber_header,
 )
 
-__all__ = ["Deliver", "InLink", "Publication", "Subscription"]
+__all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription"]
 
 _log = logging.getLogger(__name__)
 
@@ -52,6 +60,15 @@ _WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
 """Called with each message's bytes and its publisher's connection header."""
+
+
+@dataclass(frozen=True)
+class InTurns:
+    """How a subscription delivers in steps on the loop, which ``start`` runs, messages of up to ``most`` bytes."""
+
+    deliver: Callable[[Frame, Header], Steps[None]]
+    start: Callable[[Steps[None]], None]
+    most: int
 
 
 class Publication:
@@ -201,8 +218,8 @@ class Subscription:
 
     Each connection is read by a separate worker that calls ``deliver``: one publisher's messages stay in
     order, and neither topics nor publishers wait for each other. With ``on_loop``, ``deliver`` is called
-    on the loop instead and must be quick. ``newest`` may be changed at any time: of the messages that came
-    while a delivery lasted, only so many are delivered, the newest (0: all).
+    on the loop instead and must be quick; what takes longer is an :class:`InTurns` instead. ``newest`` may be changed
+    at any time: of the messages that came while a delivery lasted, only so many are delivered, the newest (0: all).
     """
 
     def __init__(
@@ -210,7 +227,7 @@ class Subscription:
         topic: str,
         type_: InterfaceType,
         caller_id: str,
-        deliver: Deliver,
+        deliver: Deliver | InTurns,
         *,
         rpc: AsyncRpcClient,
         workers: Workers,
@@ -232,7 +249,7 @@ class Subscription:
         self._rpc = rpc
         self._workers = workers
         self._readers = readers
-        self._on_loop = on_loop
+        self._on_loop = on_loop or isinstance(deliver, InTurns)
 
         self.lists = 0
         """How many lists of publishers have been received."""
@@ -365,16 +382,18 @@ class Subscription:
                 return
 
             self._links[uri] = link
-            if self._on_loop:
-                watch_frames(
-                    asyncio.get_running_loop(),
-                    link.sock,
-                    lambda frame: self._deliver(frame, link.header),
-                    lambda: self._link_ended(link),
+            loop, deliver = asyncio.get_running_loop(), self._deliver
+            ended = partial(self._link_ended, link)
+            if isinstance(deliver, InTurns):
+                in_steps, start, most = deliver.deliver, deliver.start, deliver.most
+                watch_frames_in_turns(
+                    loop, link.sock, lambda frame: in_steps(frame, link.header), ended, start, most
                 )
+            elif self._on_loop:
+                watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended)
             else:
                 try:
-                    self._workers.start(self._read, link, asyncio.get_running_loop())
+                    self._workers.start(self._read, link, deliver, loop)
                 except ThreadLimitError as error:
                     del self._links[uri]
                     link.sock.close()
@@ -425,8 +444,8 @@ class Subscription:
             host, port = _tcpros_address(answer, uri, self.topic)
         return await tcp.connect(host, port), f"{host}:{port}"
 
-    def _read(self, link: InLink, loop: asyncio.AbstractEventLoop) -> None:
-        deliver, header = self._deliver, link.header
+    def _read(self, link: InLink, deliver: Deliver, loop: asyncio.AbstractEventLoop) -> None:
+        header = link.header
 
         def on_frame(frame: Frame) -> None:
             link.received += 1

@@ -27,6 +27,7 @@ from minirospy.runtime.transport.sockets import (
     is_writable,
     may_busy_poll,
 )
+from minirospy.steps import Steps
 from minirospy.wire.framing import (
     CHUNK,
     LENGTH_BYTES,
@@ -41,9 +42,12 @@ from minirospy.wire.framing import (
     split_sizes,
 )
 
-__all__ = ["OutLink", "QueueSize", "ReaderSet", "read_frames", "watch_frames"]
+__all__ = ["OutLink", "QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
 _GATHER = 64
+_TURN_CHUNK = 4096
+"""Bytes that are received at a time, and kept for each connection, where frames are read in turns."""
+
 _DRAIN_BYTES = 64 * 1024 * 1024
 _CLAIM = 16 * 1024 * 1024
 """Largest receive, in bytes: a length is only a claim until the bytes arrive."""
@@ -392,6 +396,50 @@ def watch_frames(
             count = 0
         if not count:
             loop.remove_reader(sock)
+            sock.close()
+            on_end()
+
+    loop.add_reader(sock, readable)
+
+
+def watch_frames_in_turns(
+    loop: asyncio.AbstractEventLoop,
+    sock: socket.socket,
+    deliver: Callable[[memoryview], Steps[None]],
+    on_end: Callable[[], None],
+    start_steps: Callable[[Steps[None]], None],
+    most: int,
+) -> None:
+    """Read frames on the loop in steps, which ``start_steps`` runs in turns with those of other connections.
+
+    Frames of more than ``most`` bytes are left out.
+    """
+    reader = FrameReader(most, skips=True, chunk=_TURN_CHUNK)
+
+    def readable() -> None:
+        loop.remove_reader(sock)
+        start_steps(read())
+
+    def read() -> Steps[None]:
+        if sock.fileno() < 0:
+            # It was closed meanwhile.
+            return
+        skipped = reader.skipped
+        try:
+            count = sock.recv_into(reader.space())
+            for frame in reader.received(count):
+                yield from deliver(frame)
+        except (BlockingIOError, InterruptedError):
+            count = -1
+        except (OSError, WireError) as error:
+            _log.debug("connection ended: %s", error)
+            count = 0
+
+        if reader.skipped > skipped:
+            _log.debug("a message of more than %d bytes was left out", most)
+        if count:
+            loop.add_reader(sock, readable)
+        else:
             sock.close()
             on_end()
 

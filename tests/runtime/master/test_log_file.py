@@ -48,6 +48,19 @@ def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: py
     asyncio.run(scene())
 
 
+def test_much_text_is_written_before_the_time_is_up(tmp_path: Path) -> None:
+    async def scene() -> None:
+        file = LogFile(tmp_path / "rosout.log", 10_000_000, "rosout")
+        for _ in range(100):
+            file.text("x" * 999)
+        # Of 64 KiB of text one line is too much: each time there are 66 of them.
+        assert (tmp_path / "rosout.log").stat().st_size == 66 * 1000
+        file.close()
+        assert (tmp_path / "rosout.log").stat().st_size == 100 * 1000
+
+    asyncio.run(scene())
+
+
 def test_no_line_is_lost_if_several_threads_log(tmp_path: Path) -> None:
     file = LogFile(tmp_path / "master.log", 10_000_000, "master")
     stop = threading.Event()
