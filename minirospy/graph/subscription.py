@@ -7,8 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import count, islice
 
-__all__ = ["Connect", "Disconnect", "SubscriptionPlan"]
+__all__ = ["MOST_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
+
+MOST_PUBLISHERS = 1000
+"""Publishers of one topic that a node connects to."""
+
+_CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
+"""New publishers that are connected together, and the seconds between: else all that refuse would fail together, too."""
 
 _FIRST_DELAY = 0.1
 _LONGEST_DELAY = 8.0
@@ -43,15 +50,19 @@ class SubscriptionPlan:
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list: the full one, or with ``keep`` one that lacks some publishers that still exist."""
-        wanted = dict.fromkeys(uris)
+        """Apply the master's list: the full one, or with ``keep`` one that lacks some publishers that still exist.
+
+        Of a list of more than MOST_PUBLISHERS the others are ignored: anybody may send one.
+        """
+        wanted = dict.fromkeys(islice(uris, MOST_PUBLISHERS))
         if keep:
             wanted.update(dict.fromkeys(self._failures))
         gone = [uri for uri in self._failures if uri not in wanted]
         new = [uri for uri in wanted if uri not in self._failures or uri in self._refusals]
         self._refusals.clear()
         self._failures = {uri: self._failures.get(uri, 0) for uri in wanted}
-        return [*map(Disconnect, gone), *map(Connect, new)]
+        delays = (number // _CONNECTS_AT_ONCE * _CONNECT_PAUSE for number in count())
+        return [*map(Disconnect, gone), *map(Connect, new, delays)]
 
     def failures(self, uri: str) -> int:
         """Return how often in a row the link to ``uri`` has failed."""

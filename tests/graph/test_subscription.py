@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
+from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 
 
 def test_new_publishers_are_connected_and_lost_ones_left() -> None:
@@ -10,6 +10,22 @@ def test_new_publishers_are_connected_and_lost_ones_left() -> None:
     assert plan.publishers_changed(["http://a", "http://b"]) == [Connect("http://a"), Connect("http://b")]
     assert plan.publishers_changed(["http://b", "http://c"]) == [Disconnect("http://a"), Connect("http://c")]
     assert tuple(plan._failures) == ("http://b", "http://c")
+
+
+def test_a_list_of_too_many_publishers_is_cut() -> None:
+    plan = SubscriptionPlan()
+    uris = [f"http://{number}" for number in range(MOST_PUBLISHERS + 1)]
+    connects = plan.publishers_changed(uris)
+    assert [each.uri for each in connects] == uris[:-1]
+    assert plan.publishers_changed(uris) == []
+
+
+def test_many_new_publishers_are_not_connected_together() -> None:
+    plan = SubscriptionPlan()
+    delays = [
+        each.delay for each in plan.publishers_changed(map(str, range(250))) if isinstance(each, Connect)
+    ]
+    assert delays == [0.0] * 100 + [0.01] * 100 + [0.02] * 50
 
 
 def test_the_same_list_again_changes_nothing() -> None:
