@@ -47,6 +47,9 @@ Answer = list[object]
 _MAX_CHARACTERS = 4096
 """Of a name, a type or a URI."""
 
+_MOST_URIS = 20_000
+"""Of a list: to check them takes some milliseconds, in which a node answers nobody. No master has as many for a topic."""
+
 
 class CallRefused(MinirospyError):
     """An argument is not acceptable; the text is the answer's."""
@@ -248,6 +251,8 @@ def uris(value: object, name: str, caller_id: str) -> list[str]:
     """Return a list of URIs."""
     if not isinstance(value, list):
         raise CallRefused(f"ERROR: param [{name}] must be a list")
+    if len(value) > _MOST_URIS:
+        raise CallRefused(f"ERROR: param [{name}] has more than {_MOST_URIS} URIs")
     if not all(isinstance(uri, str) for uri in value):
         raise CallRefused(f"ERROR: param [{name}] must be a list of strings")
     for uri in value:

@@ -79,6 +79,7 @@ class Node:
         self._parameter_updates = InOrder(self.workers)
 
         self._readers = ReaderSet()
+        self._header_memory = tcp.HeaderMemory()
         self._rpc = AsyncRpcClient(same_host=environment.same_host)
         tables: Mapping[str, Mapping[str, Publication | Subscription | ServiceServer]] = {
             "Publisher": self.publications,
@@ -226,6 +227,7 @@ class Node:
             newest=newest,
             tcp_nodelay=tcp_nodelay,
             on_loop=on_loop,
+            header_memory=self._header_memory,
             this_host=self.this_host,
         )
 
@@ -307,7 +309,7 @@ class Node:
     async def _accept(self, sock: socket.socket, address: str) -> None:
         """Serve a peer that has connected: its header names a topic or service."""
         try:
-            fields = await tcp.receive_header(sock)
+            fields = await tcp.receive_header(sock, memory=self._header_memory)
         except (OSError, WireError):
             if not self._closed:
                 raise

@@ -14,10 +14,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import islice
 
 from minirospy.environment import split_uri
 from minirospy.errors import HandshakeRefused, RpcError, RpcUnreachable, ThreadLimitError, WireError
-from minirospy.graph.subscription import Connect, Disconnect, SubscriptionPlan
+from minirospy.graph.subscription import MOST_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
@@ -235,6 +236,7 @@ class Subscription:
         newest: int = 0,
         tcp_nodelay: bool = False,
         on_loop: bool = False,
+        header_memory: tcp.HeaderMemory | None = None,
         this_host: str = "",
     ) -> None:
         """``this_host``: what :func:`local.this_host` says, where publishers of this machine may be reached so."""
@@ -249,6 +251,7 @@ class Subscription:
         self._rpc = rpc
         self._workers = workers
         self._readers = readers
+        self._header_memory = header_memory
         self._on_loop = on_loop or isinstance(deliver, InTurns)
 
         self.lists = 0
@@ -276,7 +279,7 @@ class Subscription:
         if self._closed:
             return
         self.lists += 1
-        self._named = list(uris)
+        self._named = list(islice(uris, MOST_PUBLISHERS))
         for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
             if isinstance(action, Disconnect):
                 self._leave(action.uri)
@@ -423,7 +426,7 @@ class Subscription:
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
             await tcp.send_header(sock, fields)
-            header = await tcp.receive_header(sock)
+            header = await tcp.receive_header(sock, memory=self._header_memory)
             check_publisher(header, self.topic, self.type)
         except BaseException:
             sock.close()

@@ -24,6 +24,7 @@ from minirospy.wire.header import MAX_HEADER, Header, parse_header, serialize_he
 
 __all__ = [
     "MOST_HANDSHAKES",
+    "HeaderMemory",
     "Listener",
     "bind",
     "connect",
@@ -35,6 +36,10 @@ MOST_HANDSHAKES = 200
 """Handshakes under way at a time: one more ends the oldest, since a genuine one takes milliseconds."""
 
 _AT_HAND = 8192
+_SHORT_HEADER = 64 * 1024
+_MOST_LONG_HEADERS = 16 * 1024 * 1024
+"""Bytes of headers that are longer than that and incomplete, of all peers of a node."""
+
 _REFUSALS_LOGGED = 10
 _log = logging.getLogger(__name__)
 
@@ -81,13 +86,37 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
     raise last
 
 
-async def receive_header(sock: socket.socket, timeout: float = sockets.HANDSHAKE_SECONDS) -> Header:
-    """Return the peer's connection header. Raises WireError or OSError."""
+class HeaderMemory:
+    """The memory that long headers take while they are received, of many peers."""
+
+    def __init__(self, most: int = _MOST_LONG_HEADERS) -> None:
+        self.held = 0
+        """Bytes that are taken."""
+        self._most = most
+
+    def take(self, count: int) -> None:
+        """Take memory, to be returned by :meth:`free`. Raises WireError where it is too much."""
+        if self.held + count > self._most:
+            raise WireError("too many long connection headers are being received at the same time")
+        self.held += count
+
+    def free(self, count: int) -> None:
+        """Return memory."""
+        self.held -= count
+
+
+async def receive_header(
+    sock: socket.socket, timeout: float = sockets.HANDSHAKE_SECONDS, *, memory: HeaderMemory | None = None
+) -> Header:
+    """Return the peer's connection header. Raises WireError or OSError.
+
+    With ``memory``, a long header is refused where others take it all.
+    """
     at_hand = _header_at_hand(sock)
     if at_hand is not None:
         return at_hand
     with _time_limit("waiting for a connection header"):
-        return await asyncio.wait_for(_receive_header(sock), timeout)
+        return await asyncio.wait_for(_receive_header(sock, memory or HeaderMemory()), timeout)
 
 
 async def send_header(sock: socket.socket, fields: Header) -> None:
@@ -269,23 +298,32 @@ class _NothingSaidError(WireError):
     """The peer connected and disconnected."""
 
 
-async def _receive_header(sock: socket.socket) -> Header:
-    length = parse_length(await _receive_exactly(sock, LENGTH_BYTES, _NothingSaidError))
+async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
+    length = parse_length(await _receive_exactly(sock, LENGTH_BYTES, memory, _NothingSaidError))
     if length > MAX_HEADER:
         raise WireError(f"a connection header of {length} bytes is not TCPROS")
-    return parse_header(await _receive_exactly(sock, length))
+    return parse_header(await _receive_exactly(sock, length, memory))
 
 
-async def _receive_exactly(sock: socket.socket, count: int, nothing: type[WireError] = WireError) -> bytes:
+async def _receive_exactly(
+    sock: socket.socket, count: int, memory: HeaderMemory, nothing: type[WireError] = WireError
+) -> bytes:
     """``count`` bytes. Raises WireError, or ``nothing`` where not one came."""
     loop = asyncio.get_running_loop()
-    data = b""
-    while len(data) < count:
-        more = await loop.sock_recv(sock, count - len(data))
-        if not more:
-            raise (WireError if data else nothing)("the peer closed the connection during the handshake")
-        data += more
-    return data
+    data = bytearray()
+    taken = 0
+    try:
+        while len(data) < count:
+            more = await loop.sock_recv(sock, min(count - len(data), _SHORT_HEADER))
+            if not more:
+                raise (WireError if data else nothing)("the peer closed the connection during the handshake")
+            data += more
+            if len(data) > _SHORT_HEADER:
+                memory.take(len(more))
+                taken += len(more)
+        return bytes(data)
+    finally:
+        memory.free(taken)
 
 
 @contextlib.contextmanager

@@ -13,8 +13,10 @@ from typing import Any
 
 import pytest
 
+from minirospy.errors import WireError
 from minirospy.runtime.transport import sockets, tcp
 from minirospy.runtime.transport.loop import new_event_loop
+from minirospy.wire.header import serialize_header
 
 
 def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
@@ -190,6 +192,47 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
     assert lines[0].endswith("closed: it sent nothing, and 200 others are waiting")
     assert 10 < len(lines) < 30
     assert lines[-1].endswith(" more like the last ones")
+
+
+def test_long_headers_share_a_limited_memory() -> None:
+    """Who sends the start of a long header keeps memory; a header of ordinary length is accepted all the same."""
+
+    async def scene() -> None:
+        loop, memory = asyncio.get_running_loop(), tcp.HeaderMemory(300_000)
+        with contextlib.ExitStack() as stack:
+
+            def connect() -> tuple[socket.socket, socket.socket]:
+                one, other = socket.socketpair()
+                for sock in (one, other):
+                    sock.setblocking(False)
+                    stack.enter_context(sock)
+                return one, other
+
+            one, other = connect()
+            long = serialize_header({"message_definition": "x" * 400_000})
+            receiving = asyncio.ensure_future(tcp.receive_header(one, memory=memory))
+            await loop.sock_sendall(other, long[:200_000])
+            while memory.held < 200_000 - 2 * 65536:
+                await asyncio.sleep(0)
+
+            second, other_second = connect()
+            sending = asyncio.ensure_future(loop.sock_sendall(other_second, long))
+            with pytest.raises(WireError, match="too many long connection headers"):
+                await tcp.receive_header(second, memory=memory)
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+
+            third, other_third = connect()
+            short = {"topic": "/t", "message_definition": "x" * 20_000}
+            sending = asyncio.ensure_future(loop.sock_sendall(other_third, serialize_header(short)))
+            assert await tcp.receive_header(third, memory=memory) == short
+            await sending
+
+            receiving.cancel()
+            await asyncio.gather(receiving, return_exceptions=True)
+            assert memory.held == 0
+
+    run(scene)
 
 
 def test_closing_ends_handshakes_that_are_under_way() -> None:
