@@ -35,6 +35,8 @@ import psutil
 from attacks import ATTACKS, MIB, Target, called, silent_connections
 
 PERIOD = 0.02
+LONG = 0.5
+"""Seconds of a call whose cause is printed."""
 
 
 def waited(pid: int) -> tuple[float, float]:
@@ -43,6 +45,13 @@ def waited(pid: int) -> tuple[float, float]:
         ran, late, _ = Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()
         return int(ran) / 1e9, int(late) / 1e9
     return 0.0, 0.0
+
+
+def retransmissions(sock: socket.socket) -> int:
+    """Return how many segments the kernel has sent again on a connection: tcpi_total_retrans of Linux; else 0."""
+    if sys.platform != "linux":
+        return 0
+    return int.from_bytes(sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 104)[100:104], sys.byteorder)
 
 
 # --- the good client, the nodes, the control: separate programs
@@ -61,9 +70,17 @@ def run_client(port: int, server: int) -> None:
         answered = True
         try:
             with socket.create_connection(("127.0.0.1", port), 120) as sock:
+                connected = time.monotonic()
                 sock.settimeout(120)
                 sock.sendall(request)
                 answer = sock.recv(65536)
+                if time.monotonic() - start > LONG:
+                    print(
+                        f"port {port}: a getPid took {time.monotonic() - start:.1f} s, {connected - start:.1f} s of them "
+                        f"to connect; the kernel sent {retransmissions(sock)} segments again",
+                        file=sys.stderr,
+                        flush=True,
+                    )
                 answered = b"200 OK" in answer
                 if not answered:
                     print(f"port {port}: {answer[:80]!r} after a getPid", file=sys.stderr, flush=True)
