@@ -332,4 +332,4 @@ def test_connections_are_accepted_for_some_milliseconds_at_a_time(monkeypatch: p
 
     monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
     accepted, _ = asyncio.run(scene())
-    assert accepted == 6
+    assert accepted == 15
