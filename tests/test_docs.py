@@ -30,7 +30,7 @@ def test_every_program_on_a_page_has_its_output() -> None:
 @pytest.mark.parametrize(("code", "printed"), PROGRAMS)
 def test_program(code: str, printed: str, master: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-X", "dev", "-c", code], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-X", "dev", "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 0, done.stderr
     expected = re.escape(printed).replace(r"\.\.\.", ".*")
