@@ -117,6 +117,15 @@ def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
     return found
 
 
+def is_waiting(thread: threading.Thread) -> bool:
+    """Return whether a thread waits for a condition or an event, as in rospy.sleep() on simulated time."""
+    frame, names = sys._current_frames().get(thread.ident or 0), set()
+    while frame:
+        names.add(frame.f_code.co_name)
+        frame = frame.f_back
+    return "wait" in names
+
+
 def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> bool:
     """Return whether a condition holds within some time."""
     waiting = threading.Event()

@@ -12,7 +12,7 @@ inside = threading.Barrier(5)
 
 
 def together(request):
-    inside.wait(5)
+    inside.wait(30)
     return SetBoolResponse(True, "all five were in")
 
 
@@ -43,7 +43,7 @@ show("one proxy, five threads", answers)
 
 def slow(request):
     if request.data:
-        gate.wait(10)
+        gate.wait(30)
     return SetBoolResponse(request.data, "slow")
 
 

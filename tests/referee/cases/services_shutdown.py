@@ -11,7 +11,7 @@ rospy.init_node("server")
 gate = threading.Event()
 def handle(request):
     print("called", flush=True)
-    gate.wait(5)
+    gate.wait(30)
     return TriggerResponse(True, "late")
 service = rospy.Service("/slow", Trigger, handle)
 print("ready", flush=True)

@@ -51,8 +51,7 @@ def later():
 services = []
 thread = threading.Thread(target=later)
 thread.start()
-started.set()
-timed("late", lambda: rospy.wait_for_service("late", 60), 0.4, 30)
+timed("late", lambda: started.set() or rospy.wait_for_service("late", 60), 0.4, 30)
 thread.join()
 rosgraph.Master("/other").registerService("/dead", "rosrpc://localhost:1", "http://localhost:1/")
 timed("registered, not running", lambda: rospy.wait_for_service("dead", 0.5), 0.5, 30)

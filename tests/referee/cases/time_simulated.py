@@ -3,7 +3,7 @@
 import threading
 
 import rospy
-from referee import Other, eventually, outcome, show
+from referee import Other, eventually, is_waiting, outcome, show
 
 CLOCK = """
 import rospy
@@ -37,7 +37,7 @@ class Sleeper(threading.Thread):
         super().__init__(daemon=True)
         self.label, self.sleep, self.outcome = label, sleep, None
         self.start()
-        self.join(0.2)
+        eventually(lambda: is_waiting(self) or not self.is_alive())
 
     def run(self):
         try:
@@ -80,7 +80,7 @@ sleepers = [
 ]
 timer = rospy.Timer(rospy.Duration(1), events.append)
 timer_again = rospy.Timer(rospy.Duration(1), again.append, reset=True)
-threading.Event().wait(0.3)
+eventually(lambda: is_waiting(timer) and is_waiting(timer_again))
 at(5)
 for sleeper in sleepers:
     sleeper.end()
@@ -88,7 +88,7 @@ timer.join(30)
 show("Timer", timer.is_alive(), len(events), errors)
 show("Timer with reset", timer_again.is_alive(), eventually(lambda: len(again) == 1))
 for count, seconds in enumerate((6, 7, 8.5), 2):
-    threading.Event().wait(0.1)
+    eventually(lambda: is_waiting(timer_again))
     at(seconds)
     show("  ", eventually(lambda count=count: len(again) == count))
 timer_again.shutdown()

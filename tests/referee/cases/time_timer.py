@@ -95,12 +95,22 @@ eventually(lambda: len(slow) == 3)
 timer.shutdown()
 timer.join(30)
 show("one call at a time", all((b - a).to_sec() > 0.24 for a, b in itertools.pairwise(slow)))
-calls.clear()
-timer = rospy.Timer(period=rospy.Duration(0.2), callback=calls.append, oneshot=False, reset=True)
-timer.shutdown()
-time.sleep(0.4)
+
+
+timers = []
+
+
+def shut_down_early():
+    calls.clear()
+    timers.append(rospy.Timer(period=rospy.Duration(0.2), callback=calls.append, oneshot=False, reset=True))
+    timers[-1].shutdown()
+    time.sleep(0.4)
+    return (not calls,)
+
+
+of_ten_looks(shut_down_early)
 show("shut down before the first", calls)
-outcome("again", timer.shutdown)
+outcome("again", timers[-1].shutdown)
 forever = rospy.Timer(rospy.Duration(0.01), calls.append)
 eventually(lambda: calls)
 rospy.signal_shutdown("")
