@@ -22,6 +22,7 @@ from turtlesim.msg import Color, Pose
 from turtlesim.srv import Kill, SetPen, Spawn, TeleportAbsolute, TeleportRelative
 
 from minirospy import Node
+from minirospy.aio.topics import Publisher
 from minirospy.errors import ServiceException
 from minirospy.workspace.packages import Packages
 from tests.robots.conftest import SECONDS, Start, end
@@ -43,6 +44,17 @@ async def until(node: Node, topic: str, kind: type, is_right: Callable[[object],
     raise AssertionError
 
 
+async def driven(
+    node: Node, commands: Publisher[Twist], twist: Twist, topic: str, is_right: Callable[[object], bool]
+) -> object:
+    """Publish a command until a pose is right: a turtle follows it for a second, and poses may come later."""
+    following = asyncio.ensure_future(until(node, topic, Pose, is_right))
+    while not following.done():
+        await commands.publish(twist)
+        await asyncio.wait({following}, timeout=0.2)
+    return following.result()
+
+
 def test_turtle_is_driven_and_drawn(start: Start) -> None:
     process = start("turtlesim", "turtlesim_node", "_background_r:=300")
 
@@ -58,8 +70,7 @@ def test_turtle_is_driven_and_drawn(start: Start) -> None:
         await commands.wait_for_subscribers()
         twist = Twist()
         twist.linear.x = 2.0
-        await commands.publish(twist)
-        moving = await until(node, "turtle1/pose", Pose, lambda pose: pose.linear_velocity)
+        moving = await driven(node, commands, twist, "turtle1/pose", lambda pose: pose.linear_velocity)
         assert moving.linear_velocity == 2.0
         await until(node, "turtle1/color_sensor", Color, lambda color: color == Color(255, 1, 2))
         await until(node, "turtle1/pose", Pose, lambda pose: not pose.linear_velocity)
@@ -136,8 +147,7 @@ def test_velocity_that_is_not_finite_is_one_line(start: Start) -> None:
         await commands.publish(twist)
         await commands.wait_for_subscribers()
         twist.linear.x = 1.0
-        await commands.publish(twist)
-        await until(node, "turtle1/pose", Pose, lambda pose: pose.linear_velocity == 1.0)
+        await driven(node, commands, twist, "turtle1/pose", lambda pose: pose.linear_velocity == 1.0)
 
     run(body)
     end(process)
@@ -169,14 +179,9 @@ def test_mimic_copies_by_remapped_namespaces(start: Start) -> None:
         await commands.wait_for_subscribers()
         twist = Twist()
         twist.linear.x, twist.angular.z = 1.5, -0.5
-        following = asyncio.ensure_future(
-            until(node, "turtle2/pose", Pose, lambda pose: pose.linear_velocity == 1.5)
-        )
-        while not following.done():
-            # Again until mimic is connected to both turtles.
-            await commands.publish(twist)
-            await asyncio.wait({following}, timeout=0.2)
-        assert following.result().angular_velocity == -0.5  # type: ignore[attr-defined]
+        # Again until mimic is connected to both turtles.
+        copied = await driven(node, commands, twist, "turtle2/pose", lambda pose: pose.linear_velocity == 1.5)
+        assert copied.angular_velocity == -0.5  # type: ignore[attr-defined]
 
     run(body)
 
