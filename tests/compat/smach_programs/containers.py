@@ -286,8 +286,12 @@ for chosen in ("left", None):
     say(cc.execute())
 
 
+slow_runs = threading.Event()
+
+
 def waits(state):
     def run(ud):
+        slow_runs.set()
         for _ in range(500):
             if state[0].preempt_requested():
                 state[0].service_preempt()
@@ -322,11 +326,9 @@ with outer:
     smach.StateMachine.add("INNER", inner)
 results = []
 thread = threading.Thread(target=lambda: results.append(outer.execute()))
-slow_started = threading.Event()
-inner.register_start_cb(lambda *arguments: slow_started.set())
+slow_runs.clear()
 thread.start()
-slow_started.wait(10)
-threading.Event().wait(0.2)
+slow_runs.wait(30)
 outer.request_preempt()
 thread.join(20)
 say(results, outer.preempt_requested(), inner.preempt_requested(), slow.preempt_requested())

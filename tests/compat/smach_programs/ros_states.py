@@ -247,10 +247,16 @@ wrapped = smach.StateMachine(
 )
 
 
+works = threading.Event()
+
+
 def work(ud):
     say("goal", ud.action_goal.order, ud.order)
     # The client must know its goal before the result comes.
-    threading.Event().wait(0.2)
+    while client.gh is None:
+        threading.Event().wait(0.01)
+    if ud.order > 50:
+        works.set()
     ud.sequence = [ud.order]
     for _ in range(500 if ud.order > 50 else 0):
         if worker.preempt_requested():
@@ -287,7 +293,7 @@ for order in (5, -1, -9):
     state = client.send_goal_and_wait(FibonacciGoal(order), rospy.Duration(20))
     say("wrapped", order, state, client.get_result().sequence)
 client.send_goal(FibonacciGoal(70))
-pause.wait(0.5)
+works.wait(30)
 client.cancel_goal()
 say("wrapped", client.wait_for_result(rospy.Duration(20)), client.get_state(), client.get_result().sequence)
 
