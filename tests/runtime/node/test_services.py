@@ -31,7 +31,7 @@ class Scene(NamedTuple):
     called: threading.Event
 
     def run(self, coroutine: Coroutine[Any, Any, Any]) -> Any:
-        return self.loop.run(coroutine, 10.0)
+        return self.loop.run(coroutine, 30.0)
 
     def client(self, service: str, *, persistent: bool = False, md5sum: str = TYPE.md5sum) -> ServiceClient:
         return ServiceClient(self.node.service_uri, service, md5sum, "/test", persistent=persistent)
@@ -54,7 +54,7 @@ def scene(master: str) -> Iterator[Scene]:
     async def handle_on_loop(request: bytes, _: object) -> bytes:
         if request == b"wait":
             called.set()
-            await asyncio.to_thread(gate.wait, 10)
+            await asyncio.to_thread(gate.wait, 30)
         return handle(memoryview(request), None)
 
     async def start() -> None:
