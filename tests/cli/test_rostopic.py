@@ -162,15 +162,14 @@ def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
 
 
 def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 1.0)
     words = ("std_msgs/Bool", "data: True")
     assert command("rostopic", "pub", "-1", "/listen", *words).out == (
-        "publishing and latching message for 1.0 seconds\n"
+        "publishing and latching message for 3.0 seconds\n"
     )
-    assert robot.heard == [b"\x01"]
+    _until(lambda: robot.heard == [b"\x01"])
     verbose = command("rostopic", "pub", "/listen", "-v", "std_msgs/Bool", "False", "--once")
-    assert verbose.out == "publishing and latching [data: False] for 1.0 seconds\n"
-    assert robot.heard == [b"\x01", b"\x00"]
+    assert verbose.out == "publishing and latching [data: False] for 3.0 seconds\n"
+    _until(lambda: robot.heard == [b"\x01", b"\x00"])
     monkeypatch.setattr("minirospy.cli.ros.rostopic_pub._LATCH_SECONDS", 0.1)
     for words in (
         ("geometry_msgs/Point", "1", "-2.5", "-3"),
