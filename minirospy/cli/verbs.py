@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from minirospy.cli.parser import CommandLineError, Misuse, Parser
 from minirospy.errors import MinirospyError, UsageError, did_you_mean
 from minirospy.names import parse_arguments
 
-__all__ = ["Command", "Family", "HelpStatus", "Verb"]
+__all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
 
 
 class Command(NamedTuple):
@@ -55,6 +56,16 @@ class Verb(NamedTuple):
     parser: Callable[[], Parser]
     body: Callable[..., int | None]
     wording: Wording = MappingProxyType({})
+
+
+def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB") -> Verb:
+    """Return a verb that is in another module, imported when the verb is used: the others of its family start without it."""
+
+    def verb() -> Verb:
+        found: Verb = getattr(import_module(module), attribute)
+        return found
+
+    return Verb(name, summary, lambda: verb().parser(), lambda **arguments: verb().body(**arguments))
 
 
 class HelpStatus(NamedTuple):

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 from minirospy.cli.command import RosText, WordedError, tool_node, warn_unpublished
 from minirospy.cli.parser import Misuse, Parser, integer
-from minirospy.cli.ros import rostopic_pub, rostopic_rates
-from minirospy.cli.verbs import Family, HelpStatus, Verb
+from minirospy.cli.verbs import Family, HelpStatus, Verb, deferred_verb
 from minirospy.errors import NotFoundError
 from minirospy.introspect import topics
 from minirospy.introspect.graph import Graph
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILY", "main"]
 
+_RATES = "minirospy.cli.ros.rostopic_rates"
 _CLEAR_SCREEN = "\033[2J\033[;H"
 
 
@@ -311,11 +311,11 @@ FAMILY = Family(
     "rostopic",
     "rostopic is a command-line tool for printing information about ROS Topics.",
     (
-        rostopic_rates.BW,
-        rostopic_rates.DELAY,
+        deferred_verb("bw", "display bandwidth used by topic", _RATES, "BW"),
+        deferred_verb("delay", "display delay of topic from timestamp in header", _RATES, "DELAY"),
         Verb("echo", "print messages to screen", _echo_parser, _echo),
         Verb("find", "find topics by type", _find_parser, _find),
-        rostopic_rates.HZ,
+        deferred_verb("hz", "display publishing rate of topic    ", _RATES, "HZ"),
         Verb(
             "info",
             "print information about active topic",
@@ -324,7 +324,7 @@ FAMILY = Family(
             {"topic": RosText("ERROR: Unknown topic {name}")},
         ),
         Verb("list", "list active topics", _list_parser, _list),
-        rostopic_pub.VERB,
+        deferred_verb("pub", "publish data to topic", "minirospy.cli.ros.rostopic_pub"),
         Verb("type", "print topic or field type", _type_parser, _type),
     ),
     "Type rostopic <command> -h for more detailed usage, e.g. 'rostopic echo -h'",
