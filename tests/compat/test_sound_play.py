@@ -275,6 +275,7 @@ def test_node_without_players_says_what_to_install(tmp_path: Path, master: str) 
         node.terminate()
         _, said = node.communicate(timeout=30)
     assert done.stdout.startswith("4 no program that says texts is installed: one of espeak-ng,"), done.stderr
+    assert ("powershell" in done.stdout + said) == (sys.platform == "win32")
     assert "no program that plays sounds is installed: one of paplay," in said
 
 

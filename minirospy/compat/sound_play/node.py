@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 import tempfile
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -24,7 +26,14 @@ from minirospy import client as rospy
 from minirospy.actionlib.simple_server import SimpleActionServer
 from minirospy.compat.rospkg.common import ResourceNotFound
 from minirospy.compat.rospkg.rospack import RosPack
-from minirospy.compat.sound_play.players import PLAYERS, SPEAKERS, Command, play_command, say_command
+from minirospy.compat.sound_play.players import (
+    PLAYERS,
+    SPEAKERS,
+    Command,
+    installable,
+    play_command,
+    say_command,
+)
 from minirospy.compat.sound_play.tones import BUILTIN, wav_of
 
 __all__ = ["SoundError", "SoundNode", "main"]
@@ -138,11 +147,11 @@ class SoundNode:
         if request.sound == SoundRequest.SAY:
             command = say_command(request.arg, request.arg2 or self._default_voice, volume, shutil.which)
             if command is None:
-                raise SoundError(f"no program that says texts is installed: one of {', '.join(SPEAKERS)}")
+                raise SoundError(_missing(SPEAKERS, "says texts"))
             return command
         command = play_command(str(self._file(request)), volume, shutil.which)
         if command is None:
-            raise SoundError(f"no program that plays sounds is installed: one of {', '.join(PLAYERS)}")
+            raise SoundError(_missing(PLAYERS, "plays sounds"))
         return command
 
     def _file(self, request: SoundRequest) -> Path:
@@ -216,6 +225,10 @@ def _time_since(start: rospy.Time) -> rospy.Time:
     return rospy.Time.from_sec(max(0.0, (rospy.Time.now() - start).to_sec()))
 
 
+def _missing(programs: Iterable[str], what: str) -> str:
+    return f"no program that {what} is installed: one of {', '.join(installable(programs, sys.platform))}"
+
+
 def main() -> int:
     """Run the node; return the exit status."""
     rospy.init_node("sound_play")
@@ -223,7 +236,7 @@ def main() -> int:
         node = SoundNode(Path(folder))
         for programs, what in ((PLAYERS, "plays sounds"), (SPEAKERS, "says texts")):
             if not any(map(shutil.which, programs)):
-                rospy.logwarn(f"no program that {what} is installed: one of {', '.join(programs)}")
+                rospy.logwarn(_missing(programs, what))
         rospy.loginfo("sound_play node is ready to play sound")
         try:
             while not rospy.is_shutdown():

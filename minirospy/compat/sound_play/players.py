@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-__all__ = ["PLAYERS", "SPEAKERS", "Command", "play_command", "say_command"]
+__all__ = ["PLAYERS", "SPEAKERS", "Command", "installable", "play_command", "say_command"]
 
 Which = Callable[[str], "str | None"]
 
@@ -55,6 +55,8 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
 }
 """Programs that say a text, in order of preference."""
 
+_ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
+
 
 def _espeak(voice: str, volume: float) -> list[str]:
     # Names such as voice_kal_diphone are festival's.
@@ -64,6 +66,11 @@ def _espeak(voice: str, volume: float) -> list[str]:
 
 def _festival(voice: str) -> list[str]:
     return [f"({voice})"] if voice.startswith("voice_") and voice.replace("_", "").isalnum() else []
+
+
+def installable(programs: Iterable[str], platform: str) -> list[str]:
+    """Return which programs can be installed on a platform (``sys.platform``)."""
+    return [name for name in programs if _ONLY_ON.get(name, platform) == platform]
 
 
 def play_command(file: str, volume: float, which: Which) -> Command | None:
