@@ -176,6 +176,70 @@ def test_driver_saves_what_its_service_gets(master: str, tmp_path: Path) -> None
     assert (found[0], found[1].width, found[1].K[0]) == ("front", 4, 1.5)
 
 
+ZOOM = """
+import sys, rospy
+from camera_info_manager import ApproximateZoomCameraInfoManager, CameraInfoError, InterpolatingZoomCameraInfoManager
+rospy.init_node("driver")
+def show(info):
+    print([round(info.K[at], 3) for at in (0, 2, 4, 5, 8)], info.width, info.height, [round(each, 6) for each in info.D])
+def attempt(call, *args):
+    try:
+        call(*args)
+    except CameraInfoError as error:
+        print(type(error).__name__, error)
+with ApproximateZoomCameraInfoManager(2.7, 48, 720, 576, 1, 9999, "front", sys.argv[1] + "1.yaml", "a") as manager:
+    manager.set_zoom(5)
+    attempt(manager.getCameraInfo)
+    manager.loadCameraInfo()
+    for zoom in (1, 5000, 9999):
+        manager.set_zoom(zoom)
+        show(manager.getCameraInfo())
+    manager.set_resolution(360, 288)
+    show(manager.getCameraInfo())
+    attempt(manager.set_zoom, 0)
+template = sys.argv[1] + "%d.yaml"
+with InterpolatingZoomCameraInfoManager(template, [1, 9], "front", template % 1, "b") as manager:
+    attempt(manager.set_zoom, 1)
+    manager.loadCameraInfo()
+    for zoom in (1, 3, 5, 9):
+        manager.set_zoom(zoom)
+        show(manager.getCameraInfo())
+for template, levels in ((template, [1]), ("package://no_such_package/%d.yaml", [1, 9])):
+    with InterpolatingZoomCameraInfoManager(template, levels, "front", sys.argv[1] + "1.yaml", "c") as manager:
+        attempt(manager.loadCameraInfo)
+"""
+
+
+def test_zoom_changes_the_calibration(master: str, tmp_path: Path) -> None:
+    for level, focal_length in (("1", 500.0), ("9", 900.0)):
+        info = CameraInfo(width=640, height=480, distortion_model="plumb_bob", D=[focal_length / 1000])
+        info.K = [focal_length, 0.0, 320.0, 0.0, focal_length, 240.0, 0.0, 0.0, 1.0]
+        assert writeCalibration(str(tmp_path / f"{level}.yaml"), "front", info)
+    done = subprocess.run(
+        [sys.executable, "-c", ZOOM, f"{tmp_path.as_uri()}/"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    # As ROS's package computes them, but for zoom 3, where it takes three quarters of the farther calibration.
+    assert [line for line in done.stdout.splitlines() if not line.startswith("[INFO]")] == [
+        "CameraInfoMissingError Calibration missing, loadCameraInfo() needed.",
+        "[808.573, 360.0, 827.023, 288.0, 1.0] 720 576 [0.5]",
+        "[1600.702, 360.0, 1610.31, 288.0, 1.0] 720 576 [0.5]",
+        "[15276.047, 360.0, 15277.065, 288.0, 1.0] 720 576 [0.5]",
+        "[7638.023, 180.0, 7638.532, 144.0, 1.0] 360 288 [0.5]",
+        "CameraInfoError Zoom got outside the allowed range",
+        "CameraInfoMissingError Calibration missing, loadCameraInfo() needed.",
+        "[500.0, 320.0, 500.0, 240.0, 1.0] 640 480 [0.5]",
+        "[600.0, 320.0, 600.0, 240.0, 1.0] 640 480 [0.6]",
+        "[700.0, 320.0, 700.0, 240.0, 1.0] 640 480 [0.7]",
+        "[900.0, 320.0, 900.0, 240.0, 1.0] 640 480 [0.9]",
+        "CameraInfoError Interpolating zoom camera info manager needs at least two calibrations to exist.",
+        "CameraInfoMissingError Calibration package missing.",
+    ], done.stderr
+
+
 def test_calibration_is_missing_until_it_is_loaded() -> None:
     manager = CameraInfoManager.__new__(CameraInfoManager)
     manager.camera_info = None

@@ -12,11 +12,19 @@ from minirospy.compat.camera_info_manager.camera_info_manager import (
     saveCalibration,
     saveCalibrationFile,
 )
+from minirospy.compat.camera_info_manager.zoom_camera_info_manager import (
+    ApproximateZoomCameraInfoManager,
+    InterpolatingZoomCameraInfoManager,
+    ZoomCameraInfoManager,
+)
 
 __all__ = [
+    "ApproximateZoomCameraInfoManager",
     "CameraInfoError",
     "CameraInfoManager",
     "CameraInfoMissingError",
+    "InterpolatingZoomCameraInfoManager",
+    "ZoomCameraInfoManager",
     "genCameraName",
     "getPackageFileName",
     "loadCalibrationFile",

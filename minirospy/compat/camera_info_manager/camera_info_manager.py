@@ -29,6 +29,7 @@ __all__ = [
     "URL_invalid",
     "URL_package",
     "default_camera_info_url",
+    "filename_of",
     "genCameraName",
     "getPackageFileName",
     "loadCalibrationFile",
@@ -87,7 +88,7 @@ class CameraInfoManager:
 
     def loadCameraInfo(self) -> None:
         """Load the calibration; an empty one where the file is missing. What is wrong with it is logged."""
-        filename = _filename(self.url, self.cname)
+        filename = filename_of(self.url, self.cname)
         if filename is not None:
             self.camera_info = loadCalibrationFile(filename, self.cname)
 
@@ -177,7 +178,7 @@ def loadCalibrationFile(filename: str, cname: str) -> CameraInfo:
 
 def saveCalibration(new_info: CameraInfo, url: str, cname: str) -> bool:
     """Save a calibration where a URL points to; return False, with the reason logged, where it cannot be saved."""
-    filename = _filename(url, cname)
+    filename = filename_of(url, cname)
     return filename is not None and saveCalibrationFile(new_info, filename, cname)
 
 
@@ -187,7 +188,7 @@ def saveCalibrationFile(ci: CameraInfo, filename: str, cname: str) -> bool:
     return writeCalibration(filename, cname, ci)
 
 
-def _filename(url: str, cname: str) -> str | None:
+def filename_of(url: str, cname: str) -> str | None:
     """Return the path that a URL points to; None, with the reason logged, where it points to none."""
     resolved = resolveURL(url or default_camera_info_url, cname)
     kind = parseURL(resolved)

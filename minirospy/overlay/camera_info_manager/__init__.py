@@ -1,6 +1,7 @@
 """camera_info_manager, provided by minirospy. Source: http://wiki.ros.org/camera_info_manager_py."""
 
 from camera_info_manager import camera_info_manager as camera_info_manager
+from camera_info_manager import zoom_camera_info_manager as zoom_camera_info_manager
 from minirospy.compat.camera_info_manager.camera_info_manager import (
     CameraInfoError,
     CameraInfoManager,
@@ -13,11 +14,19 @@ from minirospy.compat.camera_info_manager.camera_info_manager import (
     saveCalibration,
     saveCalibrationFile,
 )
+from minirospy.compat.camera_info_manager.zoom_camera_info_manager import (
+    ApproximateZoomCameraInfoManager,
+    InterpolatingZoomCameraInfoManager,
+    ZoomCameraInfoManager,
+)
 
 __all__ = [
+    "ApproximateZoomCameraInfoManager",
     "CameraInfoError",
     "CameraInfoManager",
     "CameraInfoMissingError",
+    "InterpolatingZoomCameraInfoManager",
+    "ZoomCameraInfoManager",
     "genCameraName",
     "getPackageFileName",
     "loadCalibrationFile",
