@@ -6,6 +6,8 @@ import os
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from tests.interop.conftest import REAL_PYTHON, environment
 
 DRIVE = Path(__file__).parents[1] / "topic_tools" / "drive.py"
@@ -25,3 +27,24 @@ def test_real_programs_pass_on_what_is_recorded(real_master: str) -> None:
     if os.environ.get("RECORD"):
         recorded.write_text(done.stdout, encoding="utf-8")
     assert done.stdout == recorded.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "printed"),
+    [
+        ((), ["subscribed", "word", "unsubscribed"] * 2),
+        (("_lazy:=false",), ["subscribed", "word", "word"]),
+    ],
+)
+def test_lazy_program_prints_the_same_under_ros(
+    real_master: str, words: tuple[str, ...], printed: list[str]
+) -> None:
+    done = subprocess.run(
+        [REAL_PYTHON, str(DRIVE.with_name("lazy.py")), *words],
+        env=environment(real_master, "rospy"),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout.split() == printed, done.stderr
