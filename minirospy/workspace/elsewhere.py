@@ -108,7 +108,6 @@ _CPP = {
     "eigen_conversions": "a C++ library",
     "pluginlib": "plug-ins of C++ programs",
     "class_loader": "plug-ins of C++ programs",
-    "robot_pose_publisher": "a node in C++",
     "rviz": "a window in three dimensions, in C++",
     "spacenav_node": "an input device's driver, in C++",
     "twist_mux": "a node in C++",
@@ -121,7 +120,6 @@ _CPP = {
 
 _MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
 _INSTEAD = {
-    "robot_pose_publisher": "`rosrun tf tf_echo map base_link` prints the pose that it publishes",
     "twist_mux": _MUX,
     "yocs_cmd_vel_mux": _MUX,
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",

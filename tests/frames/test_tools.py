@@ -335,3 +335,26 @@ def test_angles_make_the_same_rotation(angles: tuple[float, float, float], read:
     rotation = quaternion_from_rpy(*angles)
     again = quaternion_from_rpy(*read(rotation))
     assert abs(sum(a * b for a, b in zip(rotation, again, strict=True))) == pytest.approx(1)
+
+
+@pytest.mark.usefixtures("frames")
+@pytest.mark.parametrize(("stamped", "kind"), [("true", "PoseStamped"), ("false", "Pose")])
+def test_pose_of_the_robot_is_published(start: Start, stamped: str, kind: str) -> None:
+    parameters = f"_map_frame:=/a _base_frame:=c _publish_frequency:=50 _is_stamped:={stamped}"
+    start("robot_pose_publisher", "robot_pose_publisher", *words(parameters))
+    code = (
+        "import rospy; from geometry_msgs.msg import Pose, PoseStamped; rospy.init_node('reader'); "
+        f"found = rospy.wait_for_message('robot_pose', {kind}, {SECONDS}); "
+        "pose = getattr(found, 'pose', found); print("
+        "[round(each, 3) for each in (pose.position.x, pose.position.y, pose.orientation.w)], "
+        "getattr(getattr(found, 'header', None), 'frame_id', None))"
+    )
+    frame = "/a" if stamped == "true" else None
+    assert python(code) == f"[1.425, 2.232, 0.962] {frame}\n"
+
+
+def test_pose_at_no_frequency_is_refused(start: Start) -> None:
+    program = start("robot_pose_publisher", "robot_pose_publisher", "_publish_frequency:=0")
+    _, errors = program.communicate(timeout=SECONDS)
+    assert program.returncode == 1
+    assert "~publish_frequency is 0: it is a number of messages a second" in errors
