@@ -94,11 +94,11 @@ class ThrottledLogFunction(Protocol):
         """Log, but from this place in the code at most once in ``period`` seconds."""
 
 
-def _logger(name: str | None) -> logging.Logger:
+def logger_of(name: str | None) -> logging.Logger:
     return logging.getLogger(f"rosout.{name}") if name else _rosout
 
 
-def _write(
+def write(
     logger: logging.Logger,
     level: int,
     frame: FrameType,
@@ -135,9 +135,9 @@ def _write(
 
 def _log_function(level: int, name: str) -> LogFunction:
     def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
-        logger = _logger(logger_name)
+        logger = logger_of(logger_name)
         if logger.isEnabledFor(level):
-            _write(logger, level, sys._getframe(1), msg, args, **kwargs)
+            write(logger, level, sys._getframe(1), msg, args, **kwargs)
 
     return _named(log, name, f"Log ``msg % args`` at level {SEVERITIES[level]}.")
 
@@ -178,16 +178,17 @@ class _Places:
         return True
 
 
-_places = _Places()
+places = _Places()
+"""Which places of the program have logged."""
 
 
 def _once_function(level: int, name: str) -> LogFunction:
     def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
-        logger = _logger(logger_name)
+        logger = logger_of(logger_name)
         if logger.isEnabledFor(level):
             frame = sys._getframe(1)
-            if _places.is_first(frame):
-                _write(logger, level, frame, msg, args, **kwargs)
+            if places.is_first(frame):
+                write(logger, level, frame, msg, args, **kwargs)
 
     return _named(log, name, f"Log at level {SEVERITIES[level]}, from this place in the code only once.")
 
@@ -200,16 +201,16 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         logger_name: str | None = None,
         **kwargs: Unpack[_Keywords],
     ) -> None:
-        logger = _logger(logger_name)
+        logger = logger_of(logger_name)
         if not logger.isEnabledFor(level):
             return
         frame = sys._getframe(1)
         # A period of 0 is none: then the text alone decides, or nothing.
-        due = _places.is_due(frame, period) if period else not identical
+        due = places.is_due(frame, period) if period else not identical
         if identical:
-            due = _places.is_new(frame, msg) or due
+            due = places.is_new(frame, msg) or due
         if due:
-            _write(logger, level, frame, msg, args, **kwargs)
+            write(logger, level, frame, msg, args, **kwargs)
 
     what = "the same text " if identical else ""
     return _named(log, name, f"Log at level {SEVERITIES[level]}, {what}at most once in ``period`` seconds.")

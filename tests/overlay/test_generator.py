@@ -9,6 +9,7 @@ from pathlib import Path
 import genmsg.command_line
 import genpy.generate_initpy
 import genpy.generator
+import genpy.genpy_main
 import pytest
 
 from minirospy.idl.own_packages import own_definitions
@@ -72,3 +73,45 @@ def test_include_path_without_a_package_is_kept_apart() -> None:
         "p": ["/b", "/c"],
         "": ["/d"],
     }
+
+
+def test_command_line_generates(tmp_path: Path, search_path: dict[str, list[str]]) -> None:
+    out = str(tmp_path / "out" / "msg")
+    includes = [word for name, folders in search_path.items() for word in ("-I", f"{name}:{folders[0]}")]
+    words = ["genmsg_py.py", "-p", "made_here", "-o", out, *includes, str(tmp_path / "in" / "A.msg")]
+    generator = genpy.generator.MsgGenerator()
+    with pytest.raises(SystemExit) as done:
+        genpy.genpy_main.genmain(words, "genmsg_py.py", generator)
+    assert done.value.code == 0
+    assert Path(out, "_A.py").is_file()
+
+    with pytest.raises(SystemExit) as done:
+        genpy.genpy_main.genmain(["genmsg_py.py", "--initpy", "-o", out], "genmsg_py.py", generator)
+    assert done.value.code == 0
+    assert Path(out, "__init__.py").read_text() == "from ._A import *\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [
+        (["-p", "made_here", "-o", "out"], 2, "please specify args"),
+        (["--initpy"], 2, "Missing args"),
+        (["A.msg"], 2, "-p PACKAGE and -o FOLDER are needed"),
+        (["-p", "made_here", "-o", "{file}", "-I", "made_here:.", "A.msg"], 3, "ERROR:"),
+    ],
+)
+def test_command_line_refuses(
+    words: list[str],
+    status: int,
+    text: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    words = ["genmsg_py.py", *(word.replace("{file}", "file") for word in words)]
+    with pytest.raises(SystemExit) as done:
+        genpy.genpy_main.genmain(words, "genmsg_py.py", genpy.generator.MsgGenerator())
+    assert done.value.code == status
+    assert text in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,8 @@ import rosmsg
 import rosnode
 import rosparam
 import rospkg
+import rospy.core
+import rospy.topics
 import rosservice
 import rostest.rostestutil
 import rostopic
@@ -114,3 +117,27 @@ def test_log_lines_of_rostest_are_printed(capsys: pytest.CaptureFixture[str]) ->
     rostest.rostestutil.printlogerr("x %s", 3)
     out, err = capsys.readouterr()
     assert (out, err) == ("[ROSTEST]a b\n[ROSTEST]%s\n", "[ROSTEST]x 3\n")
+
+
+def test_base_logger_logs_for_its_callers_caller(caplog: pytest.LogCaptureFixture) -> None:
+    def log(level: str, text: str, **options: object) -> None:
+        rospy.core._base_logger(text, ("arms",), {"logger_name": "robot"}, level=level, **options)
+
+    with caplog.at_level(logging.INFO, "rosout"):
+        for _ in range(2):
+            log("warning", "two %s", once=True)
+            log("info", "no %s")
+    found = [(each.name, each.levelname, each.getMessage()) for each in caplog.records]
+    assert found == [
+        ("rosout.robot", "WARNING", "two arms"),
+        ("rosout.robot", "INFO", "no arms"),
+        ("rosout.robot", "INFO", "no arms"),
+    ]
+
+
+def test_topics_have_the_classes_of_their_impl() -> None:
+    assert issubclass(rospy.topics._PublisherImpl, rospy.topics._TopicImpl)
+    assert issubclass(rospy.topics._SubscriberImpl, rospy.topics._TopicImpl)
+    publisher = rospy.Publisher("topic_of_impl", Bool, queue_size=1)
+    assert type(publisher.impl) is rospy.topics._PublisherImpl
+    publisher.unregister()

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 from collections.abc import Callable, Mapping
+from typing import Any
 
-from minirospy.client.log import logerr
+from minirospy.client.log import logerr, logger_of, places, write
 from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
 from minirospy.environment import split_uri
@@ -44,6 +46,43 @@ rospyinfo = _internal.info
 rospywarn = _internal.warning
 rospyerr = _internal.error
 logerror = logerr
+_LEVELS = {
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "warning": logging.WARNING,
+    "error": logging.ERROR,
+    "critical": logging.CRITICAL,
+    "fatal": logging.CRITICAL,
+}
+
+
+def _base_logger(
+    msg: object,
+    args: tuple[object, ...],
+    kwargs: dict[str, Any],
+    throttle: float | None = None,
+    throttle_identical: bool = False,
+    level: str = "info",
+    once: bool = False,
+) -> None:
+    """Log for the caller of the caller, as rospy's log functions do: programs have such functions, too.
+
+    ``level`` is a method of logging.Logger (``warning``), ``kwargs`` may have ``logger_name``.
+    """
+    logger = logger_of(kwargs.pop("logger_name", None))
+    number = _LEVELS[level]
+    if not logger.isEnabledFor(number):
+        return
+    frame = sys._getframe(2)
+    if once:
+        is_due = places.is_first(frame)
+    else:
+        is_due = places.is_due(frame, throttle) if throttle else not throttle_identical
+        if throttle_identical:
+            is_due = places.is_new(frame, msg) or is_due
+    if is_due:
+        write(logger, number, frame, msg, args, **kwargs)
 
 
 def is_initialized() -> bool:

@@ -30,6 +30,7 @@ from minirospy.client.log import logwarn_throttle as logwarn_throttle
 from minirospy.client.log import logwarn_throttle_identical as logwarn_throttle_identical
 from minirospy.compat.rospy.core import MASTER_NAME as MASTER_NAME
 from minirospy.compat.rospy.core import ROSRPC as ROSRPC
+from minirospy.compat.rospy.core import _base_logger as _base_logger
 from minirospy.compat.rospy.core import add_client_shutdown_hook as add_client_shutdown_hook
 from minirospy.compat.rospy.core import add_preshutdown_hook as add_preshutdown_hook
 from minirospy.compat.rospy.core import add_shutdown_hook as add_shutdown_hook

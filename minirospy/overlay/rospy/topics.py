@@ -1,5 +1,8 @@
 """rospy.topics, provided by minirospy."""
 
+from minirospy.client.publisher import PublishedTopic as _PublisherImpl
+from minirospy.client.subscriber import SubscribedTopic as _SubscriberImpl
+from minirospy.client.topic import SharedTopic as _TopicImpl
 from minirospy.client.topics import Publisher as Publisher
 from minirospy.client.topics import SubscribeListener as SubscribeListener
 from minirospy.client.topics import Subscriber as Subscriber
