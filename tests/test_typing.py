@@ -7,6 +7,9 @@ import subprocess
 import sys
 import tokenize
 from pathlib import Path
+from typing import Any, get_type_hints
+
+from minirospy.idl.protocols import Message
 
 PROGRAM = """
 import rospy
@@ -100,3 +103,9 @@ def test_any_stays_rare() -> None:
         if token.type == tokenize.NAME and token.string == "Any" and "import" not in token.line
     }
     assert len(lines) < 200, "\n".join(sorted(lines))
+
+
+def test_message_protocol_takes_any_constructor() -> None:
+    # pyright compares constructors of protocols, too: with `object` it refuses Publisher("x", Twist).
+    hints = get_type_hints(Message.__init__)
+    assert (hints["args"], hints["kwds"]) == (Any, Any)

@@ -6,7 +6,7 @@ those made at run time. The names are genpy's (http://docs.ros.org/api/genpy/htm
 
 from __future__ import annotations
 
-from typing import Protocol, TypeAlias, TypeGuard
+from typing import Any, Protocol, TypeAlias, TypeGuard
 
 from minirospy.times import Time
 
@@ -49,7 +49,8 @@ class Message(Protocol):
     _slot_types: list[str]
     _connection_header: dict[str, str]
 
-    def __init__(self, *args: object, **kwds: object) -> None:
+    # Any, not object: to pyright a class with other parameters is no Message otherwise.
+    def __init__(self, *args: Any, **kwds: Any) -> None:
         """Set all fields in order, or some by name."""
 
     def serialize(self, buff: Writer) -> None:

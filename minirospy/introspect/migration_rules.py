@@ -198,7 +198,7 @@ def qualified_name(name: str, top_name: str) -> str:
     return "std_msgs/Header" if clean == "Header" else f"{top_name.split('/', maxsplit=1)[0]}/{clean}"
 
 
-def get_message_key(c: Any) -> Key | None:
+def get_message_key(c: MessageClass) -> Key | None:
     """Return what identifies a message class: its type and md5sum; None of what is not one."""
     try:
         return c._type, c._md5sum
