@@ -212,7 +212,7 @@ def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
     """Return the global, remapped name of ``name`` as this node, or the node ``caller_id``, sees it."""
-    return current_session().resolve(name, caller_id)
+    return current_session().resolve(name and str(name), caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Unpack
 
-    class _Keywords(TypedDict, total=False):
+    class Keywords(TypedDict, total=False):
         """The keywords that a log function passes to Python's logging."""
 
         exc_info: object
@@ -75,7 +75,7 @@ class LogFunction(Protocol):
     """``loginfo`` and its kin."""
 
     def __call__(
-        self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]
+        self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[Keywords]
     ) -> None:
         """Log ``msg % args``; ``logger_name`` names a logger below "rosout"."""
 
@@ -89,7 +89,7 @@ class ThrottledLogFunction(Protocol):
         msg: object,
         *args: object,
         logger_name: str | None = None,
-        **kwargs: Unpack[_Keywords],
+        **kwargs: Unpack[Keywords],
     ) -> None:
         """Log, but from this place in the code at most once in ``period`` seconds."""
 
@@ -134,7 +134,7 @@ def write(
 
 
 def _log_function(level: int, name: str) -> LogFunction:
-    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
+    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[Keywords]) -> None:
         logger = logger_of(logger_name)
         if logger.isEnabledFor(level):
             write(logger, level, sys._getframe(1), msg, args, **kwargs)
@@ -183,7 +183,7 @@ places = _Places()
 
 
 def _once_function(level: int, name: str) -> LogFunction:
-    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[_Keywords]) -> None:
+    def log(msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[Keywords]) -> None:
         logger = logger_of(logger_name)
         if logger.isEnabledFor(level):
             frame = sys._getframe(1)
@@ -199,7 +199,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         msg: object,
         *args: object,
         logger_name: str | None = None,
-        **kwargs: Unpack[_Keywords],
+        **kwargs: Unpack[Keywords],
     ) -> None:
         logger = logger_of(logger_name)
         if not logger.isEnabledFor(level):

@@ -26,14 +26,14 @@ def isstring(s: object) -> bool:
     return isinstance(s, str)
 
 
-def is_global(name: str | None) -> bool:
-    """Return whether a name starts at the root."""
-    return name is not None and name[:1] == SEP
+def is_global(name: str | None) -> bool | str | None:
+    """Return whether a name starts at the root; None and an empty name as they are."""
+    return name and name[:1] == SEP
 
 
-def is_private(name: str | None) -> bool:
-    """Return whether a name starts with ``~``."""
-    return name is not None and name[:1] == PRIV_NAME
+def is_private(name: str | None) -> bool | str | None:
+    """Return whether a name starts with ``~``; None and an empty name as they are."""
+    return name and name[:1] == PRIV_NAME
 
 
 def namespace(name: str) -> str:

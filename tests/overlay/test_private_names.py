@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from pathlib import Path
 from types import ModuleType
+from xmlrpc.client import Binary
 
 import genpy.message
 import pytest
@@ -141,3 +143,21 @@ def test_topics_have_the_classes_of_their_impl() -> None:
     publisher = rospy.Publisher("topic_of_impl", Bool, queue_size=1)
     assert type(publisher.impl) is rospy.topics._PublisherImpl
     publisher.unregister()
+
+
+def test_bytes_of_parameters_are_binary(master: str) -> None:
+    rosparam.upload_params("/camera", {"key": Binary(b"one"), "list": [Binary(b"two"), 3]})
+    assert rosparam.get_param("/camera") == {"key": Binary(b"one"), "list": [Binary(b"two"), 3]}
+    rosparam.set_param("/more", "!!binary aGVsbG8=")
+    found = rosparam.get_param("/more")
+    assert (type(found), found.data) == (Binary, b"hello")
+
+
+@pytest.mark.parametrize("name", ["-", "", None])
+def test_parameters_are_read_from_standard_input(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("a: 1\n---\nb: 2\n"))
+    assert rosparam.load_file(name, "/robot") == [({"a": 1}, "/robot"), ({"b": 2}, "/robot")]
+
+
+def test_name_that_is_a_number_is_resolved() -> None:
+    assert rospy.resolve_name(5, "/robot/node") == "/robot/5"  # type: ignore[arg-type]

@@ -120,7 +120,7 @@ def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None
 
     plain = _plain(msg)
     style = flow_style_ if flow_style_ is not None else None if _width(plain) > _WIDE else False
-    text = yaml.safe_dump(plain, default_flow_style=style).removesuffix("\n...\n").rstrip("\n")
+    text = yaml.safe_dump(plain, default_flow_style=style).rstrip("\n")
     return "\n".join(prefix + line for line in text.split("\n"))
 
 

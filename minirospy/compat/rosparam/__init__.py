@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
+from xmlrpc.client import Binary
 
 import yaml
 
@@ -57,11 +58,14 @@ class _YamlError(RosParamException, yaml.YAMLError):
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter's value. Raises rosgraph.MasterError where it is not set, or the name is empty."""
+    """Return a parameter's value; bytes as xmlrpc.client.Binary, as programs know them from ROS.
+
+    Raises rosgraph.MasterError where it is not set, or the name is empty.
+    """
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
-            return parameters.get_parameter(graph, name)
+            return _with_binaries(parameters.get_parameter(graph, name))
         except NotFoundError as error:
             raise MasterError(f"Parameter [{name}] is not set") from error
 
@@ -78,9 +82,27 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
     """Set a parameter to a value; a dictionary leaves other parameters of its namespace."""
     with _graph() as graph:
-        for name, single in parameters.set_parameter(graph, graph.resolve(param), value):
+        for name, single in parameters.set_parameter(graph, graph.resolve(param), _with_bytes(value)):
             if verbose:
                 print(f"set parameter [{name}] to [{single}]")
+
+
+def _with_binaries(value: object) -> object:
+    """Return a value with Binary instead of all bytes in it."""
+    if isinstance(value, bytes):
+        return Binary(value)
+    if isinstance(value, dict):
+        return {name: _with_binaries(inner) for name, inner in value.items()}
+    return [_with_binaries(inner) for inner in value] if isinstance(value, list) else value
+
+
+def _with_bytes(value: object) -> object:
+    """Return a value with bytes instead of each Binary in it."""
+    if isinstance(value, Binary):
+        return value.data
+    if isinstance(value, dict):
+        return {name: _with_bytes(inner) for name, inner in value.items()}
+    return [_with_bytes(inner) for inner in value] if isinstance(value, list) else value
 
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
@@ -129,8 +151,13 @@ def load_file(
 ) -> list[tuple[object, str]]:
     """Return [(values, namespace)] of each document of a YAML file, which may contain more than a parameter can.
 
+    ``-``, or nothing, is the standard input.
     Raises RosParamException where it cannot be read; where it is not YAML, one that is a yaml.YAMLError too.
     """
+    if not filename or filename == "-":
+        if verbose:
+            print("reading parameters from stdin")
+        return load_str(sys.stdin.read(), filename, default_namespace, verbose)
     path = Path(filename)
     if not path.exists():
         raise RosParamException(f"file [{filename}] does not exist")

@@ -9,13 +9,16 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from minirospy.client.log import logerr, logger_of, places, write
 from minirospy.client.session import current_session
 from minirospy.compat.rospy.names import ParameterInvalid, Validator, valid_name
 from minirospy.environment import split_uri
 from minirospy.errors import ROSException
+
+if TYPE_CHECKING:
+    from minirospy.client.log import Keywords
 
 __all__ = [
     "MASTER_NAME",
@@ -60,7 +63,7 @@ _LEVELS = {
 def _base_logger(
     msg: object,
     args: tuple[object, ...],
-    kwargs: dict[str, Any],
+    kwargs: Keywords,
     throttle: float | None = None,
     throttle_identical: bool = False,
     level: str = "info",
@@ -70,7 +73,7 @@ def _base_logger(
 
     ``level`` is a method of logging.Logger (``warning``), ``kwargs`` may have ``logger_name``.
     """
-    logger = logger_of(kwargs.pop("logger_name", None))
+    logger = logger_of(kwargs.pop("logger_name", None))  # type: ignore[typeddict-item]
     number = _LEVELS[level]
     if not logger.isEnabledFor(number):
         return
