@@ -196,8 +196,8 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only an address of this machine can be bound.
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        # Only an address of this machine can be bound; Wine binds any for datagrams.
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:
         return False

@@ -60,7 +60,7 @@ def lines_until_set(step: int, is_set: bool) -> int:
 
     def trace(frame: FrameType, kind: str, _: Any) -> Any:
         nonlocal lines
-        if kind == "line" and frame.f_code.co_filename == threading.__file__:
+        if kind == "line" and frame.f_globals.get("__name__") == "threading":
             lines += 1
             if lines == step:
                 event.set()
