@@ -63,6 +63,27 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
+def test_every_extra_that_is_named_exists() -> None:
+    """In the messages, which name the line to type, and in the docs."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    table = text.partition("[project.optional-dependencies]\n")[2].partition("\n\n")[0]
+    extras = set(re.findall(r"^(\w+) = ", table, flags=re.MULTILINE))
+    assert {"all", "dev"} < extras
+
+    files = [*(ROOT / "minirospy").rglob("*.py"), *(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
+    named = {
+        name
+        for file in files
+        for names in re.findall(r"minirospy\[([a-z0-9,]+)\]", file.read_text(encoding="utf-8"))
+        for name in names.split(",")
+    }
+    assert named <= extras
+    # All of them but what is for development, and the GPIO that hides the virtual board.
+    assert set(
+        re.findall(r'^all = \["minirospy\[(.*)\]"\]', table, flags=re.MULTILINE)[0].split(",")
+    ) == extras - {"all", "dev", "pi"}
+
+
 @pytest.mark.timeout(180)
 def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     assert wheel.name.endswith("-py3-none-any.whl")
