@@ -12,11 +12,18 @@ from minirospy.errors import UsageError
 
 __all__ = ["VIEWS", "link", "plotted_fields", "view_of_plugin"]
 
-VIEWS = ("topics",)
+VIEWS = ("topics", "console")
 """The names of the views, as in links; the page has one module for each."""
 
 _PLUGINS = {
     "rqt_topic": "topics",
+    "rqt_console": "console",
+    "rqt_logger_level": "console",
+    "rqt_plot": "plot",
+    "rqt_graph": "graph",
+    "rqt_image_view": "image",
+    "rqt_publisher": "publish",
+    "rqt_service_caller": "services",
 }
 """rqt's plug-ins -> the view that shows the same."""
 

@@ -2,9 +2,13 @@
 
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
+import { Console } from "./views/console.js";
 import { Topics } from "./views/topics.js";
 
-const VIEWS = { topics: ["Topics", Topics] };
+const VIEWS = {
+  topics: ["Topics", Topics],
+  console: ["Console", Console],
+};
 const STATES = {
   connecting: "connecting …",
   open: "connected",

@@ -1,0 +1,240 @@
+// The log lines of all nodes (/rosout_agg): filters, search, pause, copy, export, and the levels of loggers.
+
+import { download, fill, h, setText } from "../dom.js";
+import { LEVELS, NAMES, csv, filterOf, lineOf, plainText, timeText } from "../logs.js";
+import { VirtualList } from "../virtual_list.js";
+
+const MOST_LINES = 50_000;
+const ROW = 26; // pixels, as .line in style.css
+
+// The lines outlive the view: they are collected from the first visit on.
+const lines = [];
+const counts = new Map(LEVELS.map(([level]) => [level, 0]));
+let end = null;
+let listener = null;
+let removed = 0;
+
+function collect(link) {
+  end ??= link.subscribe({ topic: "/rosout_agg", mode: "all" }, (item) => {
+    for (const each of item.lines ?? []) {
+      const line = lineOf(each);
+      lines.push(line);
+      counts.set(line.level, (counts.get(line.level) ?? 0) + 1);
+    }
+    let cut = 0;
+    if (lines.length > MOST_LINES) {
+      cut = lines.length - MOST_LINES + MOST_LINES / 10;
+      lines.splice(0, cut);
+      removed += cut;
+    }
+    listener?.(cut);
+  });
+}
+
+export class Console {
+  constructor(link, words, main) {
+    this.link = link;
+    this.levels = new Set(LEVELS.map(([level]) => level));
+    this.isPaused = false;
+    this.shown = []; // the lines that pass the filter
+    this.seen = removed; // how many lines, of all that ever came, have been filtered
+    this.selected = null;
+    this.nodes = new Set();
+
+    this.buttons = new Map(LEVELS.map(([level, name]) => [level,
+      h("button", { type: "button", class: `level l${level}`, "aria-pressed": "true", onclick: () => this.switchLevel(level) }, h("span", {}, name), " ", h("span", { class: "count" }, "0"))]));
+    this.node = h("select", { "aria-label": "Node", onchange: () => this.filter() }, h("option", { value: "" }, "all nodes"));
+    this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.filter() });
+    this.isRegex = h("input", { type: "checkbox", onchange: () => this.filter() });
+    this.isExcluded = h("input", { type: "checkbox", onchange: () => this.filter() });
+    this.pauseButton = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.pause() }, "Pause");
+    this.latest = h("button", { type: "button", hidden: true, class: "primary", onclick: () => { this.list.follow(); this.showCount(); } }, "↓ Latest");
+    this.loggersButton = h("button", { type: "button", onclick: () => this.toggleLoggers() }, "Logger levels");
+    this.count = h("span", { class: "muted" });
+    this.problem = h("span", { class: "error" });
+    this.list = new VirtualList(ROW, () => this.makeRow(), (row, index) => this.showRow(row, this.shown[index]));
+    this.list.element.addEventListener("scroll", () => this.showCount());
+    this.list.element.setAttribute("aria-label", "Log lines");
+    this.details = h("div", { class: "panel details", hidden: true });
+    this.loggers = h("div", { class: "panel details loggers", hidden: true });
+    main.append(
+      h("div", { class: "bar" }, [...this.buttons.values()], this.node, this.text,
+        h("label", {}, this.isRegex, "regex"), h("label", {}, this.isExcluded, "exclude"), this.problem),
+      h("div", { class: "bar" }, this.pauseButton,
+        h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
+        h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),
+        h("button", { type: "button", onclick: () => this.save() }, "Export CSV"),
+        this.loggersButton, this.count, this.latest),
+      this.loggers, h("div", { class: "panel lines" }, this.list.element), this.details);
+
+    listener = (cut) => this.arrived(cut);
+    collect(link);
+    this.filter();
+  }
+
+  close() {
+    listener = null;
+    this.list.close();
+  }
+
+  arrived(cut) {
+    if (this.isPaused) {
+      this.showCount();
+      return;
+    }
+    if (cut) {
+      const before = this.shown.length;
+      const oldest = lines[0];
+      const index = this.shown.findIndex((each) => each.stamp >= oldest.stamp);
+      this.shown.splice(0, index < 0 ? before : index);
+      this.list.removed(before - this.shown.length);
+    }
+    this.filterNew();
+  }
+
+  filter() {
+    try {
+      this.passes = filterOf({ levels: this.levels, node: this.node.value, text: this.text.value, isRegex: this.isRegex.checked, isExcluded: this.isExcluded.checked });
+      setText(this.problem, "");
+    } catch (error) {
+      setText(this.problem, error.message);
+      return;
+    }
+    this.shown = [];
+    this.seen = removed;
+    this.filterNew();
+  }
+
+  filterNew() {
+    for (let index = Math.max(0, this.seen - removed); index < lines.length; index++) {
+      const line = lines[index];
+      this.addNode(line.node);
+      if (this.passes(line)) this.shown.push(line);
+    }
+    this.seen = removed + lines.length;
+    this.list.update(this.shown.length);
+    this.showCount();
+  }
+
+  addNode(name) {
+    if (this.nodes.has(name)) return;
+    this.nodes.add(name);
+    const after = [...this.node.options].find((option) => option.value > name) ?? null;
+    this.node.insertBefore(h("option", { value: name }, name), after);
+  }
+
+  showCount() {
+    for (const [level, button] of this.buttons) setText(button.querySelector(".count"), String(counts.get(level)));
+    const waiting = this.isPaused ? removed + lines.length - this.seen : 0;
+    setText(this.count, `${this.shown.length} of ${lines.length} lines${this.isPaused ? `, paused, ${waiting} new` : ""}`);
+    this.latest.hidden = this.list.isFollowing;
+  }
+
+  makeRow() {
+    const row = h("div", { class: "line", onclick: () => this.select(row.line) },
+      h("span", { class: "time" }), h("span", { class: "word" }), h("span", { class: "node" }), h("span", { class: "text" }));
+    return row;
+  }
+
+  showRow(row, line) {
+    row.classList.toggle("selected", line === this.selected);
+    if (row.line === line) return;
+    row.line = line;
+    row.dataset.level = line.level;
+    const [time, word, node, text] = row.children;
+    setText(time, timeText(line.stamp));
+    setText(word, NAMES.get(line.level) ?? String(line.level));
+    setText(node, line.node);
+    setText(text, line.text);
+  }
+
+  select(line) {
+    this.selected = this.selected === line ? null : line;
+    this.details.hidden = !this.selected;
+    if (this.selected) {
+      fill(this.details, h("div", { class: "bar" }, h("strong", {}, `${NAMES.get(line.level) ?? line.level} · ${line.node}`),
+        h("span", { class: "muted" }, `${timeText(line.stamp)} · ${line.file}:${line.line} ${line.function}`),
+        h("button", { type: "button", onclick: () => { this.node.value = line.node; this.filter(); } }, "Only this node")), h("pre", {}, line.text));
+    }
+    this.list.draw();
+  }
+
+  switchLevel(level) {
+    if (!this.levels.delete(level)) this.levels.add(level);
+    this.buttons.get(level).setAttribute("aria-pressed", String(this.levels.has(level)));
+    this.filter();
+  }
+
+  pause() {
+    this.isPaused = !this.isPaused;
+    this.pauseButton.setAttribute("aria-pressed", String(this.isPaused));
+    setText(this.pauseButton, this.isPaused ? "Continue" : "Pause");
+    if (!this.isPaused) this.filter();
+    this.showCount();
+  }
+
+  clear() {
+    removed += lines.length;
+    lines.length = 0;
+    for (const level of counts.keys()) counts.set(level, 0);
+    this.selected = null;
+    this.details.hidden = true;
+    this.filter();
+  }
+
+  async copy(button) {
+    const chosen = this.selected ? [this.selected] : this.shown;
+    const text = chosen.map(plainText).join("\n");
+    try {
+      await navigator.clipboard.writeText(text);
+      setText(button, `Copied ${chosen.length}`);
+    } catch {
+      // Without https a browser allows it on localhost only.
+      setText(button, "The browser refuses");
+    }
+    setTimeout(() => setText(button, "Copy"), 1500);
+  }
+
+  save() {
+    download("console.csv", new Blob([csv(this.shown)], { type: "text/csv" }));
+  }
+
+  toggleLoggers() {
+    this.loggers.hidden = !this.loggers.hidden;
+    this.loggersButton.setAttribute("aria-pressed", String(!this.loggers.hidden));
+    if (!this.loggers.hidden) this.showLoggers();
+  }
+
+  showLoggers() {
+    const nodes = [...this.link.services.keys()].filter((name) => name.endsWith("/get_loggers")).map((name) => name.slice(0, -"/get_loggers".length));
+    const list = h("div", { class: "grid" });
+    const choice = h("select", { "aria-label": "Node of the loggers", onchange: () => this.showLoggersOf(choice.value, list) },
+      h("option", { value: "" }, "choose a node"), nodes.map((name) => h("option", { value: name }, name)));
+    fill(this.loggers, h("div", { class: "bar" }, h("strong", {}, "Logger levels"), choice,
+      h("span", { class: "muted" }, this.link.mayWrite ? "what a node logs, from this level on" : "this token is read-only")), list);
+  }
+
+  async showLoggersOf(node, list) {
+    fill(list);
+    if (!node) return;
+    try {
+      const { loggers } = await this.link.call(`${node}/get_loggers`, {});
+      for (const logger of loggers) {
+        const choice = h("select", { "aria-label": logger.name, onchange: () => this.setLevel(node, logger.name, choice, list) },
+          LEVELS.map(([, name]) => h("option", { value: name.toLowerCase() }, name)));
+        choice.value = logger.level.toLowerCase();
+        list.append(h("span", {}, logger.name), choice);
+      }
+    } catch (error) {
+      fill(list, h("span", { class: "error" }, error.message));
+    }
+  }
+
+  async setLevel(node, logger, choice, list) {
+    try {
+      await this.link.call(`${node}/set_logger_level`, { logger, level: choice.value });
+    } catch (error) {
+      fill(list, h("span", { class: "error" }, error.message));
+    }
+  }
+}

@@ -1,0 +1,73 @@
+// A list of many rows of one height, of which only those that are seen are elements.
+
+import { h } from "./dom.js";
+
+const EXTRA = 6; // rows above and below what is seen
+
+export class VirtualList {
+  /** make() returns an element for a row, show(element, index) fills it. */
+  constructor(rowHeight, make, show) {
+    this.rowHeight = rowHeight;
+    this.make = make;
+    this.showRow = show;
+    this.count = 0;
+    this.isFollowing = true;
+    this.pool = [];
+    this.space = h("div", { class: "space" });
+    this.element = h("div", { class: "virtual", tabindex: "0", onscroll: () => this.scrolled() }, this.space);
+    this.observer = new ResizeObserver(() => this.draw());
+    this.observer.observe(this.element);
+  }
+
+  close() {
+    this.observer.disconnect();
+  }
+
+  /** Show this many rows; those that are on the screen are filled again. */
+  update(count) {
+    this.count = count;
+    this.space.style.height = `${count * this.rowHeight}px`;
+    if (this.isFollowing) this.element.scrollTop = count * this.rowHeight;
+    this.draw();
+  }
+
+  follow() {
+    this.isFollowing = true;
+    this.update(this.count);
+  }
+
+  /** Keep the rows that are seen where they are when rows in front of them are removed. */
+  removed(rows) {
+    if (!this.isFollowing) this.element.scrollTop = Math.max(0, this.element.scrollTop - rows * this.rowHeight);
+  }
+
+  scrollTo(index) {
+    this.isFollowing = false;
+    this.element.scrollTop = Math.max(0, index * this.rowHeight - this.element.clientHeight / 2);
+    this.draw();
+  }
+
+  scrolled() {
+    const { scrollTop, clientHeight } = this.element;
+    this.isFollowing = scrollTop + clientHeight >= this.count * this.rowHeight - this.rowHeight;
+    this.draw();
+  }
+
+  draw() {
+    const { scrollTop, clientHeight } = this.element;
+    const first = Math.max(0, Math.floor(scrollTop / this.rowHeight) - EXTRA);
+    const last = Math.min(this.count, Math.ceil((scrollTop + clientHeight) / this.rowHeight) + EXTRA);
+    while (this.pool.length < last - first) {
+      const row = this.make();
+      this.pool.push(row);
+      this.space.append(row);
+    }
+    this.pool.forEach((row, number) => {
+      const index = first + number;
+      row.hidden = index >= last;
+      if (row.hidden) return;
+      row.style.transform = `translateY(${index * this.rowHeight}px)`;
+      this.showRow(row, index);
+    });
+  }
+}
