@@ -3,11 +3,13 @@
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Console } from "./views/console.js";
+import { Plot } from "./views/plot.js";
 import { Topics } from "./views/topics.js";
 
 const VIEWS = {
   topics: ["Topics", Topics],
   console: ["Console", Console],
+  plot: ["Plot", Plot],
 };
 const STATES = {
   connecting: "connecting …",

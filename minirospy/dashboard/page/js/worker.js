@@ -3,7 +3,7 @@
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
 import { decode, encode, parseDefinition } from "./ros1.js";
-import { parseSteps, select, topicOf } from "./paths.js";
+import { numericPaths, parseSteps, select, topicOf } from "./paths.js";
 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
@@ -202,7 +202,8 @@ function use(entry) {
   }
   topic.users.add(entry);
   if (topic.subscription === null) subscribeTopic(entry.topic);
-  else if (topic.last && entry.mode === "latest") deliver(topic, entry, topic.last.seconds, topic.last.bytes);
+  // A latched message comes once for a subscription, however many share it.
+  else if (topic.last && entry.mode !== "all") give(topic, entry, topic.last.seconds, topic.last.bytes);
 }
 
 function subscribeTopic(name) {
@@ -244,38 +245,43 @@ function unsubscribe(key) {
 function received(topic, seconds, bytes) {
   topic.last = { seconds, bytes };
   let message;
-  for (const entry of topic.users) {
-    if (entry.mode === "latest") {
-      deliver(topic, entry, seconds, bytes);
-      continue;
-    }
-    if (!topic.definition) {
-      entry.error = topic.failure;
-      continue;
-    }
-    try {
-      message ??= decode(topic.definition, bytes);
-    } catch (error) {
-      entry.error = error.message;
-      schedule();
-      return;
-    }
-    if (entry.mode === "all") {
-      entry.lines.push({ seconds, message });
-      if (entry.lines.length > MOST_LINES) entry.lines.splice(0, MOST_LINES / 10);
-    } else {
-      select(message, entry.steps, (label, number) => addPoint(entry, label, seconds, number));
-    }
-  }
-  schedule();
+  for (const entry of topic.users) message = give(topic, entry, seconds, bytes, message);
 }
 
-function deliver(topic, entry, seconds, bytes) {
-  entry.count += 1;
-  entry.bytes += bytes.byteLength;
-  // Decoded when it is sent to the page, if it still is the newest then.
-  entry.newest = { topic, seconds, bytes };
+/** Take over a message for a subscriber; return it decoded, if it was. */
+function give(topic, entry, seconds, bytes, decoded) {
   schedule();
+  if (entry.mode === "latest") {
+    // Decoded when it is sent to the page, if it still is the newest then.
+    entry.count += 1;
+    entry.bytes += bytes.byteLength;
+    entry.newest = { topic, seconds, bytes };
+    return decoded;
+  }
+  let message = decoded;
+  try {
+    if (!topic.definition) throw new Error(topic.failure);
+    message ??= decode(topic.definition, bytes);
+  } catch (error) {
+    entry.error = error.message;
+    return undefined;
+  }
+  if (entry.mode === "all") {
+    entry.lines.push({ seconds, message });
+    if (entry.lines.length > MOST_LINES) entry.lines.splice(0, MOST_LINES / 10);
+    return message;
+  }
+  let isFound = false;
+  select(message, entry.steps, (label, number) => {
+    isFound = true;
+    addPoint(entry, label, seconds, number);
+  });
+  entry.isFound ||= isFound;
+  if (!entry.isFound) {
+    const known = numericPaths(topic.definition, 3).map((path) => topic.name + path);
+    entry.error = `no number there; there is ${known.join(", ") || "none in this topic"}`;
+  }
+  return message;
 }
 
 function addPoint(entry, label, seconds, number) {

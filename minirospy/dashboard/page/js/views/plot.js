@@ -1,0 +1,314 @@
+// Plots of numbers of messages: paths of fields, two axes, zoom and pan while they stream, CSV and PNG.
+
+import { download, h, number, setText } from "../dom.js";
+import { numericPaths } from "../paths.js";
+import { Samples, csv, drawn } from "../samples.js";
+
+const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
+const FRAME_MS = 33;
+const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
+
+export class Plot {
+  constructor(link, words, main) {
+    this.link = link;
+    this.ends = new Map(); // path -> what ends its subscription
+    this.series = new Map(); // label -> {label, path, samples, color, axis, isHidden}
+    this.problems = new Map();
+    this.origin = null;
+    this.zoom = null; // {min, max} of time, null: it follows
+    this.isPaused = words.get("paused") === "1";
+    this.pausedAt = null;
+    this.chart = null;
+    this.isDirty = true;
+
+    this.known = h("datalist", { id: "paths" });
+    this.input = h("input", { class: "grow", list: "paths", placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
+    this.problem = h("span", { class: "error" });
+    this.window = h("select", { "aria-label": "Time shown", onchange: () => this.live() }, WINDOWS.map(([value, name]) => h("option", { value }, name)));
+    this.window.value = words.get("window") ?? "10";
+    this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
+    this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
+    this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
+      this.input, this.known, h("button", { type: "submit", class: "primary" }, "Plot"), this.problem);
+    this.area = h("div", { class: "panel chart" });
+    this.hint = h("p", { class: "empty" }, "Type a path above, or choose “plot” next to a field in Topics.");
+    this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
+    main.append(this.form,
+      h("div", { class: "bar" }, this.pauseButton, this.window, this.liveButton,
+        h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
+        h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
+        h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
+        h("span", { class: "muted" }, "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
+      this.area, this.legend);
+    this.area.append(this.hint);
+    this.pause(this.isPaused);
+
+    this.ending = [link.watch(["channels"], () => this.suggest())];
+    const theme = () => this.rebuild();
+    link.addEventListener("theme", theme);
+    this.ending.push(() => link.removeEventListener("theme", theme));
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.area);
+    this.area.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    for (const path of words.getAll("path")) this.add(path);
+    this.timer = setInterval(() => this.draw(), FRAME_MS);
+  }
+
+  close() {
+    clearInterval(this.timer);
+    for (const end of [...this.ending, ...this.ends.values()]) end();
+    this.observer.disconnect();
+    this.chart?.destroy();
+  }
+
+  suggest() {
+    const paths = [];
+    for (const { topic, type, schema } of this.link.channels.values()) {
+      const definition = this.link.definition(type, schema);
+      if (definition && paths.length < 2000) paths.push(...numericPaths(definition, 60).map((path) => topic + path));
+    }
+    this.known.replaceChildren(...paths.map((value) => h("option", { value })));
+    this.showProblems();
+  }
+
+  addTyped() {
+    const path = this.input.value.trim();
+    if (!path) return;
+    this.add(path.startsWith("/") ? path : `/${path}`);
+    this.input.value = "";
+  }
+
+  add(path) {
+    if (this.ends.has(path)) return;
+    this.problems.set(path, `waiting for ${path}`);
+    this.ends.set(path, this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)));
+    this.remember();
+    this.showProblems();
+  }
+
+  remove(series) {
+    this.series.delete(series.label);
+    if (![...this.series.values()].some((each) => each.path === series.path)) {
+      this.ends.get(series.path)?.();
+      this.ends.delete(series.path);
+      this.problems.delete(series.path);
+    } else {
+      series.isRemoved = true;
+      (this.removed ??= new Set()).add(series.label);
+    }
+    series.row.remove();
+    this.remember();
+    this.rebuild();
+    this.showProblems();
+  }
+
+  remember() {
+    const words = new URLSearchParams([...this.ends.keys()].map((path) => ["path", path]));
+    history.replaceState(null, "", `#/plot?${words}`);
+  }
+
+  showProblems() {
+    setText(this.problem, [...this.problems.values()].slice(0, 3).join(", "));
+  }
+
+  received(path, item) {
+    if (item.error) {
+      this.problems.set(path, `${path}: ${item.error}`);
+      this.showProblems();
+    }
+    for (const { label, times, values } of item.series ?? []) {
+      if (this.removed?.has(label)) continue;
+      let series = this.series.get(label);
+      if (!series) {
+        series = this.makeSeries(label, path);
+        this.rebuild();
+      }
+      if (this.problems.delete(path)) this.showProblems();
+      this.origin ??= times[0];
+      // Time that goes back: a simulation or a bag was started again.
+      if (times[0] < series.samples.lastTime - 1) series.samples.drop(Infinity);
+      series.samples.append(times, values);
+      this.isDirty = true;
+    }
+  }
+
+  makeSeries(label, path) {
+    const used = new Set([...this.series.values()].map((each) => each.color));
+    const color = COLORS.find((each) => !used.has(each)) ?? COLORS[this.series.size % COLORS.length];
+    const series = { label, path, samples: new Samples(), color, axis: "y", isHidden: false };
+    series.value = h("span", { class: "num" });
+    series.count = h("span", { class: "muted count" });
+    const swatch = h("button", { type: "button", class: "swatch", title: "Show or hide", "aria-pressed": "true", onclick: () => {
+      series.isHidden = !series.isHidden;
+      swatch.setAttribute("aria-pressed", String(!series.isHidden));
+      this.rebuild();
+    } });
+    swatch.style.background = color;
+    const axis = h("button", { type: "button", class: "small", title: "Move to the other axis", onclick: () => {
+      series.axis = series.axis === "y" ? "y2" : "y";
+      setText(axis, series.axis === "y" ? "left axis" : "right axis");
+      this.rebuild();
+    } }, "left axis");
+    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, axis,
+      h("button", { type: "button", class: "small", title: `Remove ${label}`, onclick: () => this.remove(series) }, "×"));
+    series.row.dataset.label = label;
+    this.series.set(label, series);
+    this.legend.append(series.row);
+    return series;
+  }
+
+  pause(isPaused) {
+    this.isPaused = isPaused;
+    this.pausedAt = isPaused ? this.newest() : null;
+    this.pauseButton.setAttribute("aria-pressed", String(isPaused));
+    setText(this.pauseButton, isPaused ? "Continue" : "Pause");
+    this.isDirty = true;
+  }
+
+  live() {
+    this.zoom = null;
+    this.pause(false);
+  }
+
+  newest() {
+    return Math.max(...[...this.series.values()].map((each) => each.samples.lastTime), -Infinity);
+  }
+
+  /** Return the time that is shown: [from, to]. */
+  range() {
+    if (this.zoom) return [this.zoom.min, this.zoom.max];
+    const to = Number.isFinite(this.pausedAt) && this.pausedAt !== null ? this.pausedAt : this.newest();
+    if (!Number.isFinite(to)) return [0, 1];
+    const oldest = Math.min(...[...this.series.values()].map((each) => each.samples.firstTime));
+    const from = this.window.value ? to - Number(this.window.value) : oldest;
+    return from < to ? [from, to] : [to - 1, to];
+  }
+
+  visible() {
+    return [...this.series.values()].filter((each) => !each.isHidden);
+  }
+
+  rebuild() {
+    this.chart?.destroy();
+    this.chart = null;
+    const shown = this.visible();
+    this.hint.hidden = shown.length > 0;
+    this.isDirty = true;
+    if (!shown.length || !this.area.clientWidth) return;
+    const style = getComputedStyle(document.documentElement);
+    const text = style.getPropertyValue("--muted").trim();
+    const line = style.getPropertyValue("--line").trim();
+    const axis = (more) => ({ stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui", ...more });
+    const hasRight = shown.some((each) => each.axis === "y2");
+    this.chart = new globalThis.uPlot({
+      width: this.area.clientWidth,
+      height: this.area.clientHeight,
+      padding: [12, hasRight ? 0 : 14, 0, 0],
+      legend: { show: false },
+      cursor: { drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.live() }, points: { size: 6 } },
+      scales: { x: { time: false, range: () => this.range().map((each) => each - (this.origin ?? 0)) } },
+      series: [{}, ...shown.map(({ label, color, axis: scale }) => ({ label, stroke: color, width: 1.5, scale, spanGaps: true, points: { show: false } }))],
+      axes: [axis({ values: (_, all) => all.map((each) => `${number(each)} s`) }), axis({ scale: "y", size: 64, show: shown.some((each) => each.axis === "y") }),
+        ...(hasRight ? [axis({ scale: "y2", side: 1, size: 64, grid: { show: false } })] : [])],
+      hooks: {
+        setSelect: [(chart) => {
+          const { left, width } = chart.select;
+          if (width < 4) return;
+          this.zoom = { min: chart.posToVal(left, "x") + this.origin, max: chart.posToVal(left + width, "x") + this.origin };
+          chart.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+          this.isDirty = true;
+        }],
+        setCursor: [() => this.showValues()],
+      },
+    }, [[], ...shown.map(() => [])], this.area);
+  }
+
+  resize() {
+    if (!this.chart) this.rebuild();
+    else if (this.area.clientWidth) this.chart.setSize({ width: this.area.clientWidth, height: this.area.clientHeight });
+  }
+
+  wheel(event) {
+    if (!this.chart || this.origin === null) return;
+    event.preventDefault();
+    const [from, to] = this.range();
+    const span = to - from;
+    const by = event.deltaX || (event.shiftKey ? event.deltaY : 0);
+    if (by) {
+      this.zoom = { min: from + span * 0.0015 * by, max: to + span * 0.0015 * by };
+    } else {
+      const left = event.clientX - this.chart.over.getBoundingClientRect().left;
+      const at = this.chart.posToVal(Math.max(0, left), "x") + this.origin;
+      const factor = Math.min(10, Math.max(0.1, Math.exp(event.deltaY * 0.002)));
+      this.zoom = { min: at - (at - from) * factor, max: at + (to - at) * factor };
+    }
+    this.isDirty = true;
+  }
+
+  draw() {
+    if (!this.isDirty || document.hidden) return;
+    this.isDirty = false;
+    this.liveButton.hidden = !this.zoom && !this.isPaused;
+    if (this.chart) {
+      const [from, to] = this.range();
+      const data = drawn(this.visible().map((each) => each.samples), from, to, this.chart.bbox.width / devicePixelRatio, this.origin ?? 0);
+      this.chart.setData(data);
+    }
+    this.showValues();
+  }
+
+  showValues() {
+    const at = this.chart?.cursor.idx;
+    let shown = 0;
+    for (const series of this.series.values()) {
+      let value = series.samples.last;
+      if (!series.isHidden) {
+        shown += 1;
+        const ys = this.chart?.data[shown];
+        if (at !== null && at !== undefined && ys) {
+          let index = at;
+          while (index > 0 && ys[index] === undefined) index--;
+          value = ys[index] ?? null;
+        }
+      }
+      setText(series.value, value === null ? "–" : number(value));
+      setText(series.count, `${series.samples.total} points`);
+    }
+  }
+
+  clear() {
+    for (const { samples } of this.series.values()) {
+      samples.drop(Infinity);
+      samples.total = 0;
+    }
+    this.origin = null;
+    this.live();
+  }
+
+  saveCsv() {
+    const all = this.visible();
+    download("plot.csv", new Blob([csv(all.map((each) => each.label), all.map((each) => each.samples))], { type: "text/csv" }));
+  }
+
+  savePng() {
+    if (!this.chart) return;
+    const source = this.chart.ctx.canvas;
+    const scale = devicePixelRatio;
+    const rows = this.visible();
+    const canvas = h("canvas", { width: source.width, height: source.height + (rows.length * 20 + 16) * scale });
+    const context = canvas.getContext("2d");
+    const style = getComputedStyle(document.documentElement);
+    context.fillStyle = style.getPropertyValue("--panel");
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(source, 0, 0);
+    context.font = `${13 * scale}px system-ui, sans-serif`;
+    rows.forEach(({ label, color }, row) => {
+      const y = source.height + (row * 20 + 16) * scale;
+      context.fillStyle = color;
+      context.fillRect(16 * scale, y - 9 * scale, 14 * scale, 9 * scale);
+      context.fillStyle = style.getPropertyValue("--text");
+      context.fillText(label, 38 * scale, y);
+    });
+    canvas.toBlob((blob) => download("plot.png", blob));
+  }
+}
