@@ -3,6 +3,7 @@
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Console } from "./views/console.js";
+import { Graph } from "./views/graph.js";
 import { Plot } from "./views/plot.js";
 import { Topics } from "./views/topics.js";
 
@@ -10,6 +11,7 @@ const VIEWS = {
   topics: ["Topics", Topics],
   console: ["Console", Console],
   plot: ["Plot", Plot],
+  graph: ["Graph", Graph],
 };
 const STATES = {
   connecting: "connecting …",
