@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Console } from "./views/console.js";
 import { Graph } from "./views/graph.js";
+import { Image } from "./views/image.js";
 import { Plot } from "./views/plot.js";
 import { Topics } from "./views/topics.js";
 
@@ -12,6 +13,7 @@ const VIEWS = {
   console: ["Console", Console],
   plot: ["Plot", Plot],
   graph: ["Graph", Graph],
+  image: ["Image", Image],
 };
 const STATES = {
   connecting: "connecting …",
