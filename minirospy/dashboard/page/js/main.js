@@ -2,6 +2,7 @@
 
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
+import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
@@ -14,6 +15,7 @@ const VIEWS = {
   plot: ["Plot", Plot],
   graph: ["Graph", Graph],
   image: ["Image", Image],
+  board: ["Board", Board],
 };
 const STATES = {
   connecting: "connecting …",
