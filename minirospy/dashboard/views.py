@@ -12,7 +12,7 @@ from minirospy.errors import UsageError
 
 __all__ = ["VIEWS", "link", "plotted_fields", "view_of_plugin"]
 
-VIEWS = ("topics", "console", "plot", "graph", "image", "board")
+VIEWS = ("topics", "console", "plot", "graph", "image", "board", "publish", "services", "parameters")
 """The names of the views, as in links; the page has one module for each."""
 
 _PLUGINS = {

@@ -6,7 +6,10 @@ import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
+import { Parameters } from "./views/parameters.js";
 import { Plot } from "./views/plot.js";
+import { Publish } from "./views/publish.js";
+import { Services } from "./views/services.js";
 import { Topics } from "./views/topics.js";
 
 const VIEWS = {
@@ -16,6 +19,9 @@ const VIEWS = {
   graph: ["Graph", Graph],
   image: ["Image", Image],
   board: ["Board", Board],
+  publish: ["Publish", Publish],
+  services: ["Services", Services],
+  parameters: ["Parameters", Parameters],
 };
 const STATES = {
   connecting: "connecting …",

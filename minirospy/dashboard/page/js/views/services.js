@@ -1,0 +1,82 @@
+// Services: a form for the request, and the response.
+
+import { fill, h, setText } from "../dom.js";
+import { MessageForm } from "../form.js";
+
+export class Services {
+  constructor(link, words, main) {
+    this.link = link;
+    this.name = words.get("service") ?? "";
+    this.type = null;
+    this.form = null;
+    this.choice = h("select", { class: "grow", "aria-label": "Service", onchange: () => this.choose(this.choice.value) });
+    this.about = h("span", { class: "muted" });
+    this.fields = h("div", {});
+    this.button = h("button", { type: "submit", class: "primary", hidden: true }, "Call");
+    this.answer = h("pre", { class: "answer", "aria-live": "polite" });
+    main.append(h("div", { class: "bar" }, this.choice, this.about),
+      h("form", { class: "panel details", onsubmit: (event) => { event.preventDefault(); this.call(); } }, this.fields, h("div", { class: "bar" }, this.button)), this.answer);
+    this.ending = link.watch(["services", "state"], () => this.update());
+  }
+
+  close() {
+    this.ending();
+  }
+
+  update() {
+    const names = [...this.link.services.keys()];
+    fill(this.choice, h("option", { value: "" }, names.length ? `choose one of ${names.length} services` : "no services"), names.map((name) => h("option", { value: name }, name)));
+    this.choice.value = this.link.services.has(this.name) ? this.name : "";
+    const service = this.link.services.get(this.name);
+    if (service && service.type !== this.type) this.show(service);
+    else if (!service && this.link.state === "open" && !this.type) fill(this.fields, h("p", { class: "muted" }, this.link.mayWrite ? "Choose a service: its request becomes a form." : "This token is read-only: it calls no services."));
+  }
+
+  choose(name) {
+    this.name = name;
+    this.type = null;
+    this.button.hidden = true;
+    fill(this.fields);
+    setText(this.answer, "");
+    history.replaceState(null, "", `#/services${name ? `?service=${encodeURIComponent(name)}` : ""}`);
+    this.update();
+  }
+
+  show(service) {
+    this.type = service.type;
+    setText(this.about, service.type);
+    const definition = this.link.definition(`${service.type}Request`, service.request);
+    if (!definition) return;
+    this.form = new MessageForm(definition);
+    fill(this.fields, this.form.element);
+    this.button.hidden = false;
+  }
+
+  async call() {
+    this.answer.classList.remove("error");
+    let request;
+    try {
+      request = this.form.value();
+      setText(this.answer, "waiting for the answer …");
+      const response = await this.link.call(this.name, request);
+      setText(this.answer, yaml(response) || "done: the answer has no fields");
+    } catch (error) {
+      this.answer.classList.add("error");
+      setText(this.answer, error.message);
+    }
+  }
+}
+
+/** Return a message as rosservice prints it. */
+export function yaml(value, indent = "") {
+  if (value !== null && typeof value === "object" && value.length === undefined) {
+    return Object.entries(value).map(([name, each]) => (each !== null && typeof each === "object" && each.length === undefined
+      ? `${indent}${name}:\n${yaml(each, `${indent}  `)}` : `${indent}${name}: ${plain(each)}`)).join("\n");
+  }
+  return `${indent}${plain(value)}`;
+}
+
+function plain(value) {
+  if (value !== null && typeof value === "object") return JSON.stringify(Array.from(value), (_, each) => (typeof each === "bigint" ? String(each) : each));
+  return typeof value === "string" ? JSON.stringify(value) : String(value);
+}
