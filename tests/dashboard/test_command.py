@@ -8,12 +8,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
+from pathlib import Path
 
 import pytest
 
 from minirospy.cli import dashboard as command
 from minirospy.dashboard import browser
 from minirospy.dashboard.browser import has_screen, open_link
+from minirospy.workspace.packages import Packages
 
 
 @pytest.fixture
@@ -30,7 +32,7 @@ def started(master: str) -> Iterator[list[subprocess.Popen[str]]]:
 def link_of(started: list[subprocess.Popen[str]], *words: str) -> str:
     started.append(
         subprocess.Popen(
-            [sys.executable, "-m", "minirospy", *words],
+            [sys.executable, *words],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -47,7 +49,7 @@ def link_of(started: list[subprocess.Popen[str]], *words: str) -> str:
 def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
     started: list[subprocess.Popen[str]],
 ) -> None:
-    link = link_of(started, "dashboard", "topics", "--no-browser", "--port", "0")
+    link = link_of(started, "-m", "minirospy", "dashboard", "topics", "--no-browser", "--port", "0")
     found = re.fullmatch(r"http://localhost:(\d+)/#/topics", link)
     assert found
     connection = HTTPConnection("localhost", int(found[1]), timeout=60)
@@ -59,14 +61,14 @@ def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
 
 
 def test_second_dashboard_takes_another_port(started: list[subprocess.Popen[str]]) -> None:
-    links = {link_of(started, "dashboard", "--no-browser") for _ in range(2)}
+    links = {link_of(started, "-m", "minirospy", "dashboard", "--no-browser") for _ in range(2)}
     assert len(links) == 2
 
 
 def test_port_in_use_is_one_line(
     started: list[subprocess.Popen[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    link = link_of(started, "dashboard", "--no-browser", "--port", "0")
+    link = link_of(started, "-m", "minirospy", "dashboard", "--no-browser", "--port", "0")
     port = link.rpartition(":")[2].partition("/")[0]
     assert command.dashboard(["--no-browser", "--port", port]) == 1
     error = capsys.readouterr().err
@@ -75,7 +77,18 @@ def test_port_in_use_is_one_line(
 
 
 def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.Popen[str]]) -> None:
-    link = link_of(started, "dashboard", "--no-browser", "--port", "0", "--listen")
+    link = link_of(
+        started,
+        "-m",
+        "minirospy",
+        "dashboard",
+        "--no-browser",
+        "--port",
+        "0",
+        "--listen",
+        "--address",
+        "127.0.0.1",
+    )
     assert re.fullmatch(r"http://localhost:\d+/#/topics\?token=[\w-]{22}", link)
 
 
@@ -84,6 +97,7 @@ def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.P
     [
         (command.dashboard, ["tpics"], "there is no view 'tpics'"),
         (command.dashboard, ["--port", "70000"], "--port 70000 is not between 0 and 65535"),
+        (command.dashboard, ["--address", "192.0.2.1"], "--address 192.0.2.1 lets other machines connect"),
         (command.rqt, ["-s", "rqt_moveit"], "there is no view for the plug-in 'rqt_moveit'"),
     ],
 )
@@ -112,3 +126,37 @@ def test_screen_is_known_by_the_environment() -> None:
     assert has_screen({"DISPLAY": ":0"}, "linux")
     assert has_screen({"BROWSER": "firefox"}, "linux")
     assert has_screen({}, "darwin")
+
+
+@pytest.mark.parametrize(
+    ("words", "end"),
+    [
+        (["rqt", "-s", "rqt_graph", "--clear-config"], "/#/graph"),
+        (["rqt_console", "__name:=console"], "/#/console"),
+        (
+            ["rqt_plot", "-P", "/turtle1/pose/x:y"],
+            "/#/plot?path=/turtle1/pose/x&path=/turtle1/pose/y&paused=1",
+        ),
+        (["rqt_graph"], "/#/graph"),
+        (["rqt_image_view", "/camera/image_raw"], "/#/image?topic=/camera/image_raw"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_commands_of_rqt_open_their_view(
+    started: list[subprocess.Popen[str]], words: list[str], end: str
+) -> None:
+    program = f"import sys; from minirospy.cli.dashboard import {words[0]}; sys.exit({words[0]}())"
+    link = link_of(started, "-c", program, *words[1:], "--no-browser", "--port", "0")
+    assert link.endswith(end)
+
+
+def test_words_of_rqt_plot_that_are_not_paths_are_usage_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.rqt_plot(["x"]) == 2
+    assert "'x' is not a topic and a field, as /turtle1/pose/x" in capsys.readouterr().err
+
+
+def test_rosrun_finds_the_programs_of_rqt() -> None:
+    packages = Packages()
+    for name in ("rqt_gui", "rqt_console", "rqt_plot", "rqt_graph", "rqt_image_view"):
+        found = packages.find_executable(name, name)
+        assert any(Path(str(word)).name == name for word in found), found

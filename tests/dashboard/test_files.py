@@ -28,14 +28,14 @@ def test_every_file_of_the_folder_is_served_but_the_list_of_versions() -> None:
 
 
 def test_page_loads_files_that_exist() -> None:
-    loaded = re.findall(r'(?:src|href)="([^"#]+)"', (FOLDER / "index.html").read_text())
+    loaded = re.findall(r'(?:src|href)="([^"#]+)"', (FOLDER / "index.html").read_text(encoding="utf-8"))
     assert len(loaded) > 3
     assert [name for name in loaded if f"/{name}" not in FILES] == []
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
 def test_imports_of_a_script_exist(script: Path) -> None:
-    text = script.read_text()
+    text = script.read_text(encoding="utf-8")
     names = re.findall(r'^(?:import|export) .*?from "([^"]+)";$', text, re.MULTILINE)
     names += re.findall(r'new URL\("([^"]+)", import', text)
     assert text.count("\nimport ") + text.startswith("import ") <= len(names)
@@ -46,13 +46,13 @@ def test_imports_of_a_script_exist(script: Path) -> None:
 def test_script_makes_no_html_of_text(path: Path) -> None:
     found = re.findall(
         r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|DOMParser",
-        path.read_text(),
+        path.read_text(encoding="utf-8"),
     )
     assert found == []
 
 
 def test_page_has_nothing_inline() -> None:
-    text = (FOLDER / "index.html").read_text()
+    text = (FOLDER / "index.html").read_text(encoding="utf-8")
     assert re.findall(r"<script(?![^>]*\bsrc=)|<style|\son\w+=|\sstyle=|javascript:", text) == []
     policy = SECURITY["Content-Security-Policy"]
     assert "unsafe" not in policy
@@ -60,7 +60,7 @@ def test_page_has_nothing_inline() -> None:
 
 
 def test_vendored_files_are_those_that_are_named() -> None:
-    packages = json.loads((VENDOR / "versions.json").read_text())
+    packages = json.loads((VENDOR / "versions.json").read_text(encoding="utf-8"))
     found = {path.relative_to(VENDOR) for path in VENDOR.rglob("*") if path.is_file()} - {
         Path("versions.json")
     }

@@ -12,7 +12,9 @@ from minirospy.errors import UsageError
 
 
 def test_page_has_the_views_that_links_name() -> None:
-    table = re.search(r"const VIEWS = \{(.*?)\};", (FOLDER / "js" / "main.js").read_text(), re.DOTALL)
+    table = re.search(
+        r"const VIEWS = \{(.*?)\};", (FOLDER / "js" / "main.js").read_text(encoding="utf-8"), re.DOTALL
+    )
     assert table
     assert tuple(re.findall(r"(\w+): \[", table[1])) == VIEWS
 

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE = 60.0
+PATIENCE = 90.0
 """Seconds for a state to come; a loaded machine needs some of them."""
 
 _FLAGS = (
@@ -185,12 +185,19 @@ class Page:
             assert time.monotonic() < end, "chromium does not start"
             time.sleep(0.05)
         port, path = file.read_text().splitlines()
-        with connect(f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None) as whole:
+        with connect(
+            f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
+        ) as whole:
             whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
             while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
                 pass
         target = next(each["targetId"] for each in answer["result"]["targetInfos"] if each["type"] == "page")
-        return connect(f"ws://127.0.0.1:{port}/devtools/page/{target}", max_size=None, compression=None)
+        return connect(
+            f"ws://127.0.0.1:{port}/devtools/page/{target}",
+            max_size=None,
+            compression=None,
+            open_timeout=PATIENCE,
+        )
 
 
 def _finding(find: str, text: str = "") -> str:

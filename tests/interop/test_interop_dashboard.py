@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import random
 import shutil
 import struct
 import subprocess
+import threading
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -17,6 +19,7 @@ from geometry_msgs.msg import Twist
 from roslib.message import get_message_class
 from std_msgs.msg import String
 
+from minirospy.dashboard.views import VIEWS
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import CHROMIUM, Page
 from tests.interop.test_interop_foreign import FOREIGN
@@ -27,7 +30,9 @@ needs_chromium = pytest.mark.skipif(not CHROMIUM, reason="chromium is not instal
 needs_node = pytest.mark.skipif(
     not shutil.which("node"), reason="node is not installed: apt-get install nodejs"
 )
-TYPES = sorted(json.loads((Path(__file__).parents[1] / "idl" / "golden.json").read_text())["msg"])
+TYPES = sorted(
+    json.loads((Path(__file__).parents[1] / "idl" / "golden.json").read_text(encoding="utf-8"))["msg"]
+)
 NUMBERS = {"int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
            "int64": "q", "uint64": "Q"}  # fmt: skip
 
@@ -221,8 +226,313 @@ def test_lost_connection_is_shown_and_comes_back(
     page.wait_text("#state", "connected")
 
 
+def logger(served: Served) -> Callable[..., None]:
+    """Return a function that publishes lines to /rosout_agg, as the node of roscore does."""
+    from rosgraph_msgs.msg import Log
+
+    publishing = publisher(served, "/rosout_agg", Log, latch=True, queue_size=None)
+
+    def log(*lines: tuple[int, str, str]) -> None:
+        async def run() -> None:
+            for level, name, text in lines:
+                await publishing.publish(
+                    Log(level=level, name=name, msg=text, file="a.py", line=7, function="run")
+                )
+
+        served.run(run())
+
+    return log
+
+
 @needs_chromium
-@pytest.mark.parametrize("view", ["topics"])
+def test_console_filters_pauses_and_shows_text_as_text(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    log = logger(served)
+    log((2, "/first", "hello <img src=x onerror=alert(1)>"))
+    page = browse(address(served, "console"))
+    page.wait_text(".line .text", "hello <img src=x")
+    log((1, "/first", "detail"), (4, "/second", "battery low"), (8, "/second", "motor 3 failed"))
+    page.wait_text(".bar", "4 of 4 lines")
+    page.click("button.level", "Debug")
+    page.wait_text(".bar", "3 of 4 lines")
+    page.choose("select[aria-label=Node]", "/second")
+    page.wait_text(".bar", "2 of 4 lines")
+    page.type("input[type=search]", "MOTOR")
+    page.wait_text(".bar", "1 of 4 lines")
+    page.click("label", "regex")
+    page.type("input[type=search]", "motor [0-9")
+    page.wait_text(".error", "regular expression")
+    page.type("input[type=search]", "motor [0-9]|low")
+    page.wait_text(".bar", "2 of 4 lines")
+    page.click(".line", "motor 3 failed")
+    page.wait_text(".details", "a.py:7 run")
+    page.click("button", "Pause")
+    log((16, "/second", "motor 4 gone"))
+    page.wait_text(".bar", "paused, 1 new")
+    page.click("button", "Continue")
+    page.wait_text(".bar", "3 of 5 lines")
+
+
+@needs_chromium
+def test_console_holds_many_lines_with_few_elements(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    log = logger(served)
+    log((2, "/many", "the first"))
+    page = browse(address(served, "console"))
+    page.wait_text(".bar", "1 of 1 lines")
+    for start in range(0, 20_000, 2000):
+        log(*((2, "/many", f"line {number}") for number in range(start, start + 2000)))
+        # One part after the other: a browser that is slower than this test would lose lines, as it should.
+        page.wait_text(".bar", f"{start + 2001} of {start + 2001} lines")
+    page.wait_text(".line .text", "line 19999")
+    assert page.evaluate("document.querySelectorAll('.line').length") < 100
+    page.evaluate("document.querySelector('.virtual').scrollTop = 0")
+    page.wait_text(".line .text", "the first")
+    page.click("button", "Latest")
+    page.wait_text(".line .text", "line 19999")
+
+
+@needs_chromium
+def test_console_sets_levels_of_loggers(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    from roscpp.msg import Logger
+    from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
+
+    served = serve()
+    node = served.node("worker")
+    levels = {"rosout": "info"}
+    changed = threading.Event()
+
+    def set_level(request: Any) -> Any:
+        levels[request.logger] = request.level
+        changed.set()
+        return SetLoggerLevelResponse()
+
+    async def offer() -> None:
+        await node.serve(
+            "/other/get_loggers",
+            GetLoggers,
+            lambda _: GetLoggersResponse([Logger("rosout", levels["rosout"])]),
+        )
+        await node.serve("/other/set_logger_level", SetLoggerLevel, set_level)
+
+    served.run(offer())
+    page = browse(address(served, "console"))
+    page.wait_text("#state", "connected")
+    page.wait(
+        "document.querySelector('.loggers select')?.options.length > 1 || "
+        "([...document.querySelectorAll('button')].find(e => e.textContent === 'Logger levels').click(), false);"
+        "return document.querySelector('.loggers select')?.options.length > 1"
+    )
+    page.choose(".loggers select", "/other")
+    page.choose(".loggers .grid select", "debug")
+    assert changed.wait(60)
+    assert levels == {"rosout": "debug"}
+
+
+@needs_chromium
+def test_plot_draws_fields_of_a_topic_without_loss(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from geometry_msgs.msg import Vector3
+
+    served = serve()
+    moving = publisher(served, "/odometry", Vector3, latch=True, queue_size=None)
+    served.run(moving.publish(0.0, 0.0, 0.0))
+    page = browse(address(served, "plot?path=/odometry/x&path=/odometry.y"))
+    page.wait_text(".series[data-label='/odometry/x']", "1 points")
+
+    async def publish() -> None:
+        for number in range(1, 5000):
+            await moving.publish(float(number), 1.5, 0.0)
+
+    served.run(publish())
+    page.wait_text(".series[data-label='/odometry/x']", "5000 points")
+    page.wait_text(".series[data-label='/odometry/x'] .num", "4999")
+    page.wait_text(".series[data-label='/odometry/y'] .num", "1.5")
+    page.type("input[list=paths]", "/odometry/z")
+    page.click("button[type=submit]")
+    page.wait_text(".series[data-label='/odometry/z']", "/odometry/z")
+    assert "path=%2Fodometry%2Fz" in page.evaluate("location.href")
+    page.wait("return document.querySelector('.chart canvas').width > 300")
+    page.click(".series[data-label='/odometry/y'] button", "left axis")
+    page.wait_text(".series[data-label='/odometry/y'] button", "right axis")
+    page.click(".series[data-label='/odometry/z'] button[title^=Remove]")
+    page.wait("return !document.querySelector(\".series[data-label='/odometry/z']\")")
+
+
+@needs_chromium
+def test_plot_takes_slices_and_waits_for_a_topic(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from std_msgs.msg import Float64MultiArray
+
+    served = serve()
+    page = browse(address(served, "plot?path=/late/data[1:3]"))
+    page.wait_text(".error", "waiting for /late/data[1:3]")
+    served.run(publisher(served, "/late", Float64MultiArray, latch=True).publish(data=[1.0, 2.0, 3.0, 4.0]))
+    page.wait_text(".series[data-label='/late/data[1]'] .num", "2")
+    page.wait_text(".series[data-label='/late/data[2]'] .num", "3")
+    assert page.evaluate("document.querySelectorAll('.series').length") == 2
+
+
+@needs_chromium
+def test_graph_shows_nodes_and_topics_and_their_details(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    listener = served.node("listener")
+    publisher(served, "/chatter", String)
+
+    async def listen() -> Any:
+        return await listener.subscribe("/chatter", String)
+
+    subscription = served.run(listen())
+    page = browse(address(served, "graph"))
+    page.wait_text(".node text", "/talker_chatter")
+    page.wait_text(".node text", "/listener")
+    page.wait("return document.querySelectorAll('.edge').length === 2")
+    page.click(".graph .topic", "/chatter")
+    page.wait_text(".side", "std_msgs/String")
+    page.click(".side button", "/listener")
+    page.wait_text(".side", "Subscribes to (1)")
+    page.choose("select[aria-label='What is shown']", "nodes")
+    page.wait_text(".edge text", "/chatter")
+    assert page.evaluate("document.querySelectorAll('.graph .topic').length") == 0
+    page.choose("select[aria-label='What is shown']", "all")
+    page.wait_text(".graph .topic text", "/chatter")
+    assert "/rosout" not in page.evaluate("document.querySelector('svg.graph').textContent")
+    page.click("label", "hide debug")
+    page.wait_text(".graph .topic text", "/rosout")
+    served.run(subscription.close())
+    page.wait("return ![...document.querySelectorAll('.edge')].some(e => e.dataset.to === 'n/listener')")
+
+
+@needs_chromium
+def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    from minirospy.gpio.board import Board
+
+    served = serve()
+    with Board() as board:
+        page = browse(address(served, "board"))
+        page.wait("return document.querySelector('[aria-label=\"LED GPIO 7 red off\"]')")
+        board.set(7, 1)
+        page.wait("return document.querySelector('.lit[aria-label=\"LED GPIO 7 red on\"]')")
+        edges = board.watch([11, 12], timeout=60)
+        page.mouse("mousePressed", ".push[data-pin='11']")
+        assert next(edges)[:2] == (11, 1)
+        page.wait("return document.querySelector('.push.down[data-pin=\"11\"]')")
+        page.mouse("mouseReleased", ".push[data-pin='11']")
+        assert next(edges)[:2] == (11, 0)
+        for kind, level in (("keyDown", 1), ("keyUp", 0)):
+            page.call("Input.dispatchKeyEvent", type=kind, key="2", code="Digit2", text="2" if level else "")
+            assert next(edges)[:2] == (12, level)
+        page.click("button", "Let a person come")
+        page.wait_text(".panel", "0.60 m ahead")
+        board.move_person((0.3, 0.0))
+        page.wait_text(".panel", "in the protective field")
+
+
+@needs_chromium
+def test_image_is_drawn_and_its_pixels_have_values(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from sensor_msgs.msg import CompressedImage, Image
+
+    served = serve()
+    raw = Image(
+        height=2,
+        width=2,
+        encoding="bgr8",
+        step=8,
+        data=bytes((1, 2, 3, 4, 5, 6, 0, 0, 7, 8, 9, 10, 11, 12, 0, 0)),
+    )
+    served.run(publisher(served, "/camera/image_raw", Image, latch=True).publish(raw))
+    one_red_pixel = base64.b64decode(
+        "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"
+    )
+    packed = CompressedImage(format="png", data=one_red_pixel)
+    served.run(publisher(served, "/camera/compressed", CompressedImage, latch=True).publish(packed))
+    page = browse(address(served, "image?topic=/camera/image_raw"))
+    page.wait_text(".status", " 2 · bgr8")
+    pixel = "Array.from(document.querySelector('canvas').getContext('2d').getImageData(%d, %d, 1, 1).data)"
+    assert page.evaluate(pixel % (0, 0)) == [3, 2, 1, 255]
+    assert page.evaluate(pixel % (1, 1)) == [12, 11, 10, 255]
+    page.choose("select", "/camera/compressed")
+    page.wait_text(".status", " 1 · png")
+    assert page.evaluate(pixel % (0, 0)) == [255, 0, 0, 255]
+
+
+@needs_chromium
+def test_service_is_called_by_its_form(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    from rospy_tutorials.srv import AddTwoInts, AddTwoIntsResponse
+
+    served = serve()
+    node = served.node("adder")
+
+    async def offer() -> None:
+        await node.serve("/add", AddTwoInts, lambda request: AddTwoIntsResponse(request.a + request.b))
+
+    served.run(offer())
+    page = browse(address(served, "services?service=/add"))
+    page.wait_text(".form", "int64")
+    page.type("input[name=a]", "40")
+    page.type("input[name=b]", "2")
+    page.click("button", "Call")
+    page.wait_text(".answer", "sum: 42")
+    page.type("input[name=b]", "2.5")
+    page.click("button", "Call")
+    page.wait_text(".answer.error", 'b: "2.5" is not a whole number')
+
+
+@needs_chromium
+def test_message_is_published_by_its_form(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    served = serve()
+    publisher(served, "/cmd_vel", Twist)
+    robot = served.node("robot")
+
+    async def listen() -> Any:
+        return await robot.subscribe("/cmd_vel", Twist)
+
+    subscription = served.run(listen())
+    page = browse(address(served, "publish?topic=/cmd_vel"))
+    page.wait_text(".form", "angular")
+    page.type("input[name=x]", "0.5")
+    page.click("button", "Repeat")
+    assert served.run(subscription.next(60)).linear.x == 0.5
+    page.wait_text("p[role=status]", "published")
+    page.click("button", "Stop")
+    page.type("input[name=x]", "fast")
+    page.click("button", "Publish once")
+    page.wait_text("p.error", 'x: "fast" is not a number')
+
+
+@needs_chromium
+def test_parameters_are_shown_set_and_deleted(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    node = served.node("robot")
+    served.run(node.set_param("/robot/speed", 1.5))
+    page = browse(address(served, "parameters"))
+    page.wait("return document.querySelector(\"[data-name='/robot/speed'] input\")?.value === '1.5'")
+    served.run(node.set_param("/robot/speed", 2))
+    page.wait("return document.querySelector(\"[data-name='/robot/speed'] input\")?.value === '2'")
+    page.type("input[placeholder='/name']", "/robot/list")
+    page.type("input[placeholder^=value]", "[1, 2]")
+    page.click("button", "Set")
+    page.wait("return document.querySelector(\"[data-name='/robot/list'] input\")?.value === '[1,2]'")
+    assert served.run(node.get_param("/robot/list")) == [1, 2]
+    page.click("[data-name='/robot/list'] button", "delete")
+    page.wait("return !document.querySelector(\"[data-name='/robot/list']\")")
+    assert not served.run(node.has_param("/robot/list"))
+
+
+@needs_chromium
+@pytest.mark.parametrize("view", VIEWS)
 def test_view_fits_a_phone(serve: Callable[..., Served], browse: Callable[..., Page], view: str) -> None:
     served = serve()
     served.run(publisher(served, "/a/rather/long/name/of/a/topic", String, latch=True).publish("x " * 200))
