@@ -1,9 +1,13 @@
-"""A program of roslibpy: `roslibpy_peer.py PORT` does with the bridge what the test expects, and prints it as JSON."""
+"""A program of roslibpy: `roslibpy_peer.py PORT` does with the bridge what the test expects, and prints it as JSON.
+
+A second line follows when the bridge has been replaced.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
+import queue
 import sys
 import threading
 from typing import Any
@@ -12,7 +16,7 @@ import roslibpy
 import roslibpy.ros1.actionlib
 import roslibpy.tf
 
-SECONDS = 30
+SECONDS = 60
 
 
 class Box:
@@ -33,16 +37,28 @@ class Box:
         return self._value
 
 
+def offer_action(client: Any) -> None:
+    """Start an action server."""
+    server = roslibpy.ros1.actionlib.SimpleActionServer(
+        client, "/py_fibonacci", "actionlib_tutorials/FibonacciAction"
+    )
+
+    def execute(request: Any) -> None:
+        server.set_succeeded({"sequence": list(range(request["order"]))})
+
+    server.start(execute)
+
+
 def main() -> None:
     """Do everything, and print the results."""
     client = roslibpy.Ros(host="127.0.0.1", port=int(sys.argv[1]))
     client.run(timeout=SECONDS)
     done: dict[str, Any] = {}
 
-    box = Box()
+    latched: queue.Queue[Any] = queue.Queue()
     listener = roslibpy.Topic(client, "/latched", "std_msgs/String")
-    listener.subscribe(box)
-    done["latched"] = box.get()
+    listener.subscribe(latched.put)
+    done["latched"] = latched.get(timeout=SECONDS)
 
     box = Box()
     image = roslibpy.Topic(client, "/image", "sensor_msgs/Image", queue_length=1)
@@ -83,6 +99,7 @@ def main() -> None:
     goal.send(timeout=SECONDS)
     done["action"] = goal.wait(SECONDS)["sequence"]
 
+    offer_action(client)
     box = Box()
     transforms = roslibpy.tf.TFClient(
         client, fixed_frame="/world", angular_threshold=0.0, translation_threshold=0.0
@@ -91,6 +108,9 @@ def main() -> None:
     done["tf"] = box.get()["translation"]["x"]
 
     print(json.dumps(done), flush=True)
+    again = latched.get(timeout=SECONDS)
+    request = roslibpy.ServiceRequest({"data": False})
+    print(json.dumps([again, dict(service.call(request, timeout=SECONDS))]), flush=True)
     sys.stdin.readline()
     client.terminate()
 

@@ -84,7 +84,7 @@ class Peer:
     async def line(self) -> str:
         """Return the next line."""
         assert self._process.stdout
-        return (await asyncio.wait_for(self._process.stdout.readline(), 40)).decode().rstrip()
+        return (await asyncio.wait_for(self._process.stdout.readline(), 120)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
         """Return what it prints, now or before, about ``what``."""

@@ -6,6 +6,7 @@ roslibpy brings twisted and autobahn: it is installed once into an environment o
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import shutil
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from actionlib_tutorials.msg import FibonacciAction
+from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import String
@@ -24,8 +25,10 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
-from minirospy.actionlib.aio import ActionServer
+from minirospy.actionlib.aio import ActionClient, ActionServer
 from minirospy.bridge.bridge import Bridge, BridgeOptions
+from minirospy.errors import ServiceException
+from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import modules
 
 __all__ = ["modules"]
@@ -84,38 +87,41 @@ async def serve(node: Node) -> list[Any]:
 
 def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: str) -> None:
     async def run() -> tuple[dict[str, Any], list[Any]]:
-        async with Node("peer", rosout=False) as node, Node("bridge", rosout=False) as inner:
+        options = {"rosapi": True, "transforms": True}
+        async with Gate() as gate, Node("peer", rosout=False) as node:
             offers = await serve(node)
-            options = BridgeOptions(
-                foxglove_port=None, rosbridge_port=0, diagnostics=False, rosapi=True, transforms=True
-            )
-            bridge = Bridge(inner, options)
-            await bridge.start()
             published = node.subscribe("/from_roslibpy", String)
             copies = node.subscribe("/image_copy", Image)
-            peer = await asyncio.create_subprocess_exec(
-                roslibpy_python,
-                str(PEER),
-                str(bridge.listeners["rosbridge"].port),
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.PIPE,
-            )
-            try:
-                assert peer.stdout
-                line = await asyncio.wait_for(peer.stdout.readline(), 90)
-                if not line:
-                    assert peer.stderr
-                    raise AssertionError((await peer.stderr.read()).decode())
-                found = json.loads(line)
-                text, copy = await published.next(30), await copies.next(30)
-                response = await node.call("/ours", SetBool, True)
-            finally:
-                peer.kill()
-                await peer.wait()
-                await bridge.close()
+            client: Any = ActionClient(node, "/py_fibonacci", FibonacciAction)
+            async with contextlib.AsyncExitStack() as stack:
+                async with serving(gate, "rosbridge", **options):
+                    peer = await asyncio.create_subprocess_exec(
+                        roslibpy_python,
+                        str(PEER),
+                        str(gate.port),
+                        stdin=asyncio.subprocess.PIPE,
+                        stdout=asyncio.subprocess.PIPE,
+                        stderr=asyncio.subprocess.PIPE,
+                    )
+                    stack.push_async_callback(end, peer)
+                    found = await line_of(peer)
+                    text, copy = await published.next(60), await copies.next(60)
+                    await node.wait_for_service("/ours", 60)
+                    response = await node.call("/ours", SetBool, True)
+                    async with client:
+                        await client.wait_for_server(60)
+                        result = await client.send(FibonacciGoal(order=3))
+
+                async with serving(gate, "rosbridge", **options):
+                    again = await line_of(peer)
+                    answer = None
+                    while answer is None:
+                        # roslibpy offers its services again a second after it has lost its connection.
+                        with contextlib.suppress(ServiceException):
+                            answer = await node.call("/ours", SetBool, False)
             await offers[-1].close()
-            return found, [text.data, bytes(copy.data) == DATA, response.success, response.message]
+            ours = [text.data, bytes(copy.data) == DATA, response.success, response.message]
+            return found, [*ours, list(result.sequence), again, answer.success]
 
     found, ours = asyncio.run(run())
     assert found == {
@@ -131,7 +137,27 @@ def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: 
         "action": [0, 1, 2],
         "tf": 1.5,
     }
-    assert ours == ["hello", True, True, "from roslibpy"]
+    assert ours == [
+        *("hello", True, True, "from roslibpy", [0, 1, 2]),
+        [{"data": "hello"}, {"success": False, "message": "from minirospy"}],
+        False,
+    ]
+
+
+async def line_of(peer: asyncio.subprocess.Process) -> Any:
+    """Return the next JSON that a program prints."""
+    assert peer.stdout
+    assert peer.stderr
+    line = await asyncio.wait_for(peer.stdout.readline(), 120)
+    if not line:
+        raise AssertionError((await peer.stderr.read()).decode())
+    return json.loads(line)
+
+
+async def end(peer: asyncio.subprocess.Process) -> None:
+    """End a program."""
+    peer.kill()
+    await peer.communicate()
 
 
 def test_roslib_js_reads_every_compression(master: str, modules: Path) -> None:

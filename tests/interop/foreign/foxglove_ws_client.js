@@ -1,49 +1,28 @@
 // A conversation by @foxglove/ws-protocol, the client of Foxglove Studio and Lichtblick; a line of JSON for each step.
 // node foxglove_ws_client.js URL SUB-PROTOCOL; both packages are found by NODE_PATH.
-const { FoxgloveClient } = require("@foxglove/ws-protocol");
-const WebSocket = require("ws");
+const { App } = require("./foxglove_app.js");
 
 const [url, subprotocol] = process.argv.slice(2);
-const socket = new WebSocket(url, [subprotocol]);
-const client = new FoxgloveClient({ ws: socket });
+const app = new App(url, subprotocol);
+const { client } = app;
 const say = (step, value) => console.log(JSON.stringify({ step, value }));
-const once = (name, wanted = () => true) =>
-  new Promise((resolve) => {
-    const listener = (event) => {
-      if (wanted(event)) {
-        client.off(name, listener);
-        resolve(event);
-      }
-    };
-    client.on(name, listener);
-  });
+const once = (name, wanted) => app.once(name, wanted);
 const bytes = (view) => Buffer.from(view.buffer, view.byteOffset, view.byteLength);
 
 client.on("error", (error) => say("error", String(error)));
 client.on("status", (status) => say("status", status.message));
-const channels = new Map();
-client.on("advertise", (offered) => offered.forEach((each) => channels.set(each.topic, each)));
-const services = new Map();
-client.on("advertiseServices", (offered) => offered.forEach((each) => services.set(each.name, each)));
-
-const found = async (table, name, event) => {
-  while (!table.has(name)) {
-    await once(event);
-  }
-  return table.get(name);
-};
 
 (async () => {
-  const info = await once("serverInfo");
+  const info = await app.info;
   say("serverInfo", { capabilities: info.capabilities, distro: info.metadata.ROS_DISTRO });
 
-  const channel = await found(channels, "/latched", "advertise");
+  const channel = await app.channel("/latched");
   const subscription = client.subscribe(channel.id);
   const message = await once("message", (each) => each.subscriptionId === subscription);
   say("message", { schema: channel.schemaName, hex: bytes(message.data).toString("hex") });
   client.unsubscribe(subscription);
 
-  const service = await found(services, "/set", "advertiseServices");
+  const service = await app.service("/set");
   const answer = once("serviceCallResponse", (each) => each.callId === 7);
   client.sendServiceCallRequest({
     serviceId: service.id,
@@ -76,13 +55,12 @@ const found = async (table, name, event) => {
   const text = Buffer.alloc(4 + large.length);
   text.writeUInt32LE(large.length);
   text.write(large, 4);
-  await found(channels, "/from_node", "advertise");
-  const echo = client.subscribe(channels.get("/from_node").id);
+  const echo = client.subscribe((await app.channel("/from_node")).id);
   const timer = setInterval(() => client.sendMessage(own, new Uint8Array(text)), 100);
   const returned = await once("message", (each) => each.subscriptionId === echo);
   clearInterval(timer);
   say("published", bytes(returned.data).equals(text));
   client.unadvertise(own);
   client.close();
-  socket.close();
+  app.socket.close();
 })();
