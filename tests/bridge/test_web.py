@@ -24,6 +24,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.bridge.web.connection import Limits
+from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.errors import BridgeError
 
 if TYPE_CHECKING:
@@ -302,6 +303,28 @@ def test_client_that_opens_and_closes_leaves_nothing_behind(bridge: Running) -> 
     assert_alive(steady)
 
 
+def test_connections_that_come_too_often_are_refused(bridge: Running) -> None:
+    now = 0.0
+    listener = bridge.bridge.listeners["foxglove"]
+    first = bridge.client()
+    bridge.call(lambda: setattr(listener, "rate", ConnectionRate(50, 10, lambda: now)))
+    request = b"GET /none HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    # What is refused is refused before its request has come.
+    answers = [raw_answer(bridge.port, request if number < 10 else b"") for number in range(300)]
+    statuses = [answer.split(b" ")[1] for answer in answers]
+    assert statuses == [b"404"] * 10 + [b"429"] * 290
+    assert answers[-1].startswith(b"HTTP/1.1 429 Too Many Requests\r\n")
+    assert b"Retry-After: 1\r\n" in answers[-1]
+    assert answers[-1].endswith(b"\r\n\r\ntoo many new connections from this address: wait a second\n")
+    assert listener.refused == 290
+    assert len(listener.rate) == 1
+    assert_alive(first)
+    now = 1.0
+    assert_alive(bridge.client())
+    while bridge.call(lambda: len(listener.connections)) > 2:
+        time.sleep(0.01)
+
+
 def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(messages_a_second=50))
     start_time, all_sent = time.monotonic(), threading.Event()
@@ -371,6 +394,16 @@ def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tm
     connection.request("GET", "/status")
     assert connection.getresponse().status == 200
     connection.close()
+    listener = bridge.bridge.listeners["foxglove"]
+    bridge.call(lambda: setattr(listener, "rate", ConnectionRate(1, 0, lambda: 0.0)))
+    with (
+        socket.create_connection(("127.0.0.1", bridge.port), 30) as sock,
+        context.wrap_socket(sock, server_hostname="127.0.0.1") as encrypted,
+    ):
+        answer = b"".join(iter(partial(encrypted.recv, 4096), b""))
+    assert answer.startswith(b"HTTP/1.1 429 ")
+    assert answer.endswith(b"too many new connections from this address: wait a second\n")
+    bridge.call(lambda: setattr(listener, "rate", ConnectionRate(1, 5, lambda: 0.0)))
     assert not raw_answer(bridge.port, b"GET / HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 2")
 
 

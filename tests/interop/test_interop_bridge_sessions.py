@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+import pytest
 from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image
@@ -22,6 +23,8 @@ from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import Peer, modules
 
 __all__ = ["modules"]
+
+pytestmark = pytest.mark.timeout(600)
 
 DATA = bytes(range(256)) * 3600
 DIGEST = hashlib.sha1(DATA).hexdigest()

@@ -85,6 +85,7 @@ async def serve(node: Node) -> list[Any]:
     return [latched, images, static, service, action]
 
 
+@pytest.mark.timeout(600)
 def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: str) -> None:
     async def run() -> tuple[dict[str, Any], list[Any]]:
         options = {"rosapi": True, "transforms": True}

@@ -44,7 +44,11 @@ PLAIN_HEADERS = {
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one client: bytes of a message, messages and bytes a second, seconds without progress, connections."""
+    """The limits of one client: bytes of a message, messages a second, bytes that wait, seconds without progress.
+
+    ``connections`` is the number of all clients together; an address may open ``connections_a_second``, and at first
+    ``connection_burst``.
+    """
 
     message: int = 64_000_000
     unfinished: int = 256_000_000
@@ -52,6 +56,8 @@ class Limits:
     messages_a_second: int = 20_000
     queue: int = DEFAULT_LIMIT
     connections: int = 256
+    connections_a_second: float = 50.0
+    connection_burst: int = 500
     handshake_seconds: float = 10.0
     ping_seconds: float = 20.0
     silent_seconds: float = 60.0

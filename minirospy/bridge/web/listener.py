@@ -8,12 +8,15 @@ import errno
 import logging
 import socket
 import ssl
+import time
 from collections.abc import Callable, Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from minirospy.bridge.access import Access, Credentials, Grant, Refusal
+from minirospy.bridge.web.client import PLAIN_HEADERS, response_head
 from minirospy.bridge.web.connection import Connection, Door, HttpHandler, Limits
 from minirospy.bridge.web.pipe import PipeEvents, PlainPipe, TlsPipe
+from minirospy.bridge.web.rate import ConnectionRate
 from minirospy.errors import BridgeError
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import is_file_limit
@@ -23,10 +26,21 @@ __all__ = ["Listener", "Relay"]
 _log = logging.getLogger(__name__)
 
 _ACCEPTS_A_TURN = 50
-_BUSY = (
-    b"HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Type: text/plain\r\n"
-    b"Retry-After: 5\r\nContent-Length: 22\r\n\r\ntoo many connections.\n"
-)
+_REQUEST = 64 * 1024
+
+
+def _refusal(status: int, retry_after: int, text: str) -> bytes:
+    headers = {
+        **PLAIN_HEADERS,
+        "Content-Type": "text/plain; charset=utf-8",
+        "Retry-After": str(retry_after),
+        "Content-Length": str(len(text) + 1),
+    }
+    return response_head(status, headers) + f"{text}\n".encode()
+
+
+_TOO_MANY = _refusal(503, 5, "too many connections.")
+_TOO_OFTEN = _refusal(429, 1, "too many new connections from this address: wait a second")
 
 
 class Listener:
@@ -48,7 +62,10 @@ class Listener:
         self.limits = limits or Limits()
         self.connections: set[Connection] = set()
         self.refused = 0
-        """Connections that were refused because there were too many."""
+        """Connections that were refused because there were too many, or too many new ones."""
+        self.rate = ConnectionRate(
+            self.limits.connections_a_second, self.limits.connection_burst, time.monotonic
+        )
         self._unfinished = 0
 
         self.host = ""
@@ -150,12 +167,9 @@ class Listener:
                 return
 
             sock.setblocking(False)
-            if len(self.connections) >= self.limits.connections:
-                self.refused += 1
-                with contextlib.suppress(OSError):
-                    sock.send(_BUSY)
-                    sock.shutdown(socket.SHUT_WR)
-                sock.close()
+            refusal = self._refusal_of(str(address[0]))
+            if refusal:
+                _refuse(sock, refusal)
                 continue
             with contextlib.suppress(OSError):
                 sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -180,15 +194,37 @@ class Listener:
         pipe.resume()
 
     def _connected_tls(self, pipe: TlsPipe, peer: str) -> PipeEvents | None:
-        if len(self.connections) >= self.limits.connections:
-            self.refused += 1
+        refusal = self._refusal_of(peer)
+        if refusal:
+            pipe.write((refusal,))
             return None
         return self._add(Connection(self, pipe, peer, asyncio.get_running_loop()))
+
+    def _refusal_of(self, peer: str) -> bytes | None:
+        """Return the answer to a client that may not connect now."""
+        if len(self.connections) >= self.limits.connections:
+            refusal = _TOO_MANY
+        elif not self.rate.admits(peer):
+            refusal = _TOO_OFTEN
+        else:
+            return None
+        self.refused += 1
+        return refusal
 
     def _add(self, connection: Connection) -> Connection:
         self.connections.add(connection)
         self._on_change(len(self.connections))
         return connection
+
+
+def _refuse(sock: socket.socket, answer: bytes) -> None:
+    with contextlib.suppress(OSError):
+        sock.send(answer)
+        sock.shutdown(socket.SHUT_WR)
+    with contextlib.suppress(OSError):
+        # A socket that is closed with unread bytes resets the connection, and with it the answer.
+        sock.recv(_REQUEST)
+    sock.close()
 
 
 class Relay:

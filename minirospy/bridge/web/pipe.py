@@ -166,7 +166,7 @@ class TlsPipe(asyncio.Protocol):
     """An encrypted connection."""
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
-        """``connected(pipe, peer's address)`` returns the events' target, None to refuse."""
+        """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
         self._connected = connected
         self._events: PipeEvents | None = None
         self._transport: asyncio.Transport | None = None
@@ -212,7 +212,7 @@ class TlsPipe(asyncio.Protocol):
         peer = transport.get_extra_info("peername") or ("?",)
         self._events = self._connected(self, str(peer[0]))
         if self._events is None:
-            transport.abort()
+            transport.close()
 
     def data_received(self, data: bytes) -> None:
         """Pass on bytes."""

@@ -1,0 +1,44 @@
+"""How many new connections each address may open: a token bucket for each. Pure."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import NamedTuple
+
+__all__ = ["MOST_ADDRESSES", "ConnectionRate"]
+
+MOST_ADDRESSES = 1000
+"""Addresses that are remembered; the one that connected longest ago is forgotten first."""
+
+
+class _Bucket(NamedTuple):
+    tokens: float
+    since: float
+
+
+class ConnectionRate:
+    """The rate limit of new connections."""
+
+    def __init__(self, a_second: float, burst: int, clock: Callable[[], float]) -> None:
+        """``burst``: how many an address may open at once; ``clock`` returns seconds."""
+        self._a_second = a_second
+        self._burst = burst
+        self._clock = clock
+        self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
+
+    def __len__(self) -> int:
+        """Return the number of addresses that are remembered."""
+        return len(self._buckets)
+
+    def admits(self, address: str) -> bool:
+        """Return whether an address may open a connection now, and count it."""
+        now = self._clock()
+        tokens, since = self._buckets.pop(address, _Bucket(self._burst, now))
+        tokens = min(self._burst, tokens + (now - since) * self._a_second)
+        is_admitted = tokens >= 1
+        self._buckets[address] = _Bucket(tokens - is_admitted, now)
+
+        if len(self._buckets) > MOST_ADDRESSES:
+            self._buckets.popitem(last=False)
+        return is_admitted
