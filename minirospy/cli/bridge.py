@@ -30,7 +30,9 @@ def _parser() -> Parser:
         "Only programs of this machine may connect, unless --listen is given.",
     )
     parser.add_argument(
-        "--port", type=int, default=8765, help="port of the Foxglove protocol (8765); 0 takes a free one"
+        "--port",
+        type=int,
+        help="port of the Foxglove protocol (8765); 0 takes a free one; with --status: of the bridge (all usual ports)",
     )
     parser.add_argument(
         "--rosbridge-port",
@@ -148,7 +150,7 @@ def _parser() -> Parser:
 
 
 def _bridge(
-    port: int,
+    port: int | None,
     rosbridge_port: int | None,
     no_rosbridge: bool,
     listen: bool,
@@ -177,14 +179,13 @@ def _bridge(
 ) -> int:
     from minirospy.bridge.serve import require_libraries
 
+    if status:
+        return _show_status(port, rosbridge_port, token, as_json=json)
+    port = 8765 if port is None else port
     _check_range("port", port, 0, 65535)
     if rosbridge_port is None:
         rosbridge_port = 9090 if port else 0
     _check_range("rosbridge-port", rosbridge_port, 0, 65535)
-    if status:
-        from minirospy.cli.bridge_status import show_status
-
-        return show_status(port, token, as_json=json)
     if show_tokens:
         kept = _tokens("", "", beyond=True, renews=new_tokens)
         print(f"read-write: {kept.write}\nread-only: {kept.read}")
@@ -237,6 +238,16 @@ def _bridge(
         return Bridge(node, options)
 
     return run(name, (), start, lambda bridge: _announce(bridge, options, tokens))
+
+
+def _show_status(port: int | None, rosbridge_port: int | None, token: str, *, as_json: bool) -> int:
+    from minirospy.cli.bridge_status import show_status
+
+    ports = [each for each in (port, rosbridge_port) if each is not None]
+    for each in ports:
+        _check_range("port", each, 1, 65535)
+    # Those of Foxglove, rosbridge and web_video_server.
+    return show_status(ports or (8765, 9090, 8080), token, as_json=as_json)
 
 
 def _check_range(name: str, value: int, low: int, high: int) -> None:

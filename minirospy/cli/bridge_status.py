@@ -1,9 +1,10 @@
-"""`minirospy bridge --status`: what a running bridge serves, and to whom."""
+"""`minirospy bridge --status`: what running bridges serve, and to whom."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from minirospy.errors import BridgeError
 
@@ -11,22 +12,61 @@ __all__ = ["show_status"]
 
 _SECONDS = 5.0
 _MOST_BYTES = 10_000_000
+_SCHEMES = {"video": "http"}
 
 
-def show_status(port: int, token: str, *, as_json: bool) -> int:
-    """Print the status of the bridge at a port of this machine; return the exit status. Raises BridgeError."""
-    found = _fetch(port, token)
-    if as_json:
-        print(json.dumps(found, indent=1))
+class _Token(NamedTuple):
+    """``is_kept``: it is from ROS_HOME, where this user's bridges keep theirs."""
+
+    text: str
+    is_kept: bool
+
+
+class _NoBridgeError(BridgeError):
+    """Nothing answers at a port."""
+
+
+def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
+    """Print the status of the bridges at these ports of this machine; return the exit status.
+
+    Raises BridgeError where none answers, or one refuses.
+    """
+    found: dict[str, Any] = {}
+    faults: list[BridgeError] = []
+    for port in ports:
+        try:
+            status = _fetch(port, _token(token))
+        except BridgeError as error:
+            faults.append(error)
+        else:
+            # A bridge has a port for each protocol.
+            found.setdefault(status["node"], status)
+
+    if as_json and found:
+        statuses = list(found.values())
+        print(json.dumps(statuses[0] if len(ports) == 1 else statuses, indent=1))
+    elif found:
+        for status in found.values():
+            _print_bridge(status)
+    refusals = [fault for fault in faults if not isinstance(fault, _NoBridgeError)]
+    if refusals:
+        raise refusals[0]
+    if found:
         return 0
+    if len(ports) == 1:
+        raise faults[0]
+    listed = ", ".join(map(str, ports))
+    raise BridgeError(f"no bridge answers at the ports {listed} of this machine: give --port, or start one")
 
+
+def _print_bridge(found: Any) -> None:
     print(f"node [{found['node']}], for {found['seconds']:.0f} s")
     for name, door in found["doors"].items():
-        scheme = "wss" if door["encrypted"] else "ws"
+        url = _url(_SCHEMES.get(name, "ws"), door)
         refused = f", {door['refused']} refused" if door["refused"] else ""
-        print(
-            f"{name}: {scheme}://{door['address']}:{door['port']}, {door['connections']} connections{refused}"
-        )
+        print(f"{name}: {url}, {door['connections']} connections{refused}")
+    if "video" not in found["doors"]:
+        print(f"video: {', '.join(_url('http', door) for door in found['doors'].values())}")
     print(f"{len(found['topics'])} topics subscribed")
     for client in found["clients"]:
         print(
@@ -34,20 +74,27 @@ def show_status(port: int, token: str, *, as_json: bool) -> int:
             f"{client['sent']} messages sent ({_size(client['sent_bytes'])}), {client['dropped']} dropped, "
             f"{client['waiting']} waiting ({_size(client['waiting_bytes'])}), {client['received']} received"
         )
-    return 0
 
 
-def _fetch(port: int, token: str) -> Any:
+def _url(scheme: str, door: Any) -> str:
+    return f"{scheme}{'s' if door['encrypted'] else ''}://{door['address']}:{door['port']}"
+
+
+def _token(given: str) -> _Token:
+    from minirospy.bridge.tokens import read_tokens
+    from minirospy.environment import Environment
+
+    if given:
+        return _Token(given, is_kept=False)
+    kept = read_tokens(Environment.read().home)
+    return _Token(kept.read if kept else "", is_kept=True)
+
+
+def _fetch(port: int, token: _Token) -> Any:
     """Return the JSON of the status page."""
     import http.client
     import ssl
 
-    from minirospy.bridge.tokens import read_tokens
-    from minirospy.environment import Environment
-
-    if not token:
-        kept = read_tokens(Environment.read().home)
-        token = kept.read if kept else ""
     # Of this machine: whose certificate it is does not matter.
     context = ssl._create_unverified_context()
     plain = http.client.HTTPConnection("127.0.0.1", port, timeout=_SECONDS)
@@ -55,9 +102,8 @@ def _fetch(port: int, token: str) -> Any:
     fault: Exception | None = None
     for connection in (plain, encrypted):
         try:
-            connection.request(
-                "GET", "/status", headers={"Authorization": f"Bearer {token}"} if token else {}
-            )
+            headers = {"Authorization": f"Bearer {token.text}"} if token.text else {}
+            connection.request("GET", "/status", headers=headers)
             answer = connection.getresponse()
             body = answer.read(_MOST_BYTES)
         except (OSError, http.client.HTTPException) as error:
@@ -66,21 +112,24 @@ def _fetch(port: int, token: str) -> Any:
         finally:
             connection.close()
         if answer.status == 401:
-            why = (
-                f"the token is not one of the bridge at port {port}"
-                if token
-                else f"the bridge at port {port} wants its token"
-            )
-            raise BridgeError(f"{why}: give --token")
+            raise BridgeError(_why_refused(port, token))
         try:
             if answer.status == 200:
                 return json.loads(body)
         except ValueError:
             pass
-        raise BridgeError(f"port {port} is that of another program: it answered {answer.status}")
-    raise BridgeError(
+        raise _NoBridgeError(f"port {port} is that of another program: it answered {answer.status}")
+    raise _NoBridgeError(
         f"no bridge answers at port {port} of this machine ({fault}): give --port, or start one"
     )
+
+
+def _why_refused(port: int, token: _Token) -> str:
+    if not token.text:
+        return f"the bridge at port {port} wants its token: give --token"
+    if token.is_kept:
+        return f"the bridge at port {port} was started with a token of its own: give --token"
+    return f"the token is not one of the bridge at port {port}: give --token as it was started with"
 
 
 def _size(count: int) -> str:

@@ -18,6 +18,7 @@ from minirospy.bridge.addresses import links, own_addresses, qr_code
 from minirospy.bridge.foxglove.node import options_of
 from minirospy.bridge.tokens import kept_tokens, read_tokens
 from minirospy.cli import bridge as command
+from minirospy.environment import Environment
 from minirospy.errors import BridgeError
 from tests.bridge.conftest import Client
 from tests.conftest import free_port
@@ -121,6 +122,37 @@ def test_status_is_also_json(start: Start, capsys: pytest.CaptureFixture[str]) -
     assert json.loads(capsys.readouterr().out)["node"] == "/door"
 
 
+def test_status_lists_all_ports_of_a_bridge(start: Start, capsys: pytest.CaptureFixture[str]) -> None:
+    process = start("bridge", "--port", "0")
+    port = process.port
+    found = re.search(r":(\d+)$", process.line("rosbridge at ws://"))
+    assert found
+    other = found[1]
+    for words in ([str(port)], [other], [str(port), "--rosbridge-port", other]):
+        assert command.main(["--status", "--port", *words]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0].startswith("node [/minirospy_bridge], for ")
+        assert lines[1].startswith(f"foxglove: ws://127.0.0.1:{port}, ")
+        assert lines[2].startswith(f"rosbridge: ws://127.0.0.1:{other}, ")
+        assert lines[3] == f"video: http://127.0.0.1:{port}, http://127.0.0.1:{other}"
+        assert len(lines) == 5
+    assert command.main(["--status", "--json", "--port", str(port), "--rosbridge-port", other]) == 0
+    (status,) = json.loads(capsys.readouterr().out)
+    assert sorted(status["doors"]) == ["foxglove", "rosbridge"]
+
+
+def test_status_shows_what_answers_and_names_what_refuses(
+    start: Start, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port = start("bridge", "--port", "0", "--name", "open").port
+    locked = start("bridge", "--port", "0", "--name", "locked", "--token", "right-token-000").port
+    assert command.main(["--status", "--port", str(port), "--rosbridge-port", str(locked)]) == 1
+    output = capsys.readouterr()
+    assert output.out.startswith("node [/open]")
+    assert output.err.count("\n") == 1
+    assert f"the bridge at port {locked} wants its token: give --token" in output.err
+
+
 def test_status_names_what_is_wrong_in_one_line(
     start: Start, capsys: pytest.CaptureFixture[str], master: str
 ) -> None:
@@ -136,8 +168,12 @@ def test_status_names_what_is_wrong_in_one_line(
     assert "right-token-000" not in capsys.readouterr().out
     assert f"the bridge at port {port} wants its token: give --token" in refusal("--port", str(port))
     wrong = refusal("--port", str(port), "--token", "wrong-token-000")
-    assert f"the token is not one of the bridge at port {port}: give --token" in wrong
+    assert f"the token is not one of the bridge at port {port}: give --token as it was started with" in wrong
     assert "wrong-token-000" not in wrong
+    kept = kept_tokens(Environment.read().home)
+    refused = refusal("--port", str(port))
+    assert f"the bridge at port {port} was started with a token of its own: give --token" in refused
+    assert kept.read not in refused
     none = free_port()
     assert f"no bridge answers at port {none} of this machine" in refusal("--port", str(none))
     other = master.rpartition(":")[2].strip("/")
