@@ -98,3 +98,14 @@ def test_bound_holds_and_counts_add_up(steps: list[tuple[str, int] | None], limi
     drained(queue)
     assert queue.size == 0
     assert not queue._waiting
+
+
+def test_cleared_queue_holds_nothing() -> None:
+    queue = SendQueue(10)
+    queue.put("a", (b"12345",))
+    queue.put_answer((b"123",))
+    queue.clear()
+    assert (len(queue), queue.size, queue.answers, queue.dropped) == (0, 0, 0, 0)
+    queue.put("a", (b"12",))
+    assert queue.pop() == (b"12",)
+    assert queue.pop() is None

@@ -379,6 +379,20 @@ def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callabl
     stuck.next("removeStatus")
 
 
+def test_disconnected_client_leaves_no_messages_in_memory(bridge: Running) -> None:
+    publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
+    stuck = bridge.client(max_queue=1)
+    stuck.subscribe("/image")
+    bridge.run(publisher.wait_for_subscribers())
+    (connection,) = bridge.bridge.listeners["foxglove"].connections
+    while bridge.call(lambda: len(connection.queue)) < 5:
+        bridge.run(publisher.publish(data=bytes(200_000)))
+    stuck.close()
+    while bridge.call(lambda: len(bridge.bridge.listeners["foxglove"].connections)):
+        time.sleep(0.01)
+    assert (len(connection.queue), connection.queue.size) == (0, 0)
+
+
 def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tmp_path: Path) -> None:
     certificate, key = make_certificate(tmp_path)
     bridge = run_bridge(certificate=str(certificate), key=str(key))

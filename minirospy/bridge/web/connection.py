@@ -156,6 +156,9 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
+        # The connection is part of reference cycles: what waited is freed now, not when they are collected.
+        self.queue.clear()
+        self._frames.clear()
         self._site.left(self)
 
     # --- to the pipe

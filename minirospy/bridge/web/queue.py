@@ -118,6 +118,12 @@ class SendQueue:
                 del self._entries[number]
             self.size -= waiting.size
 
+    def clear(self) -> None:
+        """Remove everything that waits; nothing of it counts as dropped."""
+        self._entries.clear()
+        self._waiting.clear()
+        self.size = self.answers = 0
+
     def _drop_oldest(self, key: Hashable) -> None:
         waiting = self._waiting[key]
         entry = self._entries.pop(waiting.numbers.popleft())
