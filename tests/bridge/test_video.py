@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 from collections.abc import Callable
 from io import BytesIO
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -214,3 +217,19 @@ def test_hidden_topic_is_not_shown(run_bridge: Callable[..., Running]) -> None:
     assert Browser(bridge).get("/stream?topic=/camera/image").status == 401
     assert Browser(bridge).get("/stream?topic=/camera/image&token=read-token").status == 404
     assert Browser(bridge).get("/snapshot?topic=camera/image&token=read-token").status == 404
+
+
+@pytest.mark.parametrize("path", ["/stream", "/snapshot"])
+def test_client_that_leaves_early_leaves_no_subscription(camera: Running, path: str) -> None:
+    """It disconnects while the graph is looked at."""
+    bridge = camera.bridge
+    request = SimpleNamespace(query={"topic": "/camera/image"})
+    exchange: Any = Mock(request=request, is_open=False)
+
+    async def serve() -> None:
+        bridge._video.handlers[path](exchange)
+        await asyncio.gather(*bridge.graph._tasks)
+
+    camera.run(serve())
+    assert not bridge._video._feeds
+    assert "/camera/image" not in bridge.graph.topics

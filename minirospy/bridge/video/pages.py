@@ -183,7 +183,8 @@ class VideoPages:
         self, exchange: Exchange, request: VideoRequest, start: Callable[[], None]
     ) -> None:
         graph = await self._look(exchange)
-        if graph is None:
+        # A client may have disconnected meanwhile; then nothing would end its part in the images.
+        if graph is None or not exchange.is_open:
             return
         topic = self._graph.node.resolve(request.topic)
         type_ = graph.types.get(topic, "")

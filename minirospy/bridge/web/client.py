@@ -186,6 +186,11 @@ class Exchange:
         self._connection = connection
 
     @property
+    def is_open(self) -> bool:
+        """Return whether the client is still there and the answer has not ended."""
+        return self._connection.is_open
+
+    @property
     def queue(self) -> SendQueue:
         """Return the frames that wait for the client, and the counts."""
         return self._connection.queue

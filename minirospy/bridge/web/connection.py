@@ -109,6 +109,11 @@ class Connection:
         self._timer = loop.call_later(site.limits.handshake_seconds, self._handshake_late)
         self._limits = site.limits
 
+    @property
+    def is_open(self) -> bool:
+        """Return whether more may be sent."""
+        return not self._is_closing
+
     # --- from the pipe
 
     def received(self, data: bytes) -> None:
