@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import gc
 import json
 import struct
 import time
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from unittest.mock import Mock
 
 import cbor2
 import pytest
@@ -462,3 +465,24 @@ def test_clients_are_published_as_by_rosbridge_server(bridge: Running) -> None:
     client.close()
     assert bridge.run(counts.next(30)).data == 0
     assert bridge.run(lists.next(30)).clients == []
+
+
+def test_operation_of_a_client_that_has_left_is_never_started(bridge: Running) -> None:
+    """It disconnects in the turn of the loop in which its message came."""
+
+    def leave() -> None:
+        client = Mock(may_write=True)
+        client.name = "test"
+        session = bridge.bridge.rosbridge.open(client)
+        session.received_text('{"op": "publish", "topic": "/unknown", "msg": {}}')
+        session.ended()
+
+    async def settle() -> None:
+        await asyncio.gather(*bridge.bridge.graph._tasks, return_exceptions=True)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        bridge.call(leave)
+        bridge.run(settle())
+        gc.collect()
+    assert not [each for each in caught if "never awaited" in str(each.message)]

@@ -9,7 +9,7 @@ import logging
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.aio.handle import serialized
 from minirospy.bridge.graph import Publication
@@ -53,6 +53,13 @@ _REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, Messag
 _Work = Coroutine[object, object, None]
 
 
+class _Pending(NamedTuple):
+    """The rest of an operation, which has to wait for something."""
+
+    event: Event
+    work: _Work
+
+
 @dataclass
 class _Published:
     """A topic that a client publishes: the ids of its advertisements, and the numbers of headers."""
@@ -86,7 +93,7 @@ class RosbridgeSession:
         self._inbox: deque[str | bytes] = deque()
         self._inbox_size = 0
         self._is_working = False
-        self._handlers: Mapping[type[Event], Callable[[Any], _Work | None]] = {
+        self._handlers: Mapping[type[Event], Callable[[Any], _Work | _Pending | None]] = {
             protocol.Advertise: self._advertise,
             protocol.Unadvertise: self._unadvertise,
             protocol.Publish: self._publish,
@@ -162,27 +169,28 @@ class RosbridgeSession:
         if self._inbox_size > _MOST_WAITING:
             self.client.close(_POLICY, "too much waits for an earlier operation")
 
-    def _start(self, first: _Work | None) -> None:
+    def _start(self, first: _Pending | None) -> None:
         if first is not None:
             self._is_working = True
-            self._spawn(self._work(first))
+            # A task that is cancelled before its first step does not start the work.
+            self._spawn(self._work(first)).add_done_callback(lambda _: first.work.close())
 
-    async def _work(self, first: _Work) -> None:
+    async def _work(self, first: _Pending) -> None:
         """Finish an operation, then those that have come meanwhile."""
         try:
-            await first
+            await self._finish(first)
             while self._inbox:
                 data = self._inbox.popleft()
                 self._inbox_size -= len(data)
                 pending = self._begin(data)
                 if pending is not None:
-                    await pending
+                    await self._finish(pending)
         except Exception:  # noqa: BLE001 whatever an operation raises ends this client alone, as in its connection
             _log.exception("an operation of %s could not be carried out", self.client.name)
             self.client.close(_FAILED, "the bridge failed on this message")
         self._is_working = False
 
-    def _begin(self, data: str | bytes) -> _Work | None:
+    def _begin(self, data: str | bytes) -> _Pending | None:
         """Carry out an operation; return what is left to be waited for."""
         try:
             event = protocol.parse(protocol.decode(data))
@@ -194,7 +202,7 @@ class RosbridgeSession:
             return None
         return self._carry_out(event)
 
-    def _carry_out(self, event: Event) -> _Work | None:
+    def _carry_out(self, event: Event) -> _Pending | None:
         if not self._is_authenticated and not isinstance(event, protocol.Auth):
             self._door.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
             self.client.close(_POLICY, "authentication is required first")
@@ -204,13 +212,14 @@ class RosbridgeSession:
         except _REFUSALS as error:
             self._failed(event, error)
             return None
-        return self._finish(event, pending) if pending is not None else None
+        # What a fragment completes is an operation of its own.
+        return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
-    async def _finish(self, event: Event, pending: _Work) -> None:
+    async def _finish(self, pending: _Pending) -> None:
         try:
-            await pending
+            await pending.work
         except _REFUSALS as error:
-            self._failed(event, error)
+            self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
         # rosbridge names the operation where it did not report the fault itself.
@@ -418,7 +427,7 @@ class RosbridgeSession:
 
     # --- the others
 
-    def _fragment(self, event: protocol.Fragment) -> _Work | None:
+    def _fragment(self, event: protocol.Fragment) -> _Pending | None:
         text = self._fragments.add(event, asyncio.get_running_loop().time())
         return self._begin(text) if text is not None else None
 
