@@ -1,10 +1,11 @@
 """Anything at all, sent to the bridge by a client: it answers or refuses, and the next client finds it as before.
 
     make fuzz                                            # ten minutes of this, too
-    python tests/fuzz_bridge.py --minutes 1
+    python tests/fuzz_bridge.py --minutes 1 --only rosbridge
 
-Handshakes and frames with mutations, of the Foxglove protocol. A finding is written to ``fuzz-bridge-finding.bin``;
-``python tests/fuzz_bridge.py FILE`` runs it again.
+Handshakes and frames with mutations of the Foxglove protocol and of rosbridge, requests for images. A finding is written to
+``fuzz-bridge-finding.bin``, the kind of its input in the first line; ``python tests/fuzz_bridge.py FILE`` runs it again. At
+the end the memory of the process at each quarter is printed.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import json
 import logging
 import os
 import random
@@ -19,8 +21,9 @@ import socket
 import struct
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.fuzz import CUT, Faults, mutated
@@ -30,9 +33,10 @@ INPUTS_PER_BRIDGE = 2000
 MOST_WAITING = 70_000_000
 HANDSHAKE = (
     b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
 )
-TEXTS = [
+FOXGLOVE_HANDSHAKE = HANDSHAKE + b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+FOXGLOVE_TEXTS = [
     b'{"op":"subscribe","subscriptions":[{"id":0,"channelId":1},{"id":1,"channelId":2}]}',
     b'{"op":"unsubscribe","subscriptionIds":[0,1]}',
     b'{"op":"advertise","channels":[{"id":1,"topic":"/fuzz","encoding":"ros1","schemaName":"std_msgs/String"}]}',
@@ -48,11 +52,88 @@ TEXTS = [
     b'{"op":"unsubscribeConnectionGraph"}',
     b'{"op":"fetchAsset","uri":"package://std_msgs/package.xml","requestId":1}',
 ]
-BINARIES = [
+FOXGLOVE_BINARIES = [
     struct.pack("<BII", 1, 1, 2) + b"hi",
     struct.pack("<BIII", 2, 1, 1, 4) + b"ros1",
     struct.pack("<BBfBQI", 3, 0, 1.0, 1, 5, 2) + b"id",
 ]
+
+
+OPERATIONS: list[dict[str, object]] = [
+    {
+        "op": "subscribe",
+        "id": "a",
+        "topic": "/known",
+        "type": "std_msgs/String",
+        "throttle_rate": 100,
+        "queue_length": 2,
+    },
+    {"op": "subscribe", "topic": "/image", "compression": "png", "fragment_size": 100},
+    {"op": "subscribe", "topic": "/image", "compression": "cbor"},
+    {"op": "subscribe", "topic": "/image", "compression": "cbor-raw", "queue_length": 1},
+    {"op": "unsubscribe", "id": "a", "topic": "/known"},
+    {
+        "op": "advertise",
+        "id": "b",
+        "topic": "/fuzz",
+        "type": "geometry_msgs/PoseStamped",
+        "latch": True,
+        "queue_size": 5,
+    },
+    {
+        "op": "publish",
+        "topic": "/fuzz",
+        "msg": {"header": {"stamp": "now"}, "pose": {"position": {"x": 1.5, "y": 2}}},
+    },
+    {"op": "publish", "topic": "/known", "msg": {"data": "hi"}},
+    {"op": "publish", "topic": "/image", "msg": {"height": 1, "width": 2, "data": "QUJD", "step": 2}},
+    {"op": "unadvertise", "id": "b", "topic": "/fuzz"},
+    {"op": "call_service", "id": "c", "service": "/set", "args": {"data": True}},
+    {"op": "call_service", "service": "/set#7", "args": [True], "compression": "cbor", "fragment_size": 10},
+    {"op": "advertise_service", "service": "/ours", "type": "std_srvs/SetBool"},
+    {"op": "service_response", "service": "/ours", "id": "d", "values": {"success": True}, "result": True},
+    {"op": "unadvertise_service", "service": "/ours"},
+    {"op": "fragment", "id": "e", "num": 0, "total": 2, "data": '{"op":"set_level",'},
+    {"op": "fragment", "id": "e", "num": 1, "total": 2, "data": '"level":"info"}'},
+    {"op": "set_level", "level": "info"},
+    {"op": "auth", "mac": "a", "client": "b", "dest": "c", "rand": "d", "t": 1.5, "level": "e", "end": 2},
+    {"op": "status", "level": "info", "msg": "hi"},
+]
+PAGES = [
+    b"/",
+    b"/status",
+    b"/stream?topic=/image",
+    b"/stream?topic=/image&type=png&width=3&height=5&invert",
+    b"/stream?topic=/image&type=ros_compressed&quality=20",
+    b"/stream_viewer?topic=/image&token=x",
+    b"/snapshot?topic=/image&type=png&quality=80&width=100",
+    b"/snapshot?topic=/known",
+]
+
+
+class Kind(NamedTuple):
+    """The inputs of one protocol: the first bytes of a connection, text messages and binary ones."""
+
+    openings: Sequence[bytes]
+    texts: Sequence[bytes] = ()
+    binaries: Sequence[bytes] = ()
+
+
+def kinds() -> Mapping[str, Kind]:
+    """Return the inputs by the name of the listener that gets them."""
+    from minirospy.bridge.rosbridge.cbor import encode_cbor, typed_array
+    from minirospy.bridge.rosbridge.protocol import encode
+
+    texts = [json.dumps(each).encode() for each in OPERATIONS]
+    pictures = [str(encode(each, "png")).encode() for each in OPERATIONS[:4]]
+    array = {"op": "publish", "topic": "/scan", "msg": {"ranges": typed_array("float32", [1.5, 2.5])}}
+    binaries = [encode_cbor(each) for each in (*OPERATIONS, array)]
+    requests = [b"GET " + page + b" HTTP/1.1\r\nHost: localhost\r\n\r\n" for page in PAGES]
+    return {
+        "foxglove": Kind([FOXGLOVE_HANDSHAKE], FOXGLOVE_TEXTS, FOXGLOVE_BINARIES),
+        "rosbridge": Kind([HANDSHAKE + b"\r\n"], [*texts, *pictures], binaries),
+        "video": Kind(requests),
+    }
 
 
 def frame(payload: bytes, opcode: int) -> bytes:
@@ -74,16 +155,16 @@ class Target:
         self._count = 0
         self._parts: tuple[Any, Any, Any] | None = None
 
-    def __call__(self, data: bytes) -> None:
-        """Give one input. Raises on a finding."""
-        self._loop.run_until_complete(self._take(data))
+    def __call__(self, kind: str, data: bytes) -> None:
+        """Give one input to a listener. Raises on a finding."""
+        self._loop.run_until_complete(self._take(kind, data))
 
     def close(self) -> None:
         """End the bridge."""
         self._loop.run_until_complete(self._end())
         self._loop.close()
 
-    async def _take(self, data: bytes) -> None:
+    async def _take(self, kind: str, data: bytes) -> None:
         from minirospy.bridge.web.connection import Connection
         from minirospy.bridge.web.listener import Relay
         from minirospy.bridge.web.pipe import PlainPipe
@@ -94,7 +175,7 @@ class Target:
         self._count += 1
         assert self._parts
         bridge = self._parts[2]
-        listener = bridge.listeners["foxglove"]
+        listener = bridge.listeners[kind]
         ours, theirs = socket.socketpair()
         ours.setblocking(False)
 
@@ -117,24 +198,53 @@ class Target:
             connection.abort()
 
         assert not self._faults.found, self._faults.found.pop()
-        assert not listener.connections
+        await self._settle(bridge)
+
+    async def _settle(self, bridge: Any) -> None:
+        """Wait until nothing of the client is left."""
+
+        def left() -> list[object]:
+            connections = [each for listener in bridge.listeners.values() for each in listener.connections]
+            rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.services]
+            graph = [*bridge.graph._publishers, *bridge.graph.topics]
+            return [*connections, *rosbridge, *bridge._video._feeds, *graph]
+
+        end = time.monotonic() + 60
+        while left():
+            assert time.monotonic() < end, left()
+            await asyncio.sleep(0.001)
         assert len(bridge.foxglove.sessions) == 1
-        assert not bridge.graph._publishers
+        assert not self._faults.found, self._faults.found.pop()
 
     async def _begin(self) -> None:
+        from sensor_msgs.msg import Image
         from std_msgs.msg import String
+        from std_srvs.srv import SetBool
 
         from minirospy import Node
         from minirospy.bridge.bridge import Bridge, BridgeOptions
+        from minirospy.bridge.rosbridge.door import RosbridgeOptions
         from minirospy.runtime.master.master import Master
 
         master = Master()
         await master.start()
         node = Node("bridge", master_uri=f"http://localhost:{master.port}", host="localhost", rosout=False)
         await node.start()
-        bridge = Bridge(node, BridgeOptions(foxglove_port=0, diagnostics=False))
+        # What a client did wrong is no finding, and would be printed for each input.
+        logging.getLogger(node.log.name).disabled = True
+        options = BridgeOptions(
+            foxglove_port=0,
+            rosbridge_port=0,
+            video_port=0,
+            diagnostics=False,
+            rosbridge=RosbridgeOptions(unregister_timeout=0.0),
+        )
+        bridge = Bridge(node, options)
         await bridge.start()
         await node.advertise("/known", String, latch=True)
+        images = await node.advertise("/image", Image, latch=True)
+        await images.publish(Image(height=2, width=2, encoding="mono8", step=2, data=b"abcd"))
+        await node.serve("/set", SetBool, lambda request: (request.data, "set"))
         # A steady client, so that the next one is offered channels immediately.
         bridge.foxglove.open(Steady())  # type: ignore[arg-type]
         while not bridge.foxglove.channels.by_id:
@@ -172,14 +282,19 @@ class Steady:
         """Take it."""
 
 
-def an_input(rng: random.Random) -> bytes:
-    """Return a handshake and some frames, mutated outside or inside of the frames."""
-    parts = [HANDSHAKE if rng.random() < 0.95 else mutated(rng, [HANDSHAKE])]
-    for _ in range(rng.randrange(1, 6)):
+def an_input(rng: random.Random, kind: Kind) -> bytes:
+    """Return the start of a connection and some frames, mutated outside or inside of the frames."""
+    opening = rng.choice(kind.openings)
+    often = 0.95 if kind.texts else 0.3
+    parts = [opening if rng.random() < often else mutated(rng, list(kind.openings))]
+    for _ in range(rng.randrange(1, 6) if kind.texts else 0):
         is_text = rng.random() < 0.7
-        sources = TEXTS if is_text else BINARIES
-        payload = mutated(rng, sources).replace(CUT, b"") if rng.random() < 0.6 else rng.choice(sources)
-        payload = payload.partition(b"\r\n\r\n")[2] or payload
+        sources = list(kind.texts if is_text else kind.binaries)
+        payload = rng.choice(sources)
+        if rng.random() < 0.6:
+            # The accidents are those of requests, of which a payload is the body.
+            requests = [b"\r\n\r\n" + each for each in sources]
+            payload = mutated(rng, requests).replace(CUT, b"").partition(b"\r\n\r\n")[2]
         parts.append(frame(payload, 0x81 if is_text else 0x82))
     if rng.random() < 0.2:
         parts[-1] = mutated(rng, [parts[-1]])
@@ -188,32 +303,49 @@ def an_input(rng: random.Random) -> bytes:
 
 def main() -> int:
     """Fuzz, or run one input again."""
+    inputs = kinds()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=10.0, help="how long")
+    parser.add_argument("--only", choices=inputs, help="inputs of this listener alone")
     parser.add_argument("finding", nargs="?", type=Path, help="an input to run again")
     options = parser.parse_args()
     os.environ["ROS_HOSTNAME"] = "localhost"
     target = Target()
     if options.finding:
-        target(options.finding.read_bytes())
+        kind, _, data = options.finding.read_bytes().partition(b"\n")
+        target(kind.decode(), data)
         target.close()
         return 0
 
     rng = random.Random(time.time_ns())
-    end, count = time.monotonic() + 60 * options.minutes, 0
-    while time.monotonic() < end:
-        data = an_input(rng)
+    start, count = time.monotonic(), 0
+    memory: list[float] = []
+    while (part := (time.monotonic() - start) / (60 * options.minutes)) < 1:
+        if part * 4 >= len(memory):
+            memory.append(resident_megabytes())
+        name = options.only or rng.choice(list(inputs))
+        data = an_input(rng, inputs[name])
         count += 1
         try:
-            target(data)
+            target(name, data)
         except BaseException:
-            FINDING.write_bytes(data)
+            FINDING.write_bytes(name.encode() + b"\n" + data)
             raise
+    memory.append(resident_megabytes())
     target.close()
-    print(f"{count:,} inputs to the bridge, nothing found")
+    print(
+        f"{count:,} inputs to the bridge, nothing found; MB at each quarter: {', '.join(f'{each:.0f}' for each in memory)}"
+    )
     return 0
+
+
+def resident_megabytes() -> float:
+    """Return the memory of this process."""
+    import psutil
+
+    return float(psutil.Process().memory_info().rss) / 1e6
 
 
 if __name__ == "__main__":
