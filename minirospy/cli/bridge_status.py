@@ -13,6 +13,7 @@ __all__ = ["show_status"]
 _SECONDS = 5.0
 _MOST_BYTES = 10_000_000
 _SCHEMES = {"video": "http"}
+_Json = Any
 
 
 class _Token(NamedTuple):
@@ -31,7 +32,7 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
 
     Raises BridgeError where none answers, or one refuses.
     """
-    found: dict[str, Any] = {}
+    found: dict[str, _Json] = {}
     faults: list[BridgeError] = []
     for port in ports:
         try:
@@ -59,7 +60,7 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
     raise BridgeError(f"no bridge answers at the ports {listed} of this machine: give --port, or start one")
 
 
-def _print_bridge(found: Any) -> None:
+def _print_bridge(found: _Json) -> None:
     print(f"node [{found['node']}], for {found['seconds']:.0f} s")
     for name, door in found["doors"].items():
         url = _url(_SCHEMES.get(name, "ws"), door)
@@ -76,7 +77,7 @@ def _print_bridge(found: Any) -> None:
         )
 
 
-def _url(scheme: str, door: Any) -> str:
+def _url(scheme: str, door: _Json) -> str:
     return f"{scheme}{'s' if door['encrypted'] else ''}://{door['address']}:{door['port']}"
 
 
@@ -90,7 +91,7 @@ def _token(given: str) -> _Token:
     return _Token(kept.read if kept else "", is_kept=True)
 
 
-def _fetch(port: int, token: _Token) -> Any:
+def _fetch(port: int, token: _Token) -> _Json:
     """Return the JSON of the status page."""
     import http.client
     import ssl

@@ -6,11 +6,12 @@ Source: http://wiki.ros.org/rosbridge_server, and what the real rosbridge_websoc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.node import Node
 from minirospy.aio.topics import Publisher
+from minirospy.idl.protocols import Message
 
 if TYPE_CHECKING:
     from minirospy.bridge.rosbridge.session import RosbridgeSession
@@ -24,8 +25,8 @@ class ClientTopics:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._sessions: Sequence[RosbridgeSession] = ()
-        self._count: Publisher[Any] | None = None
-        self._clients: Publisher[Any] | None = None
+        self._count: Publisher[Message] | None = None
+        self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
         """Publish what is connected now. Raises MasterUnreachableError, RpcError."""

@@ -271,8 +271,8 @@ def _fragment_size(fields: Fields) -> int | None:
     return found
 
 
-def _number(fields: Fields, name: str, default: Any = ...) -> float:
-    found = _value(fields, name, (int, float), default)
+def _number(fields: Fields, name: str, default: float | None = None) -> float:
+    found = _value(fields, name, (int, float), ... if default is None else default)
     try:
         number = float(found)
     except OverflowError:
@@ -292,7 +292,7 @@ def _queue_length(fields: Fields) -> int:
     return max(0, int(_value(fields, "queue_length", (int,), 0)))
 
 
-_Read = Callable[[Fields], Any]
+_Read = Callable[[Fields], object]
 
 
 def _required(name: str) -> _Read:
