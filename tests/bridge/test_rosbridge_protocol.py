@@ -323,7 +323,7 @@ def test_png_is_a_picture_of_the_text() -> None:
 
 def test_png_of_other_things_is_refused() -> None:
     for data in ("%%%", base64.b64encode(b"\x89PNG\r\n\x1a\nrest").decode(), png.encode("x")[:40]):
-        with pytest.raises(BridgeProtocolError, match="not a PNG of text"):
+        with pytest.raises(BridgeProtocolError, match=r"not a PNG of text(?!.*0x)"):
             png.decode(data)
 
 

@@ -38,6 +38,8 @@ def decode(data: str) -> str:
         if picture.width * picture.height > _MOST_PIXELS:
             raise BridgeProtocolError(f"a PNG of {picture.width}x{picture.height} pixels is too large")
         text: str = picture.tobytes().decode().rstrip("\n")
+    except pillow.UnidentifiedImageError as error:
+        raise BridgeProtocolError("the data is not a PNG of text") from error
     except (binascii.Error, OSError, ValueError, SyntaxError, pillow.DecompressionBombError) as error:
         raise BridgeProtocolError(f"the data is not a PNG of text: {error}") from error
     return text
