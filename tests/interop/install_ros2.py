@@ -44,7 +44,7 @@ def main() -> int:
         "--prefer-binary",
         *PACKAGES,
     ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         print("ROS 2 cannot be installed from PyPI here: the bridge to it is not tested against it")
         return 0
