@@ -142,16 +142,12 @@ _QT_REPOSITORIES = (
 _QT_PLUGINS = (
     "rqt_action",
     "rqt_bag",
-    "rqt_console",
     "rqt_dep",
-    "rqt_graph",
-    "rqt_image_view",
     "rqt_joint_trajectory_controller",
     "rqt_launch",
     "rqt_logger_level",
     "rqt_msg",
     "rqt_nav_view",
-    "rqt_plot",
     "rqt_pose_view",
     "rqt_publisher",
     "rqt_py_console",
@@ -208,7 +204,7 @@ SUBMODULES = {
     "rosmaster.registrations": "rosgraph.Master(name).getSystemState() returns what is registered; `rosmaster` runs a master",
     "rosmaster.threadpool": "concurrent.futures.ThreadPoolExecutor runs tasks in threads",
     "rostest.runner": "`rostest FILE` or rostest.rostest_main.rostestmain() runs a file of tests",
-    "rostest.rostest_parent": "`rostest FILE` runs the tests of a file, each with a master of its own",
+    "rostest.rostest_parent": "`rostest FILE` runs the tests of a file, each with a separate master",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
 """Submodules that programs import of real ROS's packages and ours lack -> what to use; `overlay/` has one for each."""
