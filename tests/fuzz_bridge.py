@@ -230,7 +230,7 @@ class Target:
         await master.start()
         node = Node("bridge", master_uri=f"http://localhost:{master.port}", host="localhost", rosout=False)
         await node.start()
-        # What a client did wrong is no finding, and would be printed for each input.
+        # What a client did wrong is not a finding, and would be printed for each input.
         logging.getLogger(node.log.name).disabled = True
         options = BridgeOptions(
             foxglove_port=0,

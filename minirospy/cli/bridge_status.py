@@ -129,7 +129,7 @@ def _why_refused(port: int, token: _Token) -> str:
     if not token.text:
         return f"the bridge at port {port} wants its token: give --token"
     if token.is_kept:
-        return f"the bridge at port {port} was started with a token of its own: give --token"
+        return f"the bridge at port {port} was started with another token: give --token"
     return f"the token is not one of the bridge at port {port}: give --token as it was started with"
 
 

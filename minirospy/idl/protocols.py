@@ -49,7 +49,7 @@ class Message(Protocol):
     _slot_types: list[str]
     _connection_header: dict[str, str]
 
-    # Any, not object: to pyright a class with other parameters is no Message otherwise.
+    # Any, not object: pyright takes a class with other parameters for another type otherwise.
     def __init__(self, *args: Any, **kwds: Any) -> None:
         """Set all fields in order, or some by name."""
 

@@ -214,7 +214,7 @@ def main() -> int:
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "teleop_twist_keyboard: ERROR: keys come from a terminal, which standard input is not: "
-            "`rosrun teleop_twist_keyboard teleop_twist_keyboard.py` in a terminal of its own",
+            "`rosrun teleop_twist_keyboard teleop_twist_keyboard.py` in a separate terminal",
             file=sys.stderr,
         )
         return 1

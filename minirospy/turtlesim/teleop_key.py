@@ -30,7 +30,7 @@ def main() -> int:
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "turtle_teleop_key: ERROR: keys come from a terminal, which standard input is not: "
-            "`rosrun turtlesim turtle_teleop_key` in a terminal of its own",
+            "`rosrun turtlesim turtle_teleop_key` in a separate terminal",
             file=sys.stderr,
         )
         return 1

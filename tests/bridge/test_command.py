@@ -172,7 +172,7 @@ def test_status_names_what_is_wrong_in_one_line(
     assert "wrong-token-000" not in wrong
     kept = kept_tokens(Environment.read().home)
     refused = refusal("--port", str(port))
-    assert f"the bridge at port {port} was started with a token of its own: give --token" in refused
+    assert f"the bridge at port {port} was started with another token: give --token" in refused
     assert kept.read not in refused
     none = free_port()
     assert f"no bridge answers at port {none} of this machine" in refusal("--port", str(none))

@@ -215,7 +215,7 @@ def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) 
     client.next("serverInfo")
     client.socket.ping().wait(30)
     (connection,) = bridge.bridge.listeners["foxglove"].connections
-    # It sends nothing of its own from now on.
+    # It sends nothing unasked from now on.
     heard = connection._received
     while connection._received <= heard:
         time.sleep(0.01)

@@ -1,6 +1,6 @@
 """roslibpy and roslib.js, rosbridge's clients in Python and JavaScript, with the bridge.
 
-roslibpy brings twisted and autobahn: it is installed once into an environment of its own, in the user's cache folder.
+roslibpy brings twisted and autobahn: it is installed once into a separate environment, in the user's cache folder.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the type of ROS 1 that a message type of ROS 2 is: of its own name, unless that has another one in ROS 2."""
+        """Return the type of ROS 1 for a message type of ROS 2: of the same name, unless that has another one in ROS 2."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]

@@ -212,7 +212,7 @@ class RosbridgeSession:
         except _REFUSALS as error:
             self._failed(event, error)
             return None
-        # What a fragment completes is an operation of its own.
+        # What a fragment completes is a separate operation.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:

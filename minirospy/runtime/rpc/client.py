@@ -26,7 +26,7 @@ class RpcClient:
     """Calls methods of one server. Many threads may call; connections are kept and reused.
 
     A call takes a connection out of the pool while it lasts, so that a signal handler which calls in the
-    middle of another call of the same thread gets one of its own.
+    middle of another call of the same thread gets a separate one.
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""Calls at the same time: each connection has a thread of its own; slow handlers do not hold up others."""
+"""Calls at the same time: each connection has a separate thread; slow handlers do not hold up others."""
 
 import threading
 

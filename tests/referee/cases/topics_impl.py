@@ -47,7 +47,7 @@ class Listener(rospy.SubscribeListener):
 
 
 def show_heard():
-    """Return what the listener has received, in a thread of its own."""
+    """Return what the listener has received, in a separate thread."""
     eventually(lambda: heard)
     show(*heard.pop())
 
