@@ -24,6 +24,7 @@ from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
 from minirospy.runtime.node.topics import InTurns, Publication
 from minirospy.runtime.rpc.turns import Turns
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.steps import Steps
 from minirospy.wire.framing import Frame, serialize_frame
 from minirospy.wire.header import Header
@@ -65,6 +66,7 @@ class RosoutNode:
         self._log_class: type[Log] | None = None
         self._aggregated: Publication | None = None
         self._turns = Turns()
+        self._limited_log = RateLimitedLogger(_log)
 
     async def start(self) -> None:
         """Join the graph. Raises OSError, MasterUnreachableError."""
@@ -84,7 +86,9 @@ class RosoutNode:
         await self.node.advertise(self._aggregated)
         await self.node.subscribe(
             self.node.make_subscription(
-                "/rosout", type_, InTurns(self._on_message, self._turns.start, _MOST_BYTES)
+                "/rosout",
+                type_,
+                InTurns(self._on_message, self._turns.start, _MOST_BYTES, self._on_left_out),
             )
         )
         await self._serve_loggers()
@@ -95,6 +99,7 @@ class RosoutNode:
         # What is being read ends with its connection.
         while self._turns:
             await asyncio.sleep(0)
+        self._limited_log.close()
         if self._file:
             self._file.close()
 
@@ -145,6 +150,13 @@ class RosoutNode:
             yield None
         if self._file:
             yield from self._write(self._file, body)
+
+    def _on_left_out(self, header: Header) -> None:
+        self._limited_log.warning(
+            "a log message of %s was left out: it is longer than %d KiB",
+            header.get("callerid") or "a node without a name",
+            _MOST_BYTES // 1024,
+        )
 
     def _write(self, file: LogFile, body: bytes) -> Steps[None]:
         assert self._log_class

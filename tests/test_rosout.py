@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from functools import partial
 from io import BytesIO
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from rosgraph_msgs.msg import Log
 
 from minirospy import rosout
@@ -79,7 +81,21 @@ def test_text_that_is_not_a_log_message_is_not_written() -> None:
     assert lines == []
 
 
+def test_message_that_is_left_out_is_one_warning_with_the_node(caplog: pytest.LogCaptureFixture) -> None:
+    node = make_node()
+    for _ in range(3):
+        node._on_left_out({"callerid": "/talk\ner"})
+    node._limited_log.close()
+    first, *others = caplog.records
+    assert first.levelname == "WARNING"
+    assert first.message == "a log message of /talk\\ner was left out: it is longer than 256 KiB"
+    # Whether ten seconds have passed between two of them or not, each is counted.
+    assert others
+
+
 def test_publishers_are_read_in_turns() -> None:
+    left_out: list[int] = []
+
     async def scene() -> tuple[list[bytes], int]:
         turns, loop = Turns(seconds=0.0), asyncio.get_running_loop()
         found: list[bytes] = []
@@ -102,13 +118,16 @@ def test_publishers_are_read_in_turns() -> None:
             theirs.sendall(serialize_frame(b"%d" % number) * 20 + serialize_frame(b"x" * 5000))
             theirs.sendall(serialize_frame(b"last"))
             theirs.close()
-            watch_frames_in_turns(loop, ours, deliver, end, turns.start, 4000)
+            watch_frames_in_turns(
+                loop, ours, deliver, end, turns.start, 4000, partial(left_out.append, number)
+            )
         await asyncio.wait_for(ended.wait(), 30)
         assert all(ours.fileno() < 0 for ours, _ in ends)
         return found, len(turns)
 
     found, left = asyncio.run(scene())
     assert left == 0
+    assert sorted(left_out) == [0, 1]
     assert found.count(b"last") == 2
     assert len(found) == 42
     # Neither waits for the other one's end.

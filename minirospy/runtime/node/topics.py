@@ -65,11 +65,15 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """How a subscription delivers in steps on the loop, which ``start`` runs, messages of up to ``most`` bytes."""
+    """How a subscription delivers in steps on the loop, which ``start`` runs, messages of up to ``most`` bytes.
+
+    ``on_left_out`` is called with the publisher's connection header when a longer one comes.
+    """
 
     deliver: Callable[[Frame, Header], Steps[None]]
     start: Callable[[Steps[None]], None]
     most: int
+    on_left_out: Callable[[Header], None]
 
 
 class Publication:
@@ -388,9 +392,15 @@ class Subscription:
             loop, deliver = asyncio.get_running_loop(), self._deliver
             ended = partial(self._link_ended, link)
             if isinstance(deliver, InTurns):
-                in_steps, start, most = deliver.deliver, deliver.start, deliver.most
+                in_steps, left_out = deliver.deliver, deliver.on_left_out
                 watch_frames_in_turns(
-                    loop, link.sock, lambda frame: in_steps(frame, link.header), ended, start, most
+                    loop,
+                    link.sock,
+                    lambda frame: in_steps(frame, link.header),
+                    ended,
+                    deliver.start,
+                    deliver.most,
+                    lambda: left_out(link.header),
                 )
             elif self._on_loop:
                 watch_frames(loop, link.sock, lambda frame: deliver(frame, link.header), ended)

@@ -409,10 +409,11 @@ def watch_frames_in_turns(
     on_end: Callable[[], None],
     start_steps: Callable[[Steps[None]], None],
     most: int,
+    on_left_out: Callable[[], None],
 ) -> None:
     """Read frames on the loop in steps, which ``start_steps`` runs in turns with those of other connections.
 
-    Frames of more than ``most`` bytes are left out.
+    Frames of more than ``most`` bytes are left out; ``on_left_out`` is called when one comes.
     """
     reader = FrameReader(most, skips=True, chunk=_TURN_CHUNK)
 
@@ -436,7 +437,7 @@ def watch_frames_in_turns(
             count = 0
 
         if reader.skipped > skipped:
-            _log.debug("a message of more than %d bytes was left out", most)
+            on_left_out()
         if count:
             loop.add_reader(sock, readable)
         else:
