@@ -46,7 +46,7 @@ def test_client_is_offered_channels_and_gets_bytes_of_ros(bridge: Running) -> No
 
     info = client.next("serverInfo")
     assert info["supportedEncodings"] == ["ros1"]
-    assert info["metadata"] == {"ROS_DISTRO": "noetic"}
+    assert info["metadata"] == {"ROS_DISTRO": "noetic", "node": "/bridge"}
     client.subscribe("/chatter", 7)
     assert client.channels["/chatter"] == {
         "id": client.channel("/chatter"),

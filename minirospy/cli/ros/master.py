@@ -40,7 +40,7 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 
-_RECOVERY_SECONDS = 30.0
+_RECOVERY_SECONDS = 15.0
 """Within this a master that was just started answers, also on a busy machine with much to recover."""
 
 
