@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -14,9 +16,11 @@ from typing import Any
 
 import pytest
 
+from minirospy.cli.ros import master as commands
 from minirospy.cli.ros.master import main, roscore
 from minirospy.cli.ros.rostopic import main as rostopic
 from minirospy.errors import MasterUnreachableError
+from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
@@ -364,3 +368,23 @@ def test_missing_standard_output_does_not_stop_the_master(start: Start) -> None:
     master.close()
     core.terminate()
     assert core.wait(30) == 0
+
+
+@pytest.mark.parametrize("is_held", [True, False])
+def test_silent_master_at_the_port_is_known_by_its_journal(
+    is_held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It reads for long, or is stopped; without the lock it is another program."""
+    monkeypatch.setattr(commands, "_RECOVERY_SECONDS", 0.05)
+    path = tmp_path / "journal-1"
+    journal = Journal(path, list)
+    journal.lock()
+    if not is_held:
+        journal.close()
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        in_use = OSError(errno.EADDRINUSE, os.strerror(errno.EADDRINUSE))
+        said = str(commands._port_error("roscore", "localhost", port, path, in_use))
+    journal.close()
+    assert ("another roscore/master is already running" in said) == is_held
+    assert (f"port {port} is taken by another program" in said) != is_held

@@ -246,7 +246,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
     try:
         await master.start()
     except OSError as error:
-        raise _port_error(name, environment.host, port, error) from error
+        raise _port_error(name, environment.host, port, journal, error) from error
 
     keep = True
     pid_file = environment.home / f"roscore-{master.port}.pid"
@@ -425,19 +425,40 @@ async def _first(*events: asyncio.Event) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-def _port_error(name: str, host: str, port: int, error: OSError) -> MinirospyError:
+def _port_error(name: str, host: str, port: int, journal: Path | None, error: OSError) -> MinirospyError:
     if not is_address_in_use(error):
         return MinirospyError(f"cannot listen on port {port}: {error.strerror or error}")
     uri = f"http://{host}:{port}"
     try:
         # It may be reading its journal.
         RpcClient(f"http://127.0.0.1:{port}", timeout=_RECOVERY_SECONDS).call("getPid", "/roscore")
-    except (RpcUnreachable, RpcError):
-        return MinirospyError(f"port {port} is taken by another program: choose one with `{name} -p PORT`")
+    except (RpcUnreachable, RpcError) as failure:
+        # One that reads for longer, or is stopped, holds the lock of its journal.
+        if not (isinstance(failure, RpcUnreachable) and journal and _is_held(journal)):
+            return MinirospyError(
+                f"port {port} is taken by another program: choose one with `{name} -p PORT`"
+            )
     return MinirospyError(
         f"{name} cannot run as another roscore/master is already running. "
         f"Please kill other roscore/master processes before relaunching. The ROS_MASTER_URI is {uri}"
     )
+
+
+def _is_held(path: Path) -> bool:
+    """Return whether another master holds a journal."""
+    from minirospy.runtime.master.journal import Journal, JournalBusyError
+
+    if not path.with_name(path.name + ".lock").exists():
+        return False
+    journal = Journal(path, list)
+    try:
+        journal.lock()
+    except JournalBusyError:
+        return True
+    except OSError:
+        return False
+    journal.close()
+    return False
 
 
 def _quiet(line: str) -> None:
