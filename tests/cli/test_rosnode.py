@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from minirospy.introspect import nodes
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 
@@ -155,7 +156,12 @@ def test_a_node_that_hangs_is_not_killed(
             f"rosnode: ERROR: node [/hung] does not answer at {uri} (timed out after 0.1 s): "
         )
         # The robot has time to answer.
-        monkeypatch.setattr("minirospy.introspect.nodes._SHUTDOWN_SECONDS", 3.0)
+        slave = nodes._slave
+        monkeypatch.setattr(
+            nodes,
+            "_slave",
+            lambda graph, node, _: slave(graph, node, 0.1 if node.name == "/hung" else 30.0),
+        )
         status, out, err = command("rosnode", "kill", "-a")
         assert (status, out) == (1, "killing:\n * /hung\n * /robot\nkilled\n")
     assert robot.stopped
