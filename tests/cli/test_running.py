@@ -141,7 +141,7 @@ def test_roscore_on_a_port_of_somebody_else() -> None:
         other.listen()
         number = str(other.getsockname()[1])
         done = subprocess.run(
-            [str(BIN / "roscore"), "-p", number], capture_output=True, text=True, timeout=30, check=False
+            [str(BIN / "roscore"), "-p", number], capture_output=True, text=True, timeout=100, check=False
         )
     assert (done.returncode, done.stderr) == (
         1,

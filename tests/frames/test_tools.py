@@ -106,7 +106,7 @@ class TestEcho:
         assert "- Translation: [0.5, 0.0, 0.0]\n- Rotation: in Quaternion [0.0, 0.0, 0.0, 1.0]\n" in read
 
     def test_echo_of_tf2_tools_ends_after_its_limit(self, start: Start) -> None:
-        program = start("tf2_tools", "echo.py", *words("a c -r 1 -l 4 -p 3"))
+        program = start("tf2_tools", "echo.py", *words("a c -r 1 -l 10 -p 3"))
         output, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0
         assert POSE in output
@@ -115,7 +115,7 @@ class TestEcho:
     def test_frames_without_a_connection_do_not_end_it(self, start: Start) -> None:
         start(*STATIC, *words("0 0 0 0 0 0 p q"), "__name:=other")
         wait_for("q")
-        program = start("tf2_tools", "echo.py", *words("a q -r 1 -l 4"))
+        program = start("tf2_tools", "echo.py", *words("a q -r 1 -l 10"))
         _, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0
         assert "not part of the same tree" in errors
