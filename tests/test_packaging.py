@@ -160,6 +160,45 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.timeout(180)
+def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
+    """Python reads no `.pth` file there: a program of `minirospy python` can import rospy all the same."""
+    folder = tmp_path / "folder"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    program = tmp_path / "node.py"
+    program.write_text("import rospy, std_msgs.msg, RPi.GPIO; print(rospy.__file__)")
+
+    done = _run_wheel(tmp_path, [str(folder)], "python", "-S", str(program))
+
+    rospy = folder / "minirospy" / "overlay" / "rospy" / "__init__.py"
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{rospy}\n", "")
+
+
+@pytest.mark.timeout(180)
+def test_archive_is_refused(wheel: Path, tmp_path: Path) -> None:
+    """As `python -m zipapp` makes it."""
+    done = _run_wheel(tmp_path, [str(wheel)], "demo")
+
+    assert (done.returncode, done.stdout) == (2, "")
+    start = f"minirospy: ERROR: minirospy cannot run from the archive {wheel}: "
+    assert done.stderr.startswith(start)
+    assert done.stderr.count("\n") == 1
+
+
+def _run_wheel(folder: Path, path: list[str], *words: str) -> subprocess.CompletedProcess[str]:
+    """Run `minirospy` with a path that no `.pth` file adds to."""
+    # -S: the checkout's own path lines are not read; its libraries are added by hand.
+    return subprocess.run(
+        [sys.executable, "-S", "-m", "minirospy", *words],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*path, _libraries(folder)])},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 def _libraries(folder: Path) -> str:
     """Return a folder with minirospy's dependencies, and nothing else of the environment."""
     libraries = folder / "libraries"

@@ -58,6 +58,13 @@ __all__ = [
 ]
 
 
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+
+_IN_ARCHIVE = (
+    "minirospy cannot run from the archive {}: its programs, launch files and messages are files; "
+    "install it into a venv, or by pipx"
+)
+
 INTERRUPTED = 130
 """As a shell has it of a program that SIGINT ended: `catkin_make && roslaunch ...` goes no further."""
 
@@ -118,6 +125,9 @@ def run(
     SIGINT ends a command that has it ignored, unless its ``interrupted`` is a fault.
     """
     _open_streams()
+    if not os.path.isdir(_PACKAGE):
+        return complain(name, UsageError(_IN_ARCHIVE.format(os.path.dirname(_PACKAGE))), 2)
+    _offer_overlay()
     _heed_break()
     if heeds_interrupts and not interrupted:
         _heed_interrupts()
@@ -141,6 +151,19 @@ def run(
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
         return interrupted
+
+
+def _offer_overlay() -> None:
+    """Let this process and those that it starts import rospy also where no `.pth` file is read: `pip install --target`.
+
+    At the end of the path, where the `.pth` file adds it, too.
+    """
+    overlay = os.path.join(_PACKAGE, "overlay")
+    if overlay in sys.path:
+        return
+    sys.path.append(overlay)
+    path = [os.environ.get("PYTHONPATH"), os.path.dirname(_PACKAGE), overlay]
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, path))
 
 
 def _heed_break() -> None:
