@@ -522,7 +522,8 @@ class Subscription:
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
-            _log.warning(
+            # A list may name a thousand publishers that refuse: to log all of them takes the loop 0.2 s.
+            self._limited_log.warning(
                 "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
                 self.topic,
                 uri,

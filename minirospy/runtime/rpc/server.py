@@ -103,6 +103,8 @@ class RpcServer:
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
+        # Those that are accepted together may take each other's places: each is read from first.
+        self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
@@ -248,7 +250,7 @@ class RpcServer:
                 loop.call_later(0.05, self._watch_again, sock)
                 return
             if peer.family not in sockets.FAMILIES or self._allows(peer, address[0]):
-                self._serve(peer, loop, reads=now - start < _READ_SECONDS)
+                self._serve(peer, loop, reads=self._reads_all or now - start < _READ_SECONDS)
             else:
                 peer.close()
             now = time.perf_counter()

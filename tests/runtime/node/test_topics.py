@@ -277,6 +277,27 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     assert advice in lines[0]
 
 
+def test_many_publishers_that_cannot_be_reached_are_some_lines_and_a_number(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    uris = [f"http://127.0.0.1:1/{number}" for number in range(30)]
+
+    async def scene() -> None:
+        async with graph("/b") as (_, (b,)):
+            subscription = b.make_subscription("/t", STRING, Box())
+            subscription._plan.publishers_changed(uris)
+            for uri in uris:
+                subscription._retry(uri, TimeoutError("no answer"))
+            subscription.close()
+
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1e9)
+    run(scene)
+    lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
+    assert len(lines) == 11
+    assert all("cannot connect to the publisher of /t" in line for line in lines[:10])
+    assert lines[10] == "20 more like the last ones"
+
+
 @pytest.mark.usefixtures("transport")
 def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
     started, go_on = threading.Event(), threading.Event()

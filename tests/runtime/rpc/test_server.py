@@ -333,3 +333,39 @@ def test_connections_are_accepted_for_some_milliseconds_at_a_time(monkeypatch: p
     monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
     accepted, _ = asyncio.run(scene())
     assert accepted == 15
+
+
+def test_connections_that_may_take_each_others_places_are_read_from_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 0.0
+
+    def clock() -> float:
+        nonlocal now
+        now += 0.001
+        return now
+
+    made: list[object] = []
+    read: list[object] = []
+
+    class Recorded(connections.Connection):
+        def __init__(self, *args: Any) -> None:
+            super().__init__(*args)
+            made.append(self)
+
+        def read(self) -> None:
+            read.append(self)
+
+    async def scene() -> None:
+        server = RpcServer(lambda method, args: 0, most_idle=2)
+        await server.start()
+        with contextlib.ExitStack() as stack:
+            for _ in range(8):
+                stack.enter_context(connect(server))
+            await until(lambda: len(made) == 8)
+        await server.close()
+
+    monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
+    monkeypatch.setattr(servers, "Connection", Recorded)
+    asyncio.run(scene())
+    assert read[:8] == made
