@@ -26,7 +26,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xmlrpc.client import dumps
@@ -39,10 +39,13 @@ LONG = 0.5
 """Seconds of a call whose cause is printed."""
 
 
-def waited(pid: int) -> tuple[float, float]:
-    """Return the seconds that a process has run, and that it has waited for a processor (on Linux; else 0)."""
+def waited(thread: str) -> tuple[float, float]:
+    """Return the seconds that a thread has run, and that it has waited for a processor (on Linux; else 0).
+
+    ``thread`` is ``PID`` for the main thread of a process, ``PID/task/TID`` for another one.
+    """
     with contextlib.suppress(OSError):
-        ran, late, _ = Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()
+        ran, late, _ = Path(f"/proc/{thread}/schedstat").read_text(encoding="ascii").split()
         return int(ran) / 1e9, int(late) / 1e9
     return 0.0, 0.0
 
@@ -57,15 +60,15 @@ def retransmissions(sock: socket.socket) -> int:
 # --- the good client, the nodes, the control: separate programs
 
 
-def run_client(port: int, server: int) -> None:
+def run_client(port: int, server: str) -> None:
     """Call getPid all the time; a line for each call: the start, the wait, whether it was answered, the machine's part.
 
-    That is the longer of the times that the process ``server`` and this one waited for a processor meanwhile, on Linux.
+    That is the longer of the times that the thread ``server`` and this one waited for a processor meanwhile, on Linux.
     Why a call was not answered goes to standard error.
     """
-    request, processes = called("getPid", "/good"), (server, os.getpid())
+    request, threads = called("getPid", "/good"), (server, str(os.getpid()))
     while True:
-        late = [waited(process)[1] for process in processes]
+        late = [waited(thread)[1] for thread in threads]
         start = time.monotonic()
         answered = True
         try:
@@ -88,7 +91,7 @@ def run_client(port: int, server: int) -> None:
             answered = False
             print(f"port {port}: {error} at a getPid", file=sys.stderr, flush=True)
         wait = time.monotonic() - start
-        machine = max(waited(process)[1] - before for process, before in zip(processes, late, strict=True))
+        machine = max(waited(thread)[1] - before for thread, before in zip(threads, late, strict=True))
         print(f"{start} {wait} {int(answered)} {machine}", flush=True)
         time.sleep(max(0.0, start + PERIOD - time.monotonic()))
 
@@ -190,6 +193,9 @@ def lower_priority() -> None:
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, 0, 0)
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 # --- measuring
@@ -198,10 +204,14 @@ def lower_priority() -> None:
 class Watch:
     """A program that prints a line for each call: the worst of them."""
 
-    def __init__(self, *args: str) -> None:
+    def __init__(self, *args: str, program: str = __file__, environ: Mapping[str, str] | None = None) -> None:
         self.calls: list[tuple[float, float, bool, float]] = []
         self.process = subprocess.Popen(
-            [sys.executable, __file__, *args], stdout=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL
+            [sys.executable, program, *args],
+            stdout=subprocess.PIPE,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            env=environ,
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -254,14 +264,19 @@ def longest(turns: Path, what: str, begin: float, end: float) -> float:
     return max(taken, default=0.0)
 
 
+def environ_of(folder: str, port: int) -> dict[str, str]:
+    """Return the environment of a master at ``port`` and its nodes, whose files are in ``folder``."""
+    environ = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))}
+    environ |= {"ROS_HOME": folder, "ROS_LOG_DIR": str(Path(folder) / "log"), "ROS_HOSTNAME": "localhost"}
+    return environ | {"ROS_MASTER_URI": f"http://localhost:{port}"}
+
+
 @contextlib.contextmanager
 def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
     """Run a master with its journal, at a free port."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
-    environ = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))}
-    environ |= {"ROS_HOME": folder, "ROS_LOG_DIR": str(Path(folder) / "log"), "ROS_HOSTNAME": "localhost"}
-    environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    environ = environ_of(folder, port)
     with open(Path(folder) / "master.out", "wb") as out:
         process = subprocess.Popen([*python, "-q", "-p", str(port)], env=environ, stdout=out, stderr=out)
 
@@ -290,22 +305,12 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         turns = Path(folder) / "turns"
         program = str(Path(__file__).with_name("master_turns.py"))
         master, port = stack.enter_context(started_master(folder, [sys.executable, program, str(turns)]))
-        control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
-        stack.callback(control.wait)
-        stack.callback(control.kill)
-        assert control.stdout
-        control_port = control.stdout.readline().strip()
-        good, idle = (
-            Watch("client", str(port), str(master.pid)),
-            Watch("client", control_port, str(control.pid)),
-        )
-        stack.callback(good.close)
-        stack.callback(idle.close)
+        good, idle = watch_clients(stack, port, str(master.pid))
         fleet = Watch("nodes", str(port), str(nodes)) if nodes else None
         if fleet:
             stack.callback(fleet.close)
         time.sleep(1.0)
-        memory, peak, begin = psutil.Process(master.pid), 0.0, time.monotonic()
+        begin = time.monotonic()
 
         if nodes:
             random.seed(1)
@@ -316,18 +321,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
                 for name in names
             ]
 
-        while any(part.poll() is None for part in parts) and time.monotonic() < begin + seconds + 60:
-            peak = max(peak, memory.memory_info().rss / MIB)
-            time.sleep(0.02)
-        for part in parts:
-            part.kill()
-            part.wait()
-        # The call that waits is answered, or not.
-        end = time.monotonic()
-        while good.calls[-1][0] < end and time.monotonic() < end + 60:
-            peak = max(peak, memory.memory_info().rss / MIB)
-            time.sleep(0.02)
-        after = memory.memory_info().rss / MIB
+        peak, after, end = watch_memory(master.pid, parts, good, begin + seconds + 60)
         median, p99, worst, calls, failed = good.since(begin)
         last, wait, _, _ = good.calls[-1]
         if last < end:
@@ -339,7 +333,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
             said, refused = _describe_nodes(fleet, nodes)
             failed += refused
             load = ", ".join(f"{each:.1f}" for each in psutil.getloadavg())
-            ran, late = waited(master.pid)
+            ran, late = waited(str(master.pid))
             said += (
                 f"\ncontrol: p99 {idle.since(begin)[1] * 1e3:.1f} ms; load of the machine: {load}"
                 f"\nthe master ran for {ran:.0f} s and waited for a processor for {late:.0f} s"
@@ -350,6 +344,39 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         return Row(
             label, median, p99, worst, good.own(begin), control_wait, turn, loop, peak, after, calls, failed
         ), said
+
+
+def watch_clients(stack: contextlib.ExitStack, port: int, thread: str) -> tuple[Watch, Watch]:
+    """Return the good client of the server at ``port``, whose loop runs in ``thread``, and that of the control."""
+    control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
+    stack.callback(control.wait)
+    stack.callback(control.kill)
+    assert control.stdout
+    control_port = control.stdout.readline().strip()
+    good, idle = Watch("client", str(port), thread), Watch("client", control_port, str(control.pid))
+    stack.callback(good.close)
+    stack.callback(idle.close)
+    return good, idle
+
+
+def watch_memory(
+    pid: int, parts: Sequence[subprocess.Popen[bytes]], good: Watch, latest: float
+) -> tuple[float, float, float]:
+    """Wait for the end of the attacks, then for the good client's call; return the peak of the memory, the last, the end."""
+    memory, peak = psutil.Process(pid), 0.0
+    while any(part.poll() is None for part in parts) and time.monotonic() < latest:
+        peak = max(peak, memory.memory_info().rss / MIB)
+        time.sleep(0.02)
+    for part in parts:
+        part.kill()
+        part.wait()
+
+    # The call that waits is answered, or not.
+    end = time.monotonic()
+    while good.calls[-1][0] < end and time.monotonic() < end + 60:
+        peak = max(peak, memory.memory_info().rss / MIB)
+        time.sleep(0.02)
+    return peak, memory.memory_info().rss / MIB, end
 
 
 def _describe_nodes(fleet: Watch, nodes: int) -> tuple[str, int]:
@@ -402,11 +429,11 @@ def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
 
 def main() -> int:
     """Run the benchmark; return its exit status."""
-    _raise_file_limit()
+    raise_file_limit()
 
     match sys.argv[1:]:
         case ["client", port, server]:
-            run_client(int(port), int(server))
+            run_client(int(port), server)
         case ["control"]:
             run_control()
         case ["nodes", port, count]:
@@ -458,7 +485,8 @@ def main() -> int:
     return 1 if failed else 0
 
 
-def _raise_file_limit() -> None:
+def raise_file_limit() -> None:
+    """Allow as many connections as the system does."""
     if sys.platform != "win32":
         import resource
 
