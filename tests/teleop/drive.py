@@ -6,6 +6,7 @@ ones printed (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have,
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pty
 import queue
@@ -53,15 +54,31 @@ def joysticks(program: list[str], names: list[str]) -> None:
         tty.setraw(slave)
         states: queue.Queue[Joy] = queue.Queue()
         subscriber = rospy.Subscriber("joy", Joy, states.put)
-        parameters = {"dev": os.ttyname(slave), "dev_ff": "/dev/null", "coalesce_interval": 0.4, **options}
+        parameters = {"dev": os.ttyname(slave), "dev_ff": "/dev/null", "coalesce_interval": 1.0, **options}
         process = started(program, "joystick", parameters)
         try:
+            while not has_opened(process, os.ttyname(slave)):
+                time.sleep(0.02)
             follow_joystick(master, os.ttyname(slave), subscriber, states)
         finally:
             ended(process)
             subscriber.unregister()
             os.close(master)
             os.close(slave)
+
+
+def has_opened(process: subprocess.Popen[bytes], path: str) -> bool:
+    """Return whether a process has a file open, as far as the system shows it."""
+    try:
+        files = os.listdir(f"/proc/{process.pid}/fd")
+    except FileNotFoundError:
+        return True
+    for each in files:
+        # One that is closed meanwhile.
+        with contextlib.suppress(FileNotFoundError):
+            if os.readlink(f"/proc/{process.pid}/fd/{each}") == path:
+                return True
+    return False
 
 
 def follow_joystick(master: int, path: str, subscriber: rospy.Subscriber, states: queue.Queue[Joy]) -> None:
@@ -99,7 +116,8 @@ def follow_teleop(
     for axes, buttons in STATES:
         publisher.publish(Joy(axes=axes, buttons=buttons))
         try:
-            twist = twists.get(timeout=0.7)
+            # A busy machine may need long for one that comes.
+            twist = twists.get(timeout=10)
         except queue.Empty:
             print("  nothing")
             continue
