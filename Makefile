@@ -14,7 +14,7 @@ CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
   tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
   tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
 
-.PHONY: demo check test interop ros2 windows lint guard bench fuzz mutants clean help
+.PHONY: demo check test interop ros2 windows lint guard bench fuzz mutants release clean help
 
 help:
 	@echo "make demo     show the workshop's button and LED on the virtual board"
@@ -28,6 +28,7 @@ help:
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and to the bridge, ten minutes each"
 	@echo "make mutants  put small faults into graph/, wire/ and the journal; list those that no test notices"
+	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"
 
 demo: $(STAMP)
@@ -76,6 +77,10 @@ lint: $(STAMP)
 
 mutants: $(STAMP)
 	@$(BIN)/python tests/mutants.py
+
+release: $(STAMP)
+	@$(BIN)/python -m pip install -q twine
+	@$(BIN)/python tools/release.py
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,208 @@
+"""Builds and checks what is released: `make release`. Out come `dist/*.tar.gz` and `dist/*.whl`; nothing is uploaded.
+
+Both are built from the files of the last commit, twice, and have to be the same bytes. Then `twine check`, the wheel's size and
+contents, and `minirospy demo` in a new environment of every Python from 3.10 on that is on the path or of pyenv.
+Exit status: 1 where anything is wrong, each fault on one line.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zipfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+MOST_BYTES = 3_000_000
+
+OLDEST = (3, 10)
+
+_INCLUDED = {
+    "minirospy/share/msgs/": "msgs/",
+    "minirospy/share/rpi_feros/": "rpi_feros/",
+    "minirospy/share/launch/": "launch/",
+}
+"""Folders of the wheel and where their files are in the sources, as in hatch_build.py."""
+
+_VENDORED = "minirospy/dashboard/page/vendor/"
+
+
+class ReleaseError(Exception):
+    """A step that failed; the text says which one, and why."""
+
+
+def main() -> int:
+    """Build and check; return the exit status."""
+    try:
+        if changed := _run("git", "status", "--porcelain"):
+            raise ReleaseError(
+                f"not all is committed, but a release is built from the last commit:\n{changed}"
+            )
+        epoch = _run("git", "log", "-1", "--format=%ct").strip()
+        dist = ROOT / "dist"
+        with tempfile.TemporaryDirectory() as scratch:
+            built = _build(Path(scratch, "first"), epoch)
+            _compare(built, _build(Path(scratch, "second"), epoch))
+            _run(sys.executable, "-m", "twine", "check", "--strict", *map(str, built))
+            (wheel,) = (path for path in built if path.suffix == ".whl")
+            tracked = _run("git", "ls-files", "-z").split("\0")
+            if faults := faults_of_wheel(_contents(wheel), wheel.stat().st_size, tracked):
+                raise ReleaseError("\n".join(f"{wheel.name}: {fault}" for fault in faults))
+
+            for python in _pythons():
+                _try_out(python, wheel, Path(scratch))
+                print(f"{python}: installed, `minirospy demo` works", flush=True)
+            shutil.rmtree(dist, ignore_errors=True)
+            dist.mkdir()
+            for path in built:
+                shutil.copy2(path, dist)
+    except ReleaseError as error:
+        print(f"release: ERROR: {error}", file=sys.stderr)
+        return 1
+
+    for path in sorted(dist.iterdir()):
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        print(f"dist/{path.name}: {path.stat().st_size:,} bytes, sha256 {digest}")
+    return 0
+
+
+def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[str]) -> list[str]:
+    """Return what is wrong with a wheel of ``size`` bytes: ``contents`` are its files, ``tracked`` those of the sources."""
+    sources = set(tracked)
+    faults = []
+    if size >= MOST_BYTES:
+        largest = sorted(contents, key=lambda name: -contents[name])[:3]
+        faults.append(
+            f"has {size:,} bytes, not under {MOST_BYTES:,}; the largest files: {', '.join(largest)}"
+        )
+
+    faults += [
+        f"{name}: not from a file of the sources"
+        for name in sorted(contents)
+        if not _is_expected(name, sources)
+    ]
+    faults += [
+        f"{name}: missing"
+        for name in sorted(sources)
+        if name.startswith("minirospy/") and not name.endswith("/.gitignore") and name not in contents
+    ]
+
+    vendored = {
+        name.removeprefix(_VENDORED).partition("/")[0] for name in contents if name.startswith(_VENDORED)
+    }
+    for folder in sorted(vendored - {"versions.json"}):
+        if not contents.get(f"{_VENDORED}{folder}/LICENSE.txt"):
+            faults.append(f"{_VENDORED}{folder}: its LICENSE.txt is missing or empty")
+    if not any(name.endswith(".dist-info/licenses/LICENSE") and contents[name] for name in contents):
+        faults.append("the licence of minirospy is missing")
+    return faults
+
+
+def _is_expected(name: str, sources: Collection[str]) -> bool:
+    if name in sources or name.partition("/")[0].endswith(".dist-info"):
+        return True
+    for folder, source in _INCLUDED.items():
+        if name.startswith(folder):
+            return source + name.removeprefix(folder) in sources
+
+    # Generated from msgs/.
+    _, _, module = name.partition("minirospy/overlay/")
+    package = module.partition("/")[0]
+    return f"msgs/{package}/package.xml" in sources and name.endswith((".py", ".pyi", "/py.typed"))
+
+
+def _contents(wheel: Path) -> dict[str, int]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {each.filename: each.file_size for each in archive.infolist()}
+
+
+def _build(folder: Path, epoch: str) -> list[Path]:
+    """Build the last commit, the wheel out of the unpacked sdist; return both files."""
+    source = folder / "minirospy"
+    archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
+        tar.extractall(source)
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
+    _run(*command, environ={**os.environ, "SOURCE_DATE_EPOCH": epoch})
+    return sorted((folder / "dist").iterdir())
+
+
+def _compare(first: list[Path], second: list[Path]) -> None:
+    for one, other in zip(first, second, strict=True):
+        if one.read_bytes() != other.read_bytes():
+            raise ReleaseError(f"{one.name}: two builds of one commit differ")
+
+
+def _pythons() -> list[str]:
+    """Return one interpreter of each version from OLDEST on."""
+    pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv") / "versions"
+    names = [f"python3.{minor}" for minor in range(OLDEST[1], 20)]
+    found = [
+        *(path for path in map(shutil.which, names) if path),
+        *map(str, pyenv.glob("3.*/bin/python")),
+        sys.executable,
+    ]
+    versions: dict[tuple[int, int], str] = {}
+    for path in found:
+        done = subprocess.run(
+            [path, "-c", "import sys, ensurepip; print(*sys.version_info[:2])"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        # pyenv's commands exist also for versions that are not chosen; Debian's have no ensurepip without python3-venv.
+        if done.returncode == 0:
+            major, minor = map(int, done.stdout.split())
+            versions.setdefault((major, minor), path)
+    return [path for version, path in sorted(versions.items()) if version >= OLDEST]
+
+
+def _try_out(python: str, wheel: Path, scratch: Path) -> None:
+    """Install the wheel into a new environment, and run the demo there. Raises ReleaseError."""
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
+        venv = Path(folder, "venv")
+        _run(python, "-m", "venv", str(venv))
+        bin_folder = venv / ("Scripts" if os.name == "nt" else "bin")
+        environ = {
+            key: value
+            for key, value in os.environ.items()
+            if not key.startswith(("PYTHON", "ROS_", "MINIROSPY_"))
+        }
+        environ |= {"ROS_HOME": str(Path(folder, "ros")), "MINIROSPY_LOCAL": "1"}
+        pip = [str(bin_folder / "python"), "-m", "pip", "--disable-pip-version-check"]
+        _run(*pip, "install", "--quiet", str(wheel), environ=environ, cwd=folder)
+        _run(*pip, "check", environ=environ, cwd=folder)
+        shown = _run(str(bin_folder / "minirospy"), "demo", "--presses", "2", environ=environ, cwd=folder)
+        if "2: button 1 released -> LED on GPIO 7 off" not in shown:
+            raise ReleaseError(f"{python}: minirospy demo does not switch the LED:\n{shown}")
+
+
+def _run(*command: str, environ: Mapping[str, str] | None = None, cwd: str | Path = ROOT) -> str:
+    """Run a command and return what it prints. Raises ReleaseError with its output."""
+    done = subprocess.run(
+        command,
+        env=environ,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
+    )
+    if done.returncode:
+        raise ReleaseError(
+            f"`{' '.join(command)}` ends with status {done.returncode}:\n{done.stdout}{done.stderr}"
+        )
+    return done.stdout
+
+
+if __name__ == "__main__":
+    sys.exit(main())
