@@ -12,7 +12,19 @@ from minirospy.errors import UsageError
 
 __all__ = ["VIEWS", "link", "plotted_fields", "view_of_plugin"]
 
-VIEWS = ("topics", "console", "plot", "graph", "image", "board", "publish", "services", "parameters")
+VIEWS = (
+    "topics",
+    "console",
+    "plot",
+    "graph",
+    "image",
+    "board",
+    "turtlesim",
+    "teleop",
+    "publish",
+    "services",
+    "parameters",
+)
 """The names of the views, as in links; the page has one module for each."""
 
 _PLUGINS = {
@@ -22,6 +34,7 @@ _PLUGINS = {
     "rqt_plot": "plot",
     "rqt_graph": "graph",
     "rqt_image_view": "image",
+    "rqt_robot_steering": "teleop",
     "rqt_publisher": "publish",
     "rqt_service_caller": "services",
 }

@@ -52,6 +52,7 @@ def test_word_that_is_not_a_path_is_refused(word: str) -> None:
 def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
     assert view_of_plugin("topics") == "topics"
     assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
+    assert view_of_plugin("rqt_robot_steering") == "teleop"
     with pytest.raises(
         UsageError, match=r"there is no view for the plug-in 'rqt_moveit': there are .*rqt_topic"
     ):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
+import contextlib
 import json
 import random
 import shutil
@@ -23,8 +25,9 @@ from minirospy.dashboard.views import VIEWS
 from tests.dashboard.conftest import Served, serve
 from tests.interop.browser import CHROMIUM, Page
 from tests.interop.test_interop_foreign import FOREIGN
+from tests.robots.conftest import start
 
-__all__ = ["serve"]
+__all__ = ["serve", "start"]
 
 needs_chromium = pytest.mark.skipif(not CHROMIUM, reason="chromium is not installed: make interop")
 needs_node = pytest.mark.skipif(
@@ -284,10 +287,10 @@ def test_console_holds_many_lines_with_few_elements(
     log((2, "/many", "the first"))
     page = browse(address(served, "console"))
     page.wait_text(".bar", "1 of 1 lines")
-    for start in range(0, 20_000, 2000):
-        log(*((2, "/many", f"line {number}") for number in range(start, start + 2000)))
+    for first in range(0, 20_000, 2000):
+        log(*((2, "/many", f"line {number}") for number in range(first, first + 2000)))
         # One part after the other: a browser that is slower than this test would lose lines, as it should.
-        page.wait_text(".bar", f"{start + 2001} of {start + 2001} lines")
+        page.wait_text(".bar", f"{first + 2001} of {first + 2001} lines")
     page.wait_text(".line .text", "line 19999")
     assert page.evaluate("document.querySelectorAll('.line').length") < 100
     page.evaluate("document.querySelector('.virtual').scrollTop = 0")
@@ -529,6 +532,179 @@ def test_parameters_are_shown_set_and_deleted(
     page.click("[data-name='/robot/list'] button", "delete")
     page.wait("return !document.querySelector(\"[data-name='/robot/list']\")")
     assert not served.run(node.has_param("/robot/list"))
+
+
+# --- turtlesim, driving
+
+
+@contextlib.contextmanager
+def repeated(served: Served, publishing: Any, message: Any) -> Iterator[None]:
+    """Publish a message again and again."""
+
+    async def publish() -> None:
+        while True:
+            await publishing.publish(message)
+            await asyncio.sleep(0.1)
+
+    async def begin() -> asyncio.Task[None]:
+        return asyncio.create_task(publish())
+
+    async def end(task: asyncio.Task[None]) -> None:
+        task.cancel()
+        await asyncio.wait([task])
+
+    task = served.run(begin())
+    try:
+        yield
+    finally:
+        served.run(end(task))
+
+
+@needs_chromium
+def test_turtles_are_drawn_with_their_trails_and_come_and_go(
+    serve: Callable[..., Served], start: Callable[..., Any], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    start("turtlesim", "turtlesim_node", "_background_r:=10")
+    page = browse(address(served, "turtlesim"))
+    page.wait_text("[data-name='/turtle1']", "x 5.544 y 5.544")
+    page.wait("return document.querySelector(\"[data-turtle='/turtle1']\").getClientRects().length")
+    paper = "document.querySelector('canvas.paper').getContext('2d')"
+    pixel = f"Array.from({paper}.getImageData(%d, %d, 1, 1).data).slice(0, 3).join()"
+    page.wait(f"return {pixel % (3, 3)} === '10,86,255'")
+    page.type("input[aria-label=name]", "leo")
+    page.click("button", "Spawn")
+    page.wait_text("[data-name='/leo']", "x 2 y 2")
+    page.click("button", "Spawn")
+    page.wait_text(".error", "leo")
+    # A circle: it comes back to where it started.
+    twist = Twist()
+    twist.linear.x, twist.angular.z = 1.0, 2.0
+    with repeated(served, publisher(served, "/turtle1/cmd_vel", Twist), twist):
+        page.wait(f"return {pixel % (249, 249)} === '179,184,255'")
+    page.click("[data-name='/turtle1'] button", "kill")
+    page.wait("return !document.querySelector(\"[data-name='/turtle1'], [data-turtle='/turtle1']\")")
+    assert page.evaluate(pixel % (249, 249)) == "179,184,255"
+    page.click("button", "Clear")
+    page.wait(f"return {pixel % (249, 249)} === '10,86,255'")
+    page.click("button", "Reset")
+    page.wait_text("[data-name='/turtle1']", "x 5.544 y 5.544")
+    page.wait("return !document.querySelector(\"[data-name='/leo']\")")
+
+
+def listener(served: Served, topic: str) -> Callable[[Callable[[Twist], bool]], None]:
+    """Return a function that waits until a message of a topic is right."""
+    robot = served.node("robot")
+
+    async def listen() -> Any:
+        return await robot.subscribe(topic, Twist)
+
+    subscription = served.run(listen())
+
+    def until(is_right: Callable[[Twist], bool]) -> None:
+        while not is_right(served.run(subscription.next(50))):
+            pass
+
+    return until
+
+
+def is_zero(twist: Twist) -> bool:
+    return not twist.linear.x and not twist.angular.z
+
+
+def drag(page: Page, kind: str, right: float, up: float) -> None:
+    """Press, move or release the mouse beside the stick's middle."""
+    x, y = page.wait(
+        "const r = document.querySelector('svg.stick').getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]"
+    )
+    page.call(
+        "Input.dispatchMouseEvent", type=kind, x=x + right, y=y - up, button="left", buttons=1, clickCount=1
+    )
+
+
+def press(page: Page, kind: str, key: str) -> None:
+    page.call("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+
+
+@needs_chromium
+def test_stick_drives_a_topic_that_nobody_publishes_and_stops_when_released(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    until = listener(served, "/turtle1/cmd_vel")
+    page = browse(address(served, "teleop?topic=/turtle1/cmd_vel"))
+    page.wait_text("#state", "connected")
+    drag(page, "mousePressed", 0, 40)
+    until(lambda twist: twist.linear.x > 0.05 and twist.angular.z == 0)
+    drag(page, "mouseMoved", -400, 0)
+    until(lambda twist: abs(twist.linear.x) < 1e-6 and twist.angular.z == 1)
+    drag(page, "mouseReleased", -400, 0)
+    until(is_zero)
+    page.wait_text("p[role=status]", "stopped")
+    # Another topic, and another speed.
+    page.type("input[aria-label=Topic]", "/other/cmd_vel")
+    page.type("input[aria-label='Metres a second']", "2")
+    page.wait("document.activeElement.blur(); return location.hash.includes('linear=2')")
+    assert "topic=%2Fother%2Fcmd_vel" in page.evaluate("location.hash")
+
+
+@needs_chromium
+@pytest.mark.parametrize(
+    "leaving",
+    [
+        "location.hash = '#/topics'",
+        "Object.defineProperty(document, 'hidden', {get: () => true}); document.dispatchEvent(new Event('visibilitychange'))",
+        "dispatchEvent(new Event('blur'))",
+        "location.href = 'about:blank'",
+    ],
+)
+def test_robot_stops_when_the_page_is_hidden_or_left(
+    serve: Callable[..., Served], browse: Callable[..., Page], leaving: str
+) -> None:
+    served = serve()
+    until = listener(served, "/cmd_vel")
+    page = browse(address(served, "teleop"))
+    page.wait_text("#state", "connected")
+    page.wait_text("p[role=status]", "stopped")
+    press(page, "rawKeyDown", "ArrowUp")
+    press(page, "rawKeyDown", "ArrowLeft")
+    until(lambda twist: (twist.linear.x, twist.angular.z) == (0.5, 1))
+    page.evaluate(leaving)
+    until(is_zero)
+
+
+@needs_chromium
+def test_gamepad_drives_while_its_deadman_button_is_held(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    until = listener(served, "/cmd_vel")
+    page = browse(address(served, "teleop"))
+    page.wait_text("#state", "connected")
+    page.evaluate(
+        "window.pad = {connected: true, id: 'Pad 7', axes: [0.05, -1], buttons: [...'012345'].map(() => ({pressed: false}))};"
+        "navigator.getGamepads = () => [null, window.pad]"
+    )
+    page.wait_text(".teleop", "Gamepad: Pad 7")
+    assert "stopped" in page.wait_text("p[role=status]", "")
+    page.evaluate("pad.buttons[4].pressed = true")
+    until(lambda twist: (twist.linear.x, twist.angular.z) == (0.5, 0))
+    page.evaluate("pad.buttons[4].pressed = false")
+    until(is_zero)
+
+
+@needs_chromium
+def test_teleop_names_what_it_cannot_drive(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    from minirospy.bridge.access import Access
+
+    served = serve(
+        access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    )
+    publisher(served, "/chatter", String)
+    page = browse(address(served, "teleop?topic=/chatter&token=write-token-0"))
+    page.wait_text(".teleop .error", "/chatter has the type std_msgs/String, not geometry_msgs/Twist")
+    reader = browse(address(served, "teleop?token=read-token-00"))
+    reader.wait_text(".teleop .error", "This token is read-only")
 
 
 @needs_chromium

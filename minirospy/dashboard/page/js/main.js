@@ -10,7 +10,9 @@ import { Parameters } from "./views/parameters.js";
 import { Plot } from "./views/plot.js";
 import { Publish } from "./views/publish.js";
 import { Services } from "./views/services.js";
+import { Teleop } from "./views/teleop.js";
 import { Topics } from "./views/topics.js";
+import { Turtlesim } from "./views/turtlesim.js";
 
 const VIEWS = {
   topics: ["Topics", Topics],
@@ -19,6 +21,8 @@ const VIEWS = {
   graph: ["Graph", Graph],
   image: ["Image", Image],
   board: ["Board", Board],
+  turtlesim: ["Turtlesim", Turtlesim],
+  teleop: ["Teleop", Teleop],
   publish: ["Publish", Publish],
   services: ["Services", Services],
   parameters: ["Parameters", Parameters],
