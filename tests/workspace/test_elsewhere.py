@@ -10,13 +10,22 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.dashboard import views
 from minirospy.errors import NotFoundError
 from minirospy.workspace import elsewhere
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES, advice
 from minirospy.workspace.packages import Packages, built_in_roots
 
 OVERLAY = Path(elsewhere.__file__).parents[1] / "overlay"
-TABLE = sorted({*elsewhere._CPP, *elsewhere._INSTEAD, *elsewhere._QT_PLUGINS, *elsewhere._QT_LIBRARIES})
+TABLE = sorted(
+    {
+        *elsewhere._CPP,
+        *elsewhere._INSTEAD,
+        *elsewhere._VIEWED,
+        *elsewhere._QT_PLUGINS,
+        *elsewhere._QT_LIBRARIES,
+    }
+)
 
 
 @pytest.mark.parametrize("name", [*TABLE, *elsewhere._MESSAGES])
@@ -25,6 +34,12 @@ def test_advice_is_one_line_that_names_what_to_type(name: str) -> None:
     assert "\n" not in text
     assert "{" not in text
     assert re.search(r"`[a-z]\S* ", text)
+
+
+def test_plug_ins_with_a_view_are_those_of_the_dashboard() -> None:
+    # Of the others of the dashboard there are packages with programs: rqt_plot, ...
+    assert set(elsewhere._VIEWED) == set(views._PLUGINS) - set(Packages.below(*built_in_roots()).names())
+    assert not set(elsewhere._VIEWED) & set(elsewhere._QT_PLUGINS)
 
 
 def test_unknown_names_have_no_advice() -> None:
