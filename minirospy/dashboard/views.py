@@ -21,6 +21,7 @@ VIEWS = (
     "board",
     "turtlesim",
     "teleop",
+    "diagnostics",
     "publish",
     "services",
     "parameters",
@@ -35,6 +36,8 @@ _PLUGINS = {
     "rqt_graph": "graph",
     "rqt_image_view": "image",
     "rqt_robot_steering": "teleop",
+    "rqt_robot_monitor": "diagnostics",
+    "rqt_runtime_monitor": "diagnostics",
     "rqt_publisher": "publish",
     "rqt_service_caller": "services",
 }

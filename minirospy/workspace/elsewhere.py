@@ -150,8 +150,6 @@ _QT_PLUGINS = (
     "rqt_pose_view",
     "rqt_py_console",
     "rqt_reconfigure",
-    "rqt_robot_monitor",
-    "rqt_runtime_monitor",
     "rqt_shell",
     "rqt_srv",
     "rqt_tf_tree",
@@ -161,7 +159,9 @@ _QT_PLUGINS = (
 _VIEWED = (
     "rqt_logger_level",
     "rqt_publisher",
+    "rqt_robot_monitor",
     "rqt_robot_steering",
+    "rqt_runtime_monitor",
     "rqt_service_caller",
     "rqt_topic",
 )

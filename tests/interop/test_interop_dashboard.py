@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import csv
 import json
+import os
 import random
 import shutil
 import struct
 import subprocess
 import threading
+import time
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -23,7 +26,7 @@ from std_msgs.msg import String
 
 from minirospy.dashboard.views import VIEWS
 from tests.dashboard.conftest import Served, serve
-from tests.interop.browser import CHROMIUM, Page
+from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.robots.conftest import start
 
@@ -399,7 +402,9 @@ def test_graph_shows_nodes_and_topics_and_their_details(
     page.wait_text(".node text", "/listener")
     page.wait("return document.querySelectorAll('.edge').length === 2")
     page.click(".graph .topic", "/chatter")
+    # The view subscribes to a chosen topic: its list changes once, and a click on what is replaced is lost.
     page.wait_text(".side", "std_msgs/String")
+    page.wait_text(".side button", "/dashboard")
     page.click(".side button", "/listener")
     page.wait_text(".side", "Subscribes to (1)")
     page.choose("select[aria-label='What is shown']", "nodes")
@@ -705,6 +710,239 @@ def test_teleop_names_what_it_cannot_drive(serve: Callable[..., Served], browse:
     page.wait_text(".teleop .error", "/chatter has the type std_msgs/String, not geometry_msgs/Twist")
     reader = browse(address(served, "teleop?token=read-token-00"))
     reader.wait_text(".teleop .error", "This token is read-only")
+
+
+# --- diagnostics, hostile names, files, images
+
+
+def statuses(*rows: tuple[str, int, str], **values: str) -> Any:
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+    found = [KeyValue(key, value) for key, value in values.items()]
+    return DiagnosticArray(
+        status=[DiagnosticStatus(level, name, text, "serial 7", found) for name, level, text in rows]
+    )
+
+
+@needs_chromium
+def test_diagnostics_are_a_tree_with_levels_and_values(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    message = statuses(
+        ("/Robot", 2, "Error"),
+        ("/Robot/Drive/left", 2, "motor hot"),
+        ("/Robot/Scan", 0, "fine"),
+        volts="11.5",
+    )
+    page = browse(address(served, "diagnostics"))
+    page.wait_text(".empty", "Nothing has come on /diagnostics.")
+    row = "[data-path='/Robot{}']"
+    with repeated(served, publisher(served, "/diagnostics_agg", type(message)), message):
+        # What nobody reports has the worst level below it.
+        page.wait_text(row.format("/Drive") + " .badge", "Error")
+        page.wait_text(row.format("/Scan") + " .badge", "OK")
+        page.click(row.format("/Drive/left") + " .report")
+        page.wait_text(".side", "serial 7")
+        page.wait_text(".values", "volts11.5")
+        assert "name=%2FRobot%2FDrive%2Fleft" in page.evaluate("location.hash")
+        page.click("label", "only problems")
+        page.wait(f'return !document.querySelector("{row.format("/Scan")}")')
+        page.click(row.format("") + " .fold")
+        page.wait("return document.querySelectorAll('.status-row').length === 1")
+        page.click(row.format("") + " .fold")
+    page.wait_text(row.format("/Drive/left") + " .badge", "Stale")
+
+
+@needs_chromium
+def test_diagnostics_that_nobody_aggregates_are_a_list(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    message = statuses(("/camera/driver: frames", 1, "slow"), ("laser: beams", 0, "fine"))
+    page = browse(address(served, "diagnostics"))
+    with repeated(served, publisher(served, "/diagnostics", type(message)), message):
+        page.wait_text(".status-row .name", "/camera/driver: frames")
+        page.wait_text(".status-row .badge", "Warning")
+    assert page.evaluate("document.querySelectorAll('.status-row').length") == 2
+
+
+HOSTILE = "<img src=x onerror=\"document.title='broken'\">"
+
+
+@needs_chromium
+@pytest.mark.parametrize(
+    ("view", "find"),
+    [
+        ("console", ".line .node"),
+        ("image?topic=/hostile/image", ".status"),
+        ("diagnostics", ".status-row .name"),
+        ("topics", ".row[data-topic='/hostile/image'] .preview"),
+        ("parameters", ".row.parameter"),
+    ],
+)
+def test_hostile_names_of_nodes_and_frames_are_text(
+    serve: Callable[..., Served], browse: Callable[..., Page], view: str, find: str
+) -> None:
+    from rosgraph_msgs.msg import Log
+    from sensor_msgs.msg import Image
+
+    served = serve()
+    image = Image(height=1, width=1, encoding="mono8", step=1, data=b"\1")
+    image.header.frame_id = HOSTILE
+    served.run(publisher(served, "/hostile/image", Image, latch=True).publish(image))
+    served.run(publisher(served, "/rosout_agg", Log, latch=True).publish(Log(level=8, name=HOSTILE, msg="m")))
+    message = statuses((HOSTILE, 2, HOSTILE))
+    served.run(publisher(served, "/diagnostics", type(message), latch=True).publish(message))
+    served.run(served.node("setter").set_param("/hostile", HOSTILE))
+    page = browse(address(served, view))
+    if view == "topics":  # images are subscribed when they are opened
+        page.click("button.topic", "/hostile/image")
+        page.wait_text(".row[data-topic='/hostile/image'] .fields", HOSTILE)
+    elif view == "parameters":
+        page.wait(
+            f"return [...document.querySelectorAll('input')].some(e => e.value.includes({json.dumps(HOSTILE[:9])}))"
+        )
+    else:
+        page.wait_text(find, HOSTILE)
+    assert page.evaluate("document.querySelectorAll('main img, main script').length") == 0
+    assert "broken" not in page.evaluate("document.title")
+
+
+@needs_chromium
+def test_hostile_names_in_the_graph_are_text(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from xmlrpc.client import ServerProxy
+
+    served = serve()
+    # A master takes the names that nodes register with.
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        answer = master.registerPublisher(
+            "/" + HOSTILE, "/hostile", "std_msgs/String", os.environ["ROS_MASTER_URI"]
+        )
+    assert answer[0] == 1, answer
+    page = browse(address(served, "graph"))
+    page.choose("select[aria-label='What is shown']", "all")
+    page.wait_text(".node text", "<img")
+    assert page.evaluate("document.querySelectorAll('main img, main script').length") == 0
+    assert page.evaluate("document.title") == "Graph · minirospy"
+
+
+def saved(page: Page, folder: Path, name: str, button: str) -> bytes:
+    """Click a button; return the file that the browser saves."""
+    page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+    page.click("button", button)
+    end = time.monotonic() + PATIENCE
+    while not (folder / name).exists():
+        assert time.monotonic() < end, f"{name} is not saved"
+        page.evaluate("new Promise(resolve => setTimeout(resolve, 30))")
+    return (folder / name).read_bytes()
+
+
+@needs_chromium
+def test_csv_and_png_of_a_plot_are_saved(
+    serve: Callable[..., Served], browse: Callable[..., Page], tmp_path: Path
+) -> None:
+    from geometry_msgs.msg import Vector3
+
+    served = serve()
+    moving = publisher(served, "/odometry", Vector3, latch=True, queue_size=None)
+    served.run(moving.publish(1.5, 0.0, 0.0))
+    page = browse(address(served, "plot?path=/odometry/x&path=/odometry/y"))
+    page.wait_text(".series[data-label='/odometry/x']", "1 points")
+    page.wait_text(".series[data-label='/odometry/y']", "1 points")
+    head, first = saved(page, tmp_path, "plot.csv", "CSV").decode().splitlines()
+    assert head.replace('"', "").split(",") == ["time", "/odometry/x", "/odometry/y"]
+    assert first.split(",")[1:] == ["1.5", "0"]
+    page.wait("return document.querySelector('.chart canvas').width > 300")
+    png = saved(page, tmp_path, "plot.png", "PNG")
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    assert struct.unpack(">I", png[16:20])[0] == page.evaluate(
+        "document.querySelector('.chart canvas').width"
+    )
+
+
+@needs_chromium
+def test_csv_of_the_console_is_saved(
+    serve: Callable[..., Served], browse: Callable[..., Page], tmp_path: Path
+) -> None:
+    served = serve()
+    logger(served)((4, "/first", 'low, "very"\nlow'))
+    page = browse(address(served, "console"))
+    page.wait_text(".bar", "1 of 1 lines")
+    rows = list(
+        csv.reader(saved(page, tmp_path, "console.csv", "Export CSV").decode().splitlines(keepends=True))
+    )
+    assert rows[0] == ["time", "level", "node", "message", "file", "function"]
+    assert rows[1][1:] == ["Warn", "/first", 'low, "very"\nlow', "a.py:7", "run"]
+
+
+@needs_chromium
+@pytest.mark.parametrize(
+    ("encoding", "data", "about", "colors"),
+    [
+        (
+            "mono8",
+            bytes((0, 10, 200, 255)),
+            "mono8",
+            [(0, 0, 0), (10, 10, 10), (200, 200, 200), (255, 255, 255)],
+        ),
+        # One red, two green, one blue: each pixel has the colors of its neighbors.
+        ("bayer_rggb8", bytes((200, 100, 50, 30)), "bayer_rggb8", [(200, 75, 30)] + 3 * [None]),
+        ("bayer_bggr8", bytes((200, 100, 50, 30)), "bayer_bggr8", [(30, 75, 200)] + 3 * [None]),
+        (
+            "16UC1",
+            struct.pack("<4H", 1000, 2000, 3000, 2000),
+            "1000 … 3000",
+            [(0, 0, 0), (128,) * 3, (255,) * 3, None],
+        ),
+        (
+            "32FC1",
+            struct.pack("<4f", 0.5, float("nan"), 2.5, 1.5),
+            "0.5 … 2.5",
+            [(0, 0, 0), (20, 24, 60), (255,) * 3, (128,) * 3],
+        ),
+    ],
+)
+def test_mosaics_and_depths_are_shown(
+    serve: Callable[..., Served],
+    browse: Callable[..., Page],
+    encoding: str,
+    data: bytes,
+    about: str,
+    colors: list[tuple[int, ...] | None],
+) -> None:
+    from sensor_msgs.msg import Image
+
+    served = serve()
+    image = Image(height=2, width=2, encoding=encoding, step=len(data) // 2, data=data)
+    served.run(publisher(served, "/camera", Image, latch=True).publish(image))
+    page = browse(address(served, "image?topic=/camera"))
+    page.wait_text(".status", about)
+    pixels = page.evaluate(
+        "Array.from(document.querySelector('canvas').getContext('2d').getImageData(0, 0, 2, 2).data)"
+    )
+    for index, color in enumerate(colors):
+        if color:
+            assert tuple(pixels[index * 4 : index * 4 + 3]) == color, index
+
+
+@needs_chromium
+def test_image_that_cannot_be_shown_is_named(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from sensor_msgs.msg import Image
+
+    served = serve()
+    short = Image(height=2, width=2, encoding="rgb8", step=6, data=b"123")
+    served.run(publisher(served, "/short", Image, latch=True).publish(short))
+    odd = Image(height=1, width=1, encoding="odd", step=1, data=b"1")
+    served.run(publisher(served, "/odd", Image, latch=True).publish(odd))
+    page = browse(address(served, "image?topic=/short"))
+    page.wait_text(".error", "the image has 3 bytes, rgb8 of 2 x 2 needs 12")
+    page.choose("select", "/odd")
+    page.wait_text(".error", "images of encoding odd cannot be shown")
 
 
 @needs_chromium

@@ -4,6 +4,7 @@ import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
+import { Diagnostics } from "./views/diagnostics.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
 import { Parameters } from "./views/parameters.js";
@@ -23,6 +24,7 @@ const VIEWS = {
   board: ["Board", Board],
   turtlesim: ["Turtlesim", Turtlesim],
   teleop: ["Teleop", Teleop],
+  diagnostics: ["Diagnostics", Diagnostics],
   publish: ["Publish", Publish],
   services: ["Services", Services],
   parameters: ["Parameters", Parameters],
