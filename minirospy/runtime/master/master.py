@@ -12,27 +12,26 @@ import os
 import re
 import socket
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
-from itertools import chain
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import minirospy
 from minirospy.errors import MinirospyError, RpcError, RpcUnreachable
 from minirospy.graph.calls import Answer
-from minirospy.graph.master_api import MasterApi, Notice, key_of_node, nothing
-from minirospy.graph.parameters import ParameterTree, ParameterUpdate, weigh_in_steps
+from minirospy.graph.master_api import MasterApi, Notice, nothing
+from minirospy.graph.parameters import ParameterTree, ParameterUpdate
 from minirospy.graph.registry import NodeShutdown, PublisherUpdate, Registry
 from minirospy.runtime.master.dead_nodes import find_dead
 from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.master.notifier import Notifier
+from minirospy.runtime.master.replay import Replay, changes_to, forget_node
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.access import Access
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.steps import ALONE, Steps, finish
 from minirospy.wire.http import MAX_BODY
-from minirospy.wire.journal import unpack
 from minirospy.wire.xmlrpc import Serialized, serialize_response_in_steps
 
 if TYPE_CHECKING:
@@ -100,8 +99,6 @@ class Master(MasterApi):
         self._journal_path = journal
         self._fresh = fresh
         self._journal: Journal | None = None
-        # Large values whose parts were found in the journal.
-        self._parts: dict[int, list[bytes]] = {}
         self._same_host = same_host
         self._owns_process = owns_process
         self._server = RpcServer(
@@ -290,7 +287,9 @@ class Master(MasterApi):
 
         assert self._journal_path
         journal = self._journal = Journal(
-            self._journal_path, self._snapshot, start_steps=self._server.turns.start
+            self._journal_path,
+            lambda: changes_to(self.registry, self.parameters),
+            start_steps=self._server.turns.start,
         )
         busy: JournalBusyError | None = None
         try:
@@ -321,13 +320,13 @@ class Master(MasterApi):
 
     async def _take_up(self, left: Left) -> None:
         recovered, age = left.recovered, left.age
+        replay = Replay(self.registry, self.parameters)
         for record in recovered.records:
             try:
-                self._replay(*record)
+                replay.apply(*record)
             except (TypeError, ValueError, KeyError, MinirospyError) as error:
                 self.news.append(f"journal: a record was left out: {error}")
 
-        self._parts.clear()
         uri = self.registry.node_uri(_OWN_NODE)
         if uri:
             # The /rosout node went with its master; this one brings its own.
@@ -353,70 +352,6 @@ class Master(MasterApi):
             self.news.append(f"journal: {what} are left behind: none of these nodes answers")
             return
         self.news.append(f"journal: recovered {what}")
-
-    def _replay(self, what: str, *args: Any) -> None:
-        """One change, as it was recorded; the nodes that it notified then are not notified again."""
-        registry, parameters = self.registry, self.parameters
-        actions: Iterable[Notice] = ()
-
-        match what, args:
-            case "+pub", (node, topic, type_, uri):
-                actions = registry.register_publisher(node, topic, type_, uri).actions
-            case "+sub", (node, topic, type_, uri):
-                actions = registry.register_subscriber(node, topic, type_, uri).actions
-            case "+srv", (node, service, service_uri, uri):
-                actions = registry.register_service(node, service, service_uri, uri)
-            case "+par", (node, key, uri):
-                actions = registry.register_parameter(node, key_of_node(key), uri)
-                parameters.subscribe(key, node, uri)
-            case "-pub", (node, topic, uri):
-                registry.unregister_publisher(node, topic, uri)
-            case "-sub", (node, topic, uri):
-                registry.unregister_subscriber(node, topic, uri)
-            case "-srv", (node, service, service_uri):
-                registry.unregister_service(node, service, service_uri)
-            case "-par", (node, key, uri):
-                if parameters.unsubscribe(key, node, uri):
-                    registry.unregister_parameter(node, key_of_node(key), uri)
-            case "gone", (node, uri):
-                self._forget(node, uri)
-            case "type", (topic, type_):
-                registry.set_type(topic, type_)
-            case "set", (key, value):
-                parameters.set(key, value, "", finish(weigh_in_steps(key, value)))
-            case "part", (int(number), bytes(data)):
-                self._parts.setdefault(number, []).append(data)
-            case "put", (key, number):
-                value = unpack(b"".join(self._parts.pop(number)))
-                parameters.set(key, value, "", finish(weigh_in_steps(key, value)))
-            case "del", (key,):
-                parameters.delete(key)
-            case _:
-                raise ValueError(f"{what!r} with {len(args)} arguments is unknown")
-
-        for action in actions:
-            if isinstance(action, NodeShutdown):
-                parameters.unsubscribe_node(action.name, action.uri)
-
-    def _snapshot(self) -> Iterator[list[object]]:
-        """Return the changes that lead from nothing to the present state, with the order of every table.
-
-        The state is copied here and now: the changes may be read while it goes on changing.
-        """
-        registry = self.registry
-        uris, types = registry.nodes(), registry.topic_types()
-        # Each of them is a copy.
-        publications, subscriptions = registry.publications(), registry.all_subscriptions()
-        offers, parameters = list(registry.offers()), list(self.parameters.subscriptions())
-        tree = self.parameters.get("/")
-        return chain(
-            (["type", topic, type_] for topic, type_ in types.items()),
-            (["+pub", node, topic, types[topic], uris[node]] for node, topic in publications),
-            (["+sub", node, topic, "*", uris[node]] for node, topic in subscriptions),
-            (["+srv", node, name, uri, uris[node]] for node, name, uri in offers),
-            (["+par", node, key, uri] for node, uri, key in parameters),
-            (["set", "/", tree],),
-        )
 
     def _collect(self) -> None:
         """Have the garbage collector look at the youngest objects only, and at all of them now and then if they are few.
@@ -493,8 +428,7 @@ class Master(MasterApi):
             )
 
     def _forget(self, name: str, uri: str) -> list[Notice]:
-        self.parameters.unsubscribe_node(name, uri)
-        return list(self.registry.forget(name, uri))
+        return forget_node(self.registry, self.parameters, name, uri)
 
 
 async def _lock(journal: Journal) -> None:

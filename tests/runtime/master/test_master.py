@@ -20,6 +20,7 @@ import pytest
 from minirospy.escape import has_controls
 from minirospy.runtime.master import notifier
 from minirospy.runtime.master.master import Master
+from minirospy.runtime.master.replay import Replay, changes_to
 from minirospy.steps import finish
 from minirospy.wire.xmlrpc import Serialized, serialize_response
 from tests.runtime.master.master_calls import CALLS, SCENE
@@ -325,8 +326,9 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
 
             if number % 100 == 0:
                 successor = Master()
-                for record in master._snapshot():
-                    successor._replay(*record)
+                replay = Replay(successor.registry, successor.parameters)
+                for record in changes_to(master.registry, master.parameters):
+                    replay.apply(*record)
                 assert successor.get_system_state("/x") == state
                 assert successor.registry.nodes() == master.registry.nodes()
 

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from minirospy.environment import Environment
 from minirospy.errors import RpcFault, UsageError
 from minirospy.runtime.master.master import Master
+from minirospy.runtime.master.replay import Replay, changes_to
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as rpc_server
@@ -455,8 +456,9 @@ def test_any_call_is_answered(calls: list[tuple[str, list[Any]]]) -> None:
                 assert isinstance(answer[1], str)
                 assert len(answer) == 3
         again = Master()
-        for record in master._snapshot():
-            again._replay(*record)
+        replay = Replay(again.registry, again.parameters)
+        for record in changes_to(master.registry, master.parameters):
+            replay.apply(*record)
         for question in ("getSystemState", "getTopicTypes", "getParamNames"):
             assert again.dispatch(question, ["/x"]) == master.dispatch(question, ["/x"])
 

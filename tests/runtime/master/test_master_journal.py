@@ -27,6 +27,7 @@ from minirospy.runtime.master import journal as journal_module
 from minirospy.runtime.master import master as master_module
 from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.master.master import Master
+from minirospy.runtime.master.replay import Replay
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.journal import HEAD, parse_journal
@@ -662,8 +663,9 @@ def test_journal_replays_to_the_same_state_after_any_calls(
             assert served == master.dispatch("getSystemState", ["/x"])
             if number % 20 == 19:
                 again = Master()
+                replay = Replay(again.registry, again.parameters)
                 for record in parse_journal(path.read_bytes()).records[1:]:
-                    again._replay(*record)
+                    replay.apply(*record)
                 assert state(again) == state(master)
         await master.close()
 
