@@ -402,9 +402,13 @@ def test_graph_shows_nodes_and_topics_and_their_details(
     page.wait_text(".node text", "/listener")
     page.wait("return document.querySelectorAll('.edge').length === 2")
     page.click(".graph .topic", "/chatter")
-    # The view subscribes to a chosen topic: its list changes once, and a click on what is replaced is lost.
+    # The view subscribes to a chosen topic: its list changes once.
     page.wait_text(".side", "std_msgs/String")
     page.wait_text(".side button", "/dashboard")
+    page.evaluate("[...document.querySelectorAll('.side button')].forEach(button => button.isOld = true)")
+    publisher(served, "/other", String)
+    page.wait_text(".node text", "/talker_other")
+    assert page.evaluate("[...document.querySelectorAll('.side button')].every(button => button.isOld)")
     page.click(".side button", "/listener")
     page.wait_text(".side", "Subscribes to (1)")
     page.choose("select[aria-label='What is shown']", "nodes")

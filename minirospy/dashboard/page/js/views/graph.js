@@ -132,6 +132,7 @@ export class Graph {
     this.selected = this.selected === key ? null : key;
     this.endRate();
     if (this.selected?.[0] === "t") this.measure(key.slice(1));
+    this.shown = null;
     this.showDetails();
     this.highlight();
   }
@@ -158,6 +159,10 @@ export class Graph {
     const name = this.selected.slice(1);
     const { published, subscribed, services } = this.link.graph;
     const names = (table) => [...table].filter(([, nodes]) => nodes.includes(name)).map(([each]) => each).sort();
+    // A button that is replaced between press and release loses its click.
+    const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? ""));
+    if (content === this.shown) return;
+    this.shown = content;
     const list = (title, items, kind) => (items.length ? [h("h3", {}, `${title} (${items.length})`), h("ul", {}, items.map((each) => h("li", {}, kind
       ? h("button", { type: "button", class: "link", onclick: () => { this.selected = null; this.select(kind + each); } }, each) : each)))] : []);
     if (this.selected[0] === "n") {
