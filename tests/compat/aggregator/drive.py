@@ -7,6 +7,7 @@ import threading
 
 import rospy
 import yaml
+from bond.msg import Status
 from bondpy import bondpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from diagnostic_msgs.srv import AddDiagnostics
@@ -252,6 +253,12 @@ with Program("aggregator_node", node="open", pub_rate=20, base_path="Top"), Tree
     bond.break_bond()
     tree.show("removed", lambda lines: not has("/Top/Added")(lines))
 
+    beats = queue.Queue()
+    heartbeats = rospy.Subscriber("/diagnostics_agg/bond/adder", Status, beats.put)
     with Program("add_analyzers", node="adder", **rospy.get_param("/added")):
         tree.show("by the program", has("/Top/Added/Mine"))
+        # The real aggregator never notices the end of a program that has sent one heartbeat alone.
+        seen = 0
+        while seen < 3:
+            seen += beats.get(timeout=30)._connection_header["callerid"] == "/adder"
     tree.show("program ended", lambda lines: not has("/Top/Added")(lines))
