@@ -178,26 +178,18 @@ _QT_LIBRARIES = (
 )
 
 _MESSAGES = {
-    "cartesian_control_msgs": "https://github.com/UniversalRobots/Universal_Robots_ROS_cartesian_control_msgs",
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
-    "mavros_msgs": "-b master https://github.com/mavlink/mavros",
-    "moveit_msgs": "https://github.com/moveit/moveit_msgs",
-    "vision_msgs": "-b noetic-devel https://github.com/ros-perception/vision_msgs",
 }
 """Packages of definitions -> what `git clone` takes for ROS 1's."""
 
 IMPORTED = frozenset(
     {
-        "cartesian_control_msgs",
         "gazebo_ros",
-        "mavros_msgs",
         "moveit_commander",
-        "moveit_msgs",
         "moveit_ros_planning_interface",
         "nodelet",
         "rviz",
         "rqt_graph",
-        "vision_msgs",
         *_QT_LIBRARIES,
     }
 )
