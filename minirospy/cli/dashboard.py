@@ -96,7 +96,17 @@ def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None
 def _dashboard_parser() -> Parser:
     parser = _parser("minirospy dashboard", "Shows the graph and the board in a browser.")
     parser.add_argument(
-        "view", nargs="?", default="topics", help="the view to open", completer="dashboard_views"
+        "view",
+        nargs="?",
+        default="",
+        help="the view to open (topics), or the layout: workshop, classroom",
+        completer="dashboard_views",
+    )
+    parser.add_argument(
+        "--layout",
+        default="",
+        help="the layout to open, several views side by side: workshop, console, teleop or classroom",
+        completer="dashboard_layouts",
     )
     return parser
 
@@ -147,6 +157,7 @@ def _image_parser() -> Parser:
 
 def _dashboard(
     view: str,
+    layout: str,
     port: int | None,
     no_browser: bool,
     listen: bool,
@@ -154,12 +165,22 @@ def _dashboard(
     read_only: bool,
     arguments: Sequence[str] = (),
 ) -> int:
-    from minirospy.dashboard.views import VIEWS
+    from minirospy.dashboard.views import LAYOUTS, VIEWS
     from minirospy.errors import did_you_mean
 
-    if view not in VIEWS:
-        raise Misuse(f"there is no view '{view}'{did_you_mean(view, VIEWS)}: there are {', '.join(VIEWS)}")
-    return _serve(view, {}, port, no_browser, listen, address, read_only, arguments)
+    if view and layout:
+        raise Misuse(f"'{view}' and --layout {layout} are two views: give one")
+    if not layout and view not in VIEWS and view in LAYOUTS:
+        layout, view = view, ""
+    if layout and layout not in LAYOUTS:
+        known = ", ".join(LAYOUTS)
+        raise Misuse(f"there is no layout '{layout}'{did_you_mean(layout, LAYOUTS)}: there are {known}")
+    if view and view not in VIEWS:
+        names = (*VIEWS, *(each for each in LAYOUTS if each not in VIEWS))
+        raise Misuse(f"there is no view '{view}'{did_you_mean(view, names)}: there are {', '.join(names)}")
+    fields = {"preset": [layout]} if layout else {}
+    shown = "layout" if layout else view or "topics"
+    return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
 
 
 def _rqt(

@@ -10,9 +10,10 @@ from urllib.parse import quote, urlencode
 
 from minirospy.errors import UsageError
 
-__all__ = ["VIEWS", "link", "plotted_fields", "view_of_plugin"]
+__all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields", "view_of_plugin"]
 
 VIEWS = (
+    "layout",
     "topics",
     "console",
     "plot",
@@ -27,6 +28,9 @@ VIEWS = (
     "parameters",
 )
 """The names of the views, as in links; the page has one module for each."""
+
+LAYOUTS = ("workshop", "console", "teleop", "classroom")
+"""The layouts that come with the page: several views side by side."""
 
 _PLUGINS = {
     "rqt_topic": "topics",

@@ -60,6 +60,12 @@ def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
     assert started[0].wait(60) == 0
 
 
+@pytest.mark.parametrize("words", [["workshop"], ["--layout", "workshop"]])
+def test_layout_of_the_page_is_opened(started: list[subprocess.Popen[str]], words: list[str]) -> None:
+    link = link_of(started, "-m", "minirospy", "dashboard", *words, "--no-browser", "--port", "0")
+    assert link.endswith("/#/layout?preset=workshop")
+
+
 def test_second_dashboard_takes_another_port(started: list[subprocess.Popen[str]]) -> None:
     links = {link_of(started, "-m", "minirospy", "dashboard", "--no-browser") for _ in range(2)}
     assert len(links) == 2
@@ -96,6 +102,8 @@ def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.P
     ("run", "words", "text"),
     [
         (command.dashboard, ["tpics"], "there is no view 'tpics'"),
+        (command.dashboard, ["--layout", "workshp"], "there is no layout 'workshp'"),
+        (command.dashboard, ["plot", "--layout", "teleop"], "'plot' and --layout teleop are two views"),
         (command.dashboard, ["--port", "70000"], "--port 70000 is not between 0 and 65535"),
         (command.dashboard, ["--address", "192.0.2.1"], "--address 192.0.2.1 lets other machines connect"),
         (command.rqt, ["-s", "rqt_moveit"], "there is no view for the plug-in 'rqt_moveit'"),

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from minirospy.dashboard.files import FOLDER
-from minirospy.dashboard.views import VIEWS, link, plotted_fields, view_of_plugin
+from minirospy.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields, view_of_plugin
 from minirospy.errors import UsageError
 
 
@@ -17,6 +17,11 @@ def test_page_has_the_views_that_links_name() -> None:
     )
     assert table
     assert tuple(re.findall(r"(\w+): \[", table[1])) == VIEWS
+
+
+def test_page_has_the_layouts_that_links_name() -> None:
+    text = (FOLDER / "js" / "presets.js").read_text(encoding="utf-8")
+    assert tuple(re.findall(r"^  (\w+): \[", text, re.MULTILINE)) == LAYOUTS
 
 
 def test_link_has_its_settings_and_token_in_the_fragment() -> None:

@@ -601,9 +601,9 @@ def test_turtles_are_drawn_with_their_trails_and_come_and_go(
     page.wait("return !document.querySelector(\"[data-name='/leo']\")")
 
 
-def listener(served: Served, topic: str) -> Callable[[Callable[[Twist], bool]], None]:
+def listener(served: Served, topic: str, name: str = "robot") -> Callable[[Callable[[Twist], bool]], None]:
     """Return a function that waits until a message of a topic is right."""
-    robot = served.node("robot")
+    robot = served.node(name)
 
     async def listen() -> Any:
         return await robot.subscribe(topic, Twist)

@@ -16,7 +16,7 @@ function filled(element, properties, children) {
   for (const [name, value] of Object.entries(properties)) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name === "value" || name === "checked") element[name] = value;
+    else if (name === "value" || name === "checked" || name === "inert") element[name] = value;
     else element.setAttribute(name, value === true ? "" : value);
   }
   append(element, children);
@@ -34,6 +34,13 @@ function append(element, children) {
 export function fill(element, ...children) {
   element.replaceChildren();
   append(element, children);
+}
+
+let uniqueIds = 0;
+
+/** Return an id that no element has: the name itself where it is free, as a layout may show a view twice. */
+export function uniqueId(name) {
+  return document.getElementById(name) ? `${name}-${++uniqueIds}` : name;
 }
 
 /** Set an element's text where it differs. */

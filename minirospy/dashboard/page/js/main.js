@@ -1,5 +1,6 @@
 // The shell: views by the fragment of the address (#/plot?path=/a/b), the state of the connection, dark and light.
 
+import { addressOf, fragmentOf } from "./address.js";
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Board } from "./views/board.js";
@@ -7,6 +8,7 @@ import { Console } from "./views/console.js";
 import { Diagnostics } from "./views/diagnostics.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
+import { Layouts } from "./views/layout.js";
 import { Parameters } from "./views/parameters.js";
 import { Plot } from "./views/plot.js";
 import { Publish } from "./views/publish.js";
@@ -16,6 +18,7 @@ import { Topics } from "./views/topics.js";
 import { Turtlesim } from "./views/turtlesim.js";
 
 const VIEWS = {
+  layout: ["Layouts", Layouts],
   topics: ["Topics", Topics],
   console: ["Console", Console],
   plot: ["Plot", Plot],
@@ -42,30 +45,42 @@ const tabs = document.getElementById("tabs");
 const main = document.getElementById("view");
 const notices = document.getElementById("notices");
 let current = null;
+let shown = null; // the place of the current view
 
 /** Return the token of the address, which is kept for this tab, and removed from the address and the history. */
 function takeToken() {
-  const [path, query = ""] = location.hash.split("?");
-  const words = new URLSearchParams(query);
+  const { view, words } = addressOf(location.hash);
   const given = words.get("token");
   if (given) {
     sessionStorage.setItem("token", given);
     words.delete("token");
-    const rest = words.toString();
-    history.replaceState(null, "", `${path || "#/"}${rest ? `?${rest}` : ""}`);
+    history.replaceState(null, "", fragmentOf(view, words));
   }
   return sessionStorage.getItem("token") ?? "";
 }
 
+/** Return what a view may use of the page: where its settings are kept, other views, whether keys are for it. In a layout a pane gives its own. */
+function placeOf(name) {
+  const place = {
+    views: VIEWS,
+    isActive: () => true,
+    /** Keep the view's settings in the address; as an object, or URLSearchParams. */
+    remember: (words) => { if (place === shown) history.replaceState(null, "", fragmentOf(name, words)); },
+    /** Show a view with these settings. */
+    open: (view, words) => { location.hash = fragmentOf(view, words); },
+  };
+  return place;
+}
+
 function route() {
-  const [path, query = ""] = location.hash.slice(1).split("?");
-  const name = path.replace(/^\//, "");
-  const chosen = Object.hasOwn(VIEWS, name) ? name : "topics";
+  const { view, words } = addressOf(location.hash);
+  const chosen = Object.hasOwn(VIEWS, view) ? view : "topics";
   current?.close();
   const [title, View] = VIEWS[chosen];
   main.dataset.view = chosen;
   fill(main);
-  current = new View(link, new URLSearchParams(query), main);
+  shown = placeOf(chosen);
+  current = new View(link, words, main, shown);
   document.title = `${title} · minirospy`;
   for (const tab of tabs.children) {
     if (tab.dataset.view === chosen) tab.setAttribute("aria-current", "page");

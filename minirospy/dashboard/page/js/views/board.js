@@ -7,14 +7,15 @@ const METRES = 200; // pixels a metre in the room
 const REACH = 0.15; // of a person, in metres
 
 export class Board {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.name = words.get("board") ?? "";
     this.state = null;
     this.held = new Set();
     this.socket = null;
     this.isClosed = false;
-    this.boards = h("select", { "aria-label": "Board", onchange: () => { location.hash = `#/board?board=${encodeURIComponent(this.boards.value)}`; } });
+    this.boards = h("select", { "aria-label": "Board", onchange: () => this.choose(this.boards.value) });
     this.problem = h("span", { class: "error", role: "alert" });
     this.others = h("div", { class: "muted pins" });
     this.picture = svg("svg", { class: "board", viewBox: "0 0 560 300", role: "group", "aria-label": "The board" });
@@ -43,12 +44,22 @@ export class Board {
     this.socket?.close();
   }
 
+  choose(name) {
+    this.name = name;
+    this.place.remember({ board: name });
+    this.releaseAll();
+    this.isChosen = true;
+    // It is connected again, to the other board.
+    this.socket.close();
+  }
+
   connect() {
     this.socket = new WebSocket(this.link.address(this.name ? `?board=${encodeURIComponent(this.name)}` : ""), this.link.protocols("minirospy.board.v1"));
     this.socket.onmessage = ({ data }) => this.received(JSON.parse(data));
     this.socket.onclose = () => {
       this.held.clear();
-      if (!this.isClosed) this.timer = setTimeout(() => this.connect(), 1000);
+      if (!this.isClosed) this.timer = setTimeout(() => this.connect(), this.isChosen ? 0 : 1000);
+      this.isChosen = false;
     };
   }
 
@@ -135,7 +146,7 @@ export class Board {
   key(event) {
     const focused = document.activeElement?.dataset?.pin;
     const pin = { 1: 11, 2: 12 }[event.key] ?? (focused && (event.key === " " || event.key === "Enter") ? Number(focused) : undefined);
-    if (pin === undefined || event.repeat || /INPUT|SELECT|TEXTAREA/.test(document.activeElement?.tagName ?? "")) return;
+    if (pin === undefined || event.repeat || (event.type === "keydown" && !this.place.isActive()) || /INPUT|SELECT|TEXTAREA/.test(document.activeElement?.tagName ?? "")) return;
     event.preventDefault();
     if (event.type === "keydown") this.press(pin);
     else this.release(pin);

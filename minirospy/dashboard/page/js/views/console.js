@@ -11,7 +11,7 @@ const ROW = 26; // pixels, as .line in style.css
 const lines = [];
 const counts = new Map(LEVELS.map(([level]) => [level, 0]));
 let end = null;
-let listener = null;
+const listeners = new Set(); // of the views that are open: a layout may have several
 let removed = 0;
 
 function collect(link) {
@@ -27,14 +27,16 @@ function collect(link) {
       lines.splice(0, cut);
       removed += cut;
     }
-    listener?.(cut);
+    for (const listener of listeners) listener(cut);
   });
 }
 
 export class Console {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
-    this.levels = new Set(LEVELS.map(([level]) => level));
+    this.place = place;
+    const given = words.get("levels")?.split(",").map(Number);
+    this.levels = new Set(LEVELS.map(([level]) => level).filter((level) => !given || given.includes(level)));
     this.isPaused = false;
     this.shown = []; // the lines that pass the filter
     this.seen = removed; // how many lines, of all that ever came, have been filtered
@@ -42,11 +44,11 @@ export class Console {
     this.nodes = new Set();
 
     this.buttons = new Map(LEVELS.map(([level, name]) => [level,
-      h("button", { type: "button", class: `level l${level}`, "aria-pressed": "true", onclick: () => this.switchLevel(level) }, h("span", {}, name), " ", h("span", { class: "count" }, "0"))]));
-    this.node = h("select", { "aria-label": "Node", onchange: () => this.filter() }, h("option", { value: "" }, "all nodes"));
-    this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.filter() });
-    this.isRegex = h("input", { type: "checkbox", onchange: () => this.filter() });
-    this.isExcluded = h("input", { type: "checkbox", onchange: () => this.filter() });
+      h("button", { type: "button", class: `level l${level}`, "aria-pressed": String(this.levels.has(level)), onclick: () => this.switchLevel(level) }, h("span", {}, name), " ", h("span", { class: "count" }, "0"))]));
+    this.node = h("select", { "aria-label": "Node", onchange: () => this.change() }, h("option", { value: "" }, "all nodes"));
+    this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.change() });
+    this.isRegex = h("input", { type: "checkbox", checked: words.get("regex") === "1", onchange: () => this.change() });
+    this.isExcluded = h("input", { type: "checkbox", checked: words.get("exclude") === "1", onchange: () => this.change() });
     this.pauseButton = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.pause() }, "Pause");
     this.latest = h("button", { type: "button", hidden: true, class: "primary", onclick: () => { this.list.follow(); this.showCount(); } }, "↓ Latest");
     this.loggersButton = h("button", { type: "button", onclick: () => this.toggleLoggers() }, "Logger levels");
@@ -67,17 +69,28 @@ export class Console {
         this.loggersButton, this.count, this.latest),
       this.loggers, h("div", { class: "panel lines" }, this.list.element), this.details);
 
-    listener = (cut) => this.arrived(cut);
+    this.listener = (cut) => this.arrived(cut);
+    listeners.add(this.listener);
+    if (words.get("node")) {
+      this.addNode(words.get("node"));
+      this.node.value = words.get("node");
+    }
     collect(link);
     this.filter();
   }
 
   close() {
-    listener = null;
+    listeners.delete(this.listener);
     this.list.close();
   }
 
   arrived(cut) {
+    if (cut === Infinity) {
+      this.selected = null;
+      this.details.hidden = true;
+      this.filter();
+      return;
+    }
     if (this.isPaused) {
       this.showCount();
       return;
@@ -90,6 +103,13 @@ export class Console {
       this.list.removed(before - this.shown.length);
     }
     this.filterNew();
+  }
+
+  /** Filter as a person has set it, and keep that in the address. */
+  change() {
+    this.filter();
+    const isAll = this.levels.size === LEVELS.length;
+    this.place.remember({ text: this.text.value, node: this.node.value, levels: isAll ? "" : [...this.levels].join(",") || "0", regex: this.isRegex.checked, exclude: this.isExcluded.checked });
   }
 
   filter() {
@@ -154,7 +174,7 @@ export class Console {
     if (this.selected) {
       fill(this.details, h("div", { class: "bar" }, h("strong", {}, `${NAMES.get(line.level) ?? line.level} · ${line.node}`),
         h("span", { class: "muted" }, `${timeText(line.stamp)} · ${line.file}:${line.line} ${line.function}`),
-        h("button", { type: "button", onclick: () => { this.node.value = line.node; this.filter(); } }, "Only this node")), h("pre", {}, line.text));
+        h("button", { type: "button", onclick: () => { this.node.value = line.node; this.change(); } }, "Only this node")), h("pre", {}, line.text));
     }
     this.list.draw();
   }
@@ -162,7 +182,7 @@ export class Console {
   switchLevel(level) {
     if (!this.levels.delete(level)) this.levels.add(level);
     this.buttons.get(level).setAttribute("aria-pressed", String(this.levels.has(level)));
-    this.filter();
+    this.change();
   }
 
   pause() {
@@ -177,9 +197,7 @@ export class Console {
     removed += lines.length;
     lines.length = 0;
     for (const level of counts.keys()) counts.set(level, 0);
-    this.selected = null;
-    this.details.hidden = true;
-    this.filter();
+    for (const listener of listeners) listener(Infinity);
   }
 
   async copy(button) {

@@ -10,8 +10,9 @@ const STALE_SECONDS = 5; // without a message, as in rqt_runtime_monitor
 const MOST = 5000; // statuses that are kept
 
 export class Diagnostics {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.topic = words.get("topic") ?? "";
     this.chosen = words.get("name");
     this.statuses = new Map(); // path -> {path, name, level, message, hardware, values, at}
@@ -20,7 +21,7 @@ export class Diagnostics {
     this.end = null;
     this.choice = h("select", { "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
     this.counts = LEVELS.map((name, level) => h("span", { class: `badge d${level}` }, name, " ", h("span", { class: "count" }, "0")));
-    this.isBad = h("input", { type: "checkbox", onchange: () => this.draw() });
+    this.isBad = h("input", { type: "checkbox", checked: words.get("problems") === "1", onchange: () => { this.remember(); this.draw(); } });
     this.tree = h("div", { class: "panel tree", role: "tree", "aria-label": "Diagnostics" });
     this.empty = h("p", { class: "empty" });
     this.side = h("div", { class: "panel side details", hidden: true });
@@ -57,10 +58,7 @@ export class Diagnostics {
   }
 
   remember() {
-    const words = new URLSearchParams();
-    if (this.topic) words.set("topic", this.topic);
-    if (this.chosen) words.set("name", this.chosen);
-    history.replaceState(null, "", `#/diagnostics${words.size ? `?${words}` : ""}`);
+    this.place.remember({ topic: this.topic, name: this.chosen, problems: this.isBad.checked });
   }
 
   subscribe(topic) {

@@ -1,7 +1,7 @@
 // Who sends to whom: nodes and topics, laid out by dagre and drawn as SVG. A click shows the details.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
-import { bandwidth, fill, h, svg } from "../dom.js";
+import { bandwidth, fill, h, svg, uniqueId } from "../dom.js";
 import { Rate } from "../rates.js";
 
 const MODES = [["active", "Nodes and topics (active)"], ["all", "Nodes and topics (all)"], ["nodes", "Nodes only"]];
@@ -10,17 +10,20 @@ const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxgl
 const HEIGHT = 36;
 
 export class Graph {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.selected = null;
     this.signature = null;
     this.end = null;
-    this.mode = h("select", { "aria-label": "What is shown", onchange: () => this.update() }, MODES.map(([value, name]) => h("option", { value }, name)));
-    this.hidesDebug = h("input", { type: "checkbox", checked: true, onchange: () => this.update() });
-    this.filter = h("input", { type: "search", placeholder: "Filter names", "aria-label": "Filter", oninput: () => this.update() });
+    this.mode = h("select", { "aria-label": "What is shown", onchange: () => this.change() }, MODES.map(([value, name]) => h("option", { value }, name)));
+    this.hidesDebug = h("input", { type: "checkbox", checked: words.get("debug") !== "1", onchange: () => this.change() });
+    if (MODES.some(([value]) => value === words.get("mode"))) this.mode.value = words.get("mode");
+    this.filter = h("input", { type: "search", placeholder: "Filter names", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => this.change() });
+    this.arrow = uniqueId("arrow");
     this.drawing = svg("g", {});
     this.picture = svg("svg", { class: "graph", role: "group", "aria-label": "Graph of nodes and topics" },
-      svg("defs", {}, svg("marker", { id: "arrow", viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 7, markerHeight: 7, orient: "auto-start-reverse" },
+      svg("defs", {}, svg("marker", { id: this.arrow, viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 7, markerHeight: 7, orient: "auto-start-reverse" },
         svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
     this.details = h("aside", { class: "panel details side", hidden: true });
     this.empty = h("p", { class: "empty" });
@@ -76,6 +79,11 @@ export class Graph {
     return { nodes, topics, edges: edges.filter(([from, to]) => isThere(from) && isThere(to)) };
   }
 
+  change() {
+    this.place.remember({ mode: this.mode.value === MODES[0][0] ? "" : this.mode.value, debug: !this.hidesDebug.checked, filter: this.filter.value });
+    this.update();
+  }
+
   update() {
     // While the connection is lost, the last graph stays.
     if (this.link.state !== "open" && this.signature !== null) return;
@@ -106,7 +114,7 @@ export class Graph {
     for (const id of graph.edges()) {
       const { points, label, x, y } = graph.edge(id);
       const path = points.map((point, index) => `${index ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
-      const edge = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": "url(#arrow)" }), label ? svg("text", { x, y: y + 4 }, label) : null);
+      const edge = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), label ? svg("text", { x, y: y + 4 }, label) : null);
       edge.dataset.from = id.v;
       edge.dataset.to = id.w;
       parts.push(edge);

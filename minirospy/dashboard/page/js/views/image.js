@@ -7,8 +7,9 @@ import { Rate } from "../rates.js";
 const TYPES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 
 export class Image {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.topic = words.get("topic") ?? "";
     this.rate = new Rate();
     this.end = null;
@@ -49,7 +50,7 @@ export class Image {
 
   choose(topic) {
     this.topic = topic;
-    history.replaceState(null, "", `#/image${topic ? `?topic=${encodeURIComponent(topic)}` : ""}`);
+    this.place.remember({ topic });
     this.end?.();
     this.end = null;
     this.pixels = null;

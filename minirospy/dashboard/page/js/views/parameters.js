@@ -3,10 +3,13 @@
 import { h, setText } from "../dom.js";
 
 export class Parameters {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
     this.rows = new Map();
-    this.filter = h("input", { type: "search", placeholder: "Filter names and values", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => this.showFiltered() });
+    this.filter = h("input", { type: "search", placeholder: "Filter names and values", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
+      this.showFiltered();
+      place.remember({ filter: this.filter.value });
+    } });
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "list", "aria-label": "Parameters" });
     this.name = h("input", { placeholder: "/name", "aria-label": "Name of a new parameter", autocomplete: "off" });

@@ -1,16 +1,18 @@
 // Plots of numbers of messages: paths of fields, two axes, zoom and pan while they stream, CSV and PNG.
 
-import { download, h, number, setText } from "../dom.js";
+import { download, h, number, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 
 const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
+const USUAL_WINDOW = "10";
 const FRAME_MS = 33;
 const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
 
 export class Plot {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.ends = new Map(); // path -> what ends its subscription
     this.series = new Map(); // label -> {label, path, samples, color, axis, isHidden}
     this.problems = new Map();
@@ -21,11 +23,12 @@ export class Plot {
     this.chart = null;
     this.isDirty = true;
 
-    this.known = h("datalist", { id: "paths" });
-    this.input = h("input", { class: "grow", list: "paths", placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
+    this.known = h("datalist", { id: uniqueId("paths") });
+    this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
     this.problem = h("span", { class: "error" });
-    this.window = h("select", { "aria-label": "Time shown", onchange: () => this.live() }, WINDOWS.map(([value, name]) => h("option", { value }, name)));
-    this.window.value = words.get("window") ?? "10";
+    this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, name)));
+    const wanted = words.get("window") ?? USUAL_WINDOW;
+    this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
     this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
     this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
@@ -38,7 +41,7 @@ export class Plot {
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
-        h("span", { class: "muted" }, "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
+        h("span", { class: "muted tips" }, "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
       this.area, this.legend);
     this.area.append(this.hint);
     this.pause(this.isPaused);
@@ -103,8 +106,14 @@ export class Plot {
   }
 
   remember() {
-    const words = new URLSearchParams([...this.ends.keys()].map((path) => ["path", path]));
-    history.replaceState(null, "", `#/plot?${words}`);
+    const span = this.window.value;
+    this.place.remember([...[...this.ends.keys()].map((path) => ["path", path]), ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]])]);
+  }
+
+  /** Plot what another view links to, too. */
+  accept(words) {
+    for (const path of words.getAll("path")) this.add(path);
+    return true;
   }
 
   showProblems() {

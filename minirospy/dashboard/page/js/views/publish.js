@@ -6,8 +6,9 @@ import { MessageForm } from "../form.js";
 const LEAST_MS = 10;
 
 export class Publish {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.topic = words.get("topic") ?? "";
     this.schema = null;
     this.form = null;
@@ -55,7 +56,7 @@ export class Publish {
     this.buttons.hidden = true;
     setText(this.result, "");
     setText(this.about, "");
-    history.replaceState(null, "", `#/publish${topic ? `?topic=${encodeURIComponent(topic)}` : ""}`);
+    this.place.remember({ topic });
     this.update();
   }
 

@@ -4,8 +4,9 @@ import { fill, h, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
 
 export class Services {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.name = words.get("service") ?? "";
     this.type = null;
     this.form = null;
@@ -38,7 +39,7 @@ export class Services {
     this.button.hidden = true;
     fill(this.fields);
     setText(this.answer, "");
-    history.replaceState(null, "", `#/services${name ? `?service=${encodeURIComponent(name)}` : ""}`);
+    this.place.remember({ service: name });
     this.update();
   }
 

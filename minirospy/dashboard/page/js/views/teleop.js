@@ -1,6 +1,6 @@
 // Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist. Who holds nothing sends nothing: the last message is zero.
 
-import { fill, h, setText, svg } from "../dom.js";
+import { fill, h, setText, svg, uniqueId } from "../dom.js";
 
 const TYPE = "geometry_msgs/Twist";
 const SCHEMA = `Vector3 linear\nVector3 angular\n${"=".repeat(80)}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n`;
@@ -13,16 +13,18 @@ const KEYS = { ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],
 const isText = (element) => /INPUT|SELECT|TEXTAREA/.test(element?.tagName ?? "");
 
 export class Teleop {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.topic = words.get("topic") || "/cmd_vel";
     this.keys = new Set();
     this.stick = null; // [forward, left] of -1 to 1 while it is held
     this.isDriving = false;
     this.isAdvertised = false;
     const field = (label, value, attributes) => h("input", { "aria-label": label, value, autocomplete: "off", ...attributes });
-    this.where = field("Topic", this.topic, { type: "text", class: "grow", list: "twists", onchange: () => this.choose(this.where.value.trim()) });
-    this.topics = h("datalist", { id: "twists" });
+    this.where = field("Topic", this.topic, { type: "text", class: "grow", onchange: () => this.choose(this.where.value.trim()) });
+    this.topics = h("datalist", { id: uniqueId("twists") });
+    this.where.setAttribute("list", this.topics.id);
     const speed = (label, name, usual) => field(label, words.get(name) || usual, { type: "number", min: 0, step: "any", onchange: () => this.remember() });
     this.forward = speed("Metres a second", "linear", "0.5");
     this.turn = speed("Radians a second", "angular", "1");
@@ -93,8 +95,7 @@ export class Teleop {
   }
 
   remember() {
-    const words = new URLSearchParams({ topic: this.topic, linear: this.forward.value, angular: this.turn.value });
-    history.replaceState(null, "", `#/teleop?${words}`);
+    this.place.remember({ topic: this.topic, linear: this.forward.value, angular: this.turn.value });
   }
 
   // --- what is held
@@ -115,7 +116,7 @@ export class Teleop {
   key(event) {
     if (!Object.hasOwn(KEYS, event.code) || event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.type === "keydown") {
-      if (isText(document.activeElement)) return;
+      if (isText(document.activeElement) || !this.place.isActive()) return;
       event.preventDefault();
       this.keys.add(event.code);
     } else if (!this.keys.delete(event.code)) return;
@@ -126,6 +127,7 @@ export class Teleop {
   gamepad() {
     const pads = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
     setText(this.device, pads.length ? `Gamepad: ${pads[0].id}` : "");
+    if (!this.place.isActive()) return null;
     const pad = pads.find(({ buttons }) => DEADMAN.some((index) => buttons[index]?.pressed));
     if (!pad) return null;
     return [1, 0].map((axis) => (Math.abs(pad.axes[axis] ?? 0) < DEAD_ZONE ? 0 : -pad.axes[axis]));

@@ -11,11 +11,15 @@ const MOST_ITEMS = 100; // of one array that is opened
 const REFRESH_MS = 500;
 
 export class Topics {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.rows = new Map();
     this.opened = new Set(words.getAll("open"));
-    this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", oninput: () => this.showFiltered() });
+    this.filter = h("input", { type: "search", placeholder: "Filter topics and types", "aria-label": "Filter", value: words.get("filter") ?? "", oninput: () => {
+      this.showFiltered();
+      this.remember();
+    } });
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "tree", "aria-label": "Topics" });
     this.empty = h("p", { class: "empty" });
@@ -45,7 +49,7 @@ export class Topics {
     for (const [topic, channel] of channels) {
       let row = this.rows.get(topic);
       if (!row) {
-        row = new Row(this.link, channel, this.opened.has(topic));
+        row = new Row(this.link, channel, this.opened.has(topic), (isOpen) => this.toggled(topic, isOpen));
         this.rows.set(topic, row);
       }
       const next = before ? before.nextSibling : this.list.firstChild;
@@ -53,6 +57,26 @@ export class Topics {
       before = row.element;
     }
     this.showFiltered();
+  }
+
+  toggled(topic, isOpen) {
+    if (isOpen) this.opened.add(topic);
+    else this.opened.delete(topic);
+    this.remember();
+  }
+
+  remember() {
+    this.place.remember({ filter: this.filter.value, open: [...this.opened] });
+  }
+
+  /** Open what another view links to. */
+  accept(words) {
+    for (const topic of words.getAll("open")) {
+      const row = this.rows.get(topic);
+      if (row && !row.isOpen) row.toggle();
+      row?.element.scrollIntoView({ block: "nearest" });
+    }
+    return true;
   }
 
   showFiltered() {
@@ -74,7 +98,7 @@ export class Topics {
 }
 
 class Row {
-  constructor(link, channel, isOpen) {
+  constructor(link, channel, isOpen, toggled) {
     this.link = link;
     this.channel = channel;
     this.rate = new Rate();
@@ -90,8 +114,10 @@ class Row {
     this.element = h("div", { class: "row", role: "treeitem" }, this.button, this.fields);
     this.element.dataset.topic = channel.topic;
     this.tree = null;
+    this.toggled = () => {};
     if (isOpen) this.toggle();
     else if (!HEAVY.has(channel.type)) this.subscribe();
+    this.toggled = toggled;
   }
 
   subscribe() {
@@ -106,6 +132,7 @@ class Row {
     this.fields.hidden = !this.isOpen;
     if (!this.end || HEAVY.has(this.channel.type)) this.subscribe();
     this.show();
+    this.toggled(this.isOpen);
   }
 
   close() {

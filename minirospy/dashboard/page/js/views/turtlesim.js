@@ -13,8 +13,9 @@ const css = (color) => `rgb(${color.join(" ")})`;
 const isSame = (one, other) => one.every((value, index) => value === other[index]);
 
 export class Turtlesim {
-  constructor(link, words, main) {
+  constructor(link, words, main, place) {
     this.link = link;
+    this.place = place;
     this.space = words.get("space"); // "" or the namespace of the simulator
     this.turtles = new Map();
     this.background = USUAL_BACKGROUND;
@@ -83,7 +84,7 @@ export class Turtlesim {
 
   choose(space) {
     this.space = space;
-    history.replaceState(null, "", `#/turtlesim${space ? `?space=${encodeURIComponent(space)}` : ""}`);
+    this.place.remember({ space });
     this.erase();
     this.update();
   }

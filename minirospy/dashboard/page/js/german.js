@@ -1,0 +1,4 @@
+// The German texts of the page, by the English ones.
+
+export const GERMAN = {
+};

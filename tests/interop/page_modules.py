@@ -1,0 +1,38 @@
+"""The page's pure modules under node: run a script with them, return what it gives as JSON."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from typing import Any
+
+import pytest
+
+from minirospy.dashboard.files import FOLDER
+
+__all__ = ["needs_node", "run_script"]
+
+needs_node = pytest.mark.skipif(
+    not shutil.which("node"), reason="node is not installed: apt-get install nodejs"
+)
+
+
+def run_script(names: str, module: str, body: str) -> Any:
+    """Return what a function's body returns that uses these names of a module of the page, as ``js/layout.js``."""
+    source = (FOLDER / module).as_uri()
+    script = (
+        f"import {{ {names} }} from {json.dumps(source)};\n"
+        f"const result = await (async () => {{ {body} }})();\n"
+        "console.log(JSON.stringify(result ?? null));"
+    )
+    done = subprocess.run(
+        ["node", "--input-type=module", "-e", script],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)

@@ -1,0 +1,479 @@
+"""Layouts of the dashboard: their text under node; panes in chromium, used as a person does."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist, Vector3
+
+from minirospy.dashboard.views import LAYOUTS, VIEWS
+from minirospy.gpio.board import Board
+from tests.dashboard.conftest import Served, serve
+from tests.interop.browser import Page
+from tests.interop.page_modules import needs_node, run_script
+from tests.interop.test_interop_dashboard import (
+    address,
+    browse,
+    is_zero,
+    listener,
+    logger,
+    needs_chromium,
+    press,
+    publisher,
+    saved,
+)
+
+__all__ = ["browse", "serve"]
+
+LAYOUT = "js/layout.js"
+
+
+# --- the text of a layout
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("text", "tidy"),
+    [
+        ("", ""),
+        ("plot", "plot"),
+        ("row(plot?path=%2Fa%2Fb,board)", "row(plot?path=%2Fa%2Fb,board)"),
+        ("row(2:board,2:plot)", "row(board,plot)"),
+        ("row(3:board,1:column(plot,console))", "row(75:board,25:column(plot,console))"),
+        # A row of one is its part, a row in a row is the row.
+        ("row(column(plot))", "plot"),
+        ("row(1:board,1:row(plot,console))", "row(50:board,25:plot,25:console)"),
+    ],
+)
+def test_layout_text_is_read_and_written(text: str, tidy: str) -> None:
+    assert run_script("Layout", LAYOUT, f"return Layout.parse({json.dumps(text)}).toString()") == tidy
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("row(", '"" is not a view of a layout'),
+        ("row(plot", 'a ")" is missing in the layout'),
+        ("plot)", '")" is not expected in a layout'),
+        ("pile(plot)", '"pile(" in a layout is neither row( nor column('),
+        ("<img src=x>", '"<img src=x>" is not a view of a layout'),
+        (f"row({','.join(['plot'] * 25)})", "a layout has 24 views at most"),
+        ("row(" * 9000, "the layout is too long"),
+    ],
+)
+def test_layout_text_that_is_wrong_is_refused_with_the_reason(text: str, why: str) -> None:
+    body = f"try {{ Layout.parse({json.dumps(text)}); return ''; }} catch (error) {{ return error.message; }}"
+    assert run_script("Layout", LAYOUT, body) == why
+
+
+@needs_node
+def test_panes_are_added_moved_resized_and_removed() -> None:
+    body = """
+      const layout = Layout.parse("row(board,plot)");
+      const seen = () => layout.toString();
+      const steps = [];
+      const [board, plot] = layout.panes();
+      const console_ = layout.add("console", "", "bottom", plot); steps.push(seen());
+      layout.add("graph", "", "right", null); steps.push(seen());
+      layout.move(console_, "left", board); steps.push(seen());
+      layout.move(console_, "center", plot); steps.push(seen());
+      layout.move(board, "top", null); steps.push(seen());
+      layout.resize(layout.root, 0, 0.25); steps.push(seen());
+      layout.resize(layout.root, 0, 7); steps.push(seen());
+      for (const pane of layout.panes().slice(1)) layout.remove(pane); steps.push(seen());
+      layout.move(board, "left", null); steps.push(seen());
+      layout.remove(board); steps.push(seen());
+      return steps;
+    """
+    assert run_script("Layout", LAYOUT, body) == [
+        "row(board,column(plot,console))",
+        "row(25:board,25:column(plot,console),50:graph)",
+        "row(13:console,13:board,25:plot,50:graph)",
+        "row(13:plot,13:board,25:console,50:graph)",
+        "column(board,row(14:plot,29:console,57:graph))",
+        "column(25:board,75:row(14:plot,29:console,57:graph))",
+        "column(95:board,5:row(14:plot,29:console,57:graph))",
+        "board",
+        "board",
+        "",
+    ]
+
+
+@needs_node
+def test_side_of_a_pane_is_the_nearest_edge() -> None:
+    body = (
+        "return [sideAt(0.1, 0.5), sideAt(0.9, 0.5), sideAt(0.5, 0.1), sideAt(0.4, 0.95), sideAt(0.5, 0.5)]"
+    )
+    assert run_script("sideAt", LAYOUT, body) == ["left", "right", "top", "bottom", "center"]
+
+
+@needs_node
+def test_presets_have_views_of_the_page() -> None:
+    presets = run_script("PRESETS", "js/presets.js", "return PRESETS")
+    assert tuple(presets) == LAYOUTS
+    for name, (_, _, text) in presets.items():
+        if text is None:
+            continue
+        body = f"return Layout.parse({json.dumps(text)}).panes().map(pane => pane.view)"
+        assert set(run_script("Layout", LAYOUT, body)) <= set(VIEWS), name
+
+
+@needs_node
+def test_classroom_is_made_of_boards_and_robots() -> None:
+    topics = [
+        "/rosout",
+        "/red/cmd_vel",
+        "/red/odom",
+        "/blue/button_state",
+        "/green/scan",
+        "/deep/er/cmd_vel",
+        "/tf",
+    ]
+    body = f"return classroom({{ boards: ['a', 'b c'], topics: {json.dumps(topics)} }})"
+    assert run_script("classroom", "js/presets.js", body) == (
+        "column(row(board?board=a,board?board=b+c),"
+        "row(plot?path=%2Fblue%2Fbutton_state&window=30,topics?filter=%2Fgreen%2F),row(teleop?topic=%2Fred%2Fcmd_vel),console)"
+    )
+    assert (
+        run_script("classroom", "js/presets.js", "return classroom({ boards: [], topics: [] })")
+        == "row(board,console)"
+    )
+
+
+@needs_node
+def test_addresses_keep_settings_that_are_not_empty() -> None:
+    body = """
+      const { view, words } = addressOf("#/plot?path=/a?b&path=%2Fc");
+      return [view, words.getAll("path"),
+        fragmentOf("plot", { path: ["/a", "/b"], window: "", paused: true, off: false }), fragmentOf("topics", {})];
+    """
+    assert run_script("addressOf, fragmentOf", "js/address.js", body) == [
+        "plot",
+        ["/a?b", "/c"],
+        "#/plot?path=%2Fa&path=%2Fb&paused=1",
+        "#/topics",
+    ]
+
+
+# --- the page
+
+
+def opened(
+    serve: Callable[..., Served], browse: Callable[..., Page], tree: str, **options: Any
+) -> tuple[Served, Page]:
+    served = serve()
+    page = browse(address(served, f"layout?tree={tree}"), **options)
+    page.wait_text("#state", "connected")
+    return served, page
+
+
+def tree_of(page: Page) -> str:
+    """Return the text of the layout that the address has."""
+    return str(page.evaluate("new URLSearchParams(location.hash.split('?')[1]).get('tree')"))
+
+
+def wait_tree(page: Page, tree: str) -> None:
+    page.wait(f"return new URLSearchParams(location.hash.split('?')[1]).get('tree') === {json.dumps(tree)}")
+
+
+def pane(view: str) -> str:
+    """Return the selector of the pane of a view."""
+    return f".pane:has([data-view='{view}'])"
+
+
+def middle(page: Page, find: str, right: float = 0.5, down: float = 0.5) -> tuple[float, float]:
+    x, y = page.wait(
+        f"const r = document.querySelector({json.dumps(find)}).getBoundingClientRect();"
+        f"return r.width && [r.x + r.width * {right}, r.y + r.height * {down}]"
+    )
+    return x, y
+
+
+def drag(page: Page, start: tuple[float, float], *through: tuple[float, float]) -> None:
+    """Press the mouse at a point, move it through others, release it at the last one."""
+    points = [
+        ("mousePressed", start),
+        *(("mouseMoved", point) for point in through),
+        ("mouseReleased", through[-1]),
+    ]
+    for kind, (x, y) in points:
+        page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+
+@needs_chromium
+def test_workshop_shows_the_pressed_button_in_its_plot(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    from std_msgs.msg import Bool
+
+    served = serve()
+    button = publisher(served, "/button_state", Bool, latch=True)
+    served.run(button.publish(False))
+    with Board() as board:
+        page = browse(address(served, "layout?preset=workshop"), width=1400, height=900)
+        page.wait_text(f"{pane('plot')} .series .num", "0")
+        page.wait(f'return document.querySelector("{pane("graph")} svg.graph .node")')
+        edges = board.watch([11], timeout=60)
+        page.mouse("mousePressed", ".push[data-pin='11']")
+        assert next(edges).level == 1
+        served.run(button.publish(True))
+        page.wait_text(f"{pane('plot')} .series .num", "1")
+        page.mouse("mouseReleased", ".push[data-pin='11']")
+        assert next(edges).level == 0
+    assert page.evaluate("document.querySelectorAll('.pane').length") == 4
+    # The address names the preset until something is changed.
+    assert page.evaluate("location.hash") == "#/layout?preset=workshop"
+
+
+@needs_chromium
+def test_pane_is_split_replaced_maximised_and_closed(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    _, page = opened(serve, browse, "row(topics,console)")
+    page.click(f"{pane('console')} button[title^='Split: another view below']")
+    wait_tree(page, "row(topics,column(console,console))")
+    page.choose(".pane.active select.pane-view", "parameters")
+    wait_tree(page, "row(topics,column(console,parameters))")
+    page.click(f"{pane('parameters')} button[title=Maximise]")
+    page.wait(
+        f'const r = document.querySelector("{pane("parameters")}").getBoundingClientRect();'
+        "const d = document.querySelector('.dock').getBoundingClientRect();"
+        "return Math.abs(r.width - d.width) < 2 && Math.abs(r.height - d.height) < 2"
+    )
+    assert page.evaluate("document.querySelectorAll('.pane[inert]').length") == 2
+    page.click(f"{pane('parameters')} button[title=Maximise]")
+    page.wait("return !document.querySelector('.pane[inert]')")
+    page.click(f"{pane('topics')} button[title='Close this pane']")
+    wait_tree(page, "column(console,parameters)")
+    for view in ("console", "parameters"):
+        page.click(f"{pane(view)} button[title='Close this pane']")
+    page.wait_text("button.start", "Workshop")
+    page.click("button.start", "Teleop")
+    page.wait_text("select.pane-view", "Teleop")
+
+
+@needs_chromium
+def test_pane_is_docked_by_dragging_its_head(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    _, page = opened(serve, browse, "row(topics,column(console,parameters))")
+    about = f"{pane('parameters')} .pane-about"
+    head = middle(page, about)
+    target = middle(page, pane("topics"), 0.5, 0.9)
+    page.evaluate(f'document.querySelector("{pane("parameters")}").isOld = true')
+    drag(page, head, (head[0] - 20, head[1]), target)
+    wait_tree(page, "row(column(topics,parameters),console)")
+    # The pane has moved, it was not made again.
+    assert page.evaluate(f'document.querySelector("{pane("parameters")}").isOld')
+    head = middle(page, f"{pane('console')} .pane-about")
+    drag(page, head, (head[0] - 20, head[1]), middle(page, pane("topics")))
+    wait_tree(page, "row(column(console,parameters),topics)")
+    # To the edge of the whole layout.
+    head = middle(page, f"{pane('topics')} .pane-about")
+    left, top = middle(page, ".dock", 0.3, 0.0)
+    drag(page, head, (head[0] - 20, head[1]), (left, top + 4))
+    wait_tree(page, "column(50:topics,25:console,25:parameters)")
+    # By keys: it changes places with the next one.
+    page.evaluate(f'document.querySelector("{pane("topics")} .pane-grip").focus()')
+    press(page, "rawKeyDown", "ArrowDown")
+    wait_tree(page, "column(50:console,25:topics,25:parameters)")
+    press(page, "rawKeyDown", "ArrowDown")
+    wait_tree(page, "column(50:console,25:parameters,25:topics)")
+
+
+@needs_chromium
+def test_panes_are_resized_by_mouse_and_keys_and_kept(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    _, page = opened(serve, browse, "row(topics,console)")
+    start = middle(page, ".divider")
+    left, _ = middle(page, ".dock", 0.25)
+    drag(page, start, (start[0] - 10, start[1]), (left, start[1]))
+    page.wait(
+        "return /row\\(2[3-7]:topics,7[3-7]:console\\)/.test(new URLSearchParams(location.hash.split('?')[1]).get('tree'))"
+    )
+    before = tree_of(page)
+    page.evaluate("document.querySelector('.divider').focus()")
+    press(page, "rawKeyDown", "ArrowRight")
+    page.wait(f"return new URLSearchParams(location.hash.split('?')[1]).get('tree') !== {json.dumps(before)}")
+    kept = tree_of(page)
+    page.call("Page.reload")
+    page.wait_text("select.pane-view", "Console")
+    assert tree_of(page) == kept
+    page.wait(
+        "const [a, b] = [...document.querySelectorAll('.pane')].map(e => e.offsetWidth); return a < b * 0.55"
+    )
+
+
+@needs_chromium
+def test_views_work_twice_on_one_page(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    served = serve()
+    moving = publisher(served, "/odometry", Vector3, latch=True)
+    served.run(moving.publish(1.0, 2.0, 3.0))
+    log = logger(served)
+    log((2, "/first", "hello"))
+    plots = ",".join(f"plot?path=%252Fodometry%252F{axis}" for axis in "xy")
+    tree = f"row(column({plots}),column(console,console?levels=8),column(graph,graph?mode=all))"
+    page = browse(address(served, f"layout?tree={tree}"), width=1500, height=900)
+    page.wait_text(".pane[data-pane='1'] .series .num", "1")
+    page.wait_text(".pane[data-pane='2'] .series .num", "2")
+    page.wait_text(".pane[data-pane='3'] .bar", "1 of 1 lines")
+    log((8, "/second", "broken"))
+    page.wait_text(".pane[data-pane='3'] .bar", "2 of 2 lines")
+    page.wait_text(".pane[data-pane='4'] .bar", "1 of 2 lines")
+    log((8, "/second", "again"))
+    page.wait_text(".pane[data-pane='3'] .bar", "3 of 3 lines")
+    page.wait_text(".pane[data-pane='4'] .bar", "2 of 3 lines")
+    # What one clears is cleared in both.
+    page.click(".pane[data-pane='4'] button", "Clear")
+    page.wait_text(".pane[data-pane='3'] .bar", "0 of 0 lines")
+    ids = page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
+    assert len(ids) == len(set(ids))
+    page.wait("return document.querySelectorAll(\".pane[data-pane='6'] .edge\").length >= 1")
+    # Closing one leaves the other as it is.
+    page.click(".pane[data-pane='1'] button[title='Close this pane']")
+    served.run(moving.publish(1.0, 7.0, 3.0))
+    page.wait_text(".pane[data-pane='2'] .series .num", "7")
+
+
+@needs_chromium
+def test_link_in_a_pane_is_followed_inside_of_the_layout(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/odometry", Vector3, latch=True).publish(1.5, 2.5, 3.0))
+    page = browse(address(served, "layout?tree=topics?open=%252Fodometry"), width=1400)
+    page.click("a.plot[title='Plot /odometry/x']")
+    page.wait_text(f"{pane('plot')} .series .num", "1.5")
+    # A plot that is there takes over the next one.
+    page.click("a.plot[title='Plot /odometry/y']")
+    page.wait_text(f"{pane('plot')} .series[data-label='/odometry/y'] .num", "2.5")
+    wait_tree(page, "row(topics?open=%2Fodometry,plot?path=%2Fodometry%2Fx&path=%2Fodometry%2Fy)")
+
+
+@needs_chromium
+def test_keys_drive_the_active_pane_alone(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    served = serve()
+    left, right = (listener(served, f"/{side}/cmd_vel", f"{side}_robot") for side in ("left", "right"))
+    page = browse(
+        address(
+            served, "layout?tree=row(teleop?topic=%252Fleft%252Fcmd_vel,teleop?topic=%252Fright%252Fcmd_vel)"
+        )
+    )
+    page.wait_text("#state", "connected")
+    page.click(".pane[data-pane='2'] .pane-about")
+    press(page, "rawKeyDown", "ArrowUp")
+    right(lambda twist: twist.linear.x == 0.5)
+    assert "stopped" in page.wait_text(".pane[data-pane='1'] p[role=status]", "")
+    press(page, "keyUp", "ArrowUp")
+    right(is_zero)
+    page.click(".pane[data-pane='1'] .pane-about")
+    press(page, "rawKeyDown", "ArrowUp")
+    left(lambda twist: twist.linear.x == 0.5)
+    # A pane that is closed stops what it drives.
+    page.click(".pane[data-pane='1'] button[title='Close this pane']")
+    left(is_zero)
+
+
+@needs_chromium
+def test_layout_is_saved_by_name_exported_imported_and_shared(
+    serve: Callable[..., Served], browse: Callable[..., Page], tmp_path: Path
+) -> None:
+    _, page = opened(serve, browse, "row(topics,parameters?filter=robot)")
+    page.type("input.layout-name", "my robot")
+    page.click(".layout-bar button", "Save")
+    page.wait_text(".layout-bar", "Saved in this browser.")
+    exported = json.loads(saved(page, tmp_path, "my robot.json", "Export"))
+    assert exported == {
+        "minirospy layout": 1,
+        "name": "my robot",
+        "layout": "row(topics,parameters?filter=robot)",
+    }
+    link = page.evaluate("location.href")
+    # Another day: from the list of layouts.
+    page.evaluate("location.hash = '#/layout'")
+    page.wait_text("button.start", "my robot")
+    page.choose("select[aria-label=Layout]", "saved my robot")
+    page.wait("return document.querySelector('input[type=search]')?.getClientRects().length")
+    wait_tree(page, "row(topics,parameters?filter=robot)")
+    page.click(".layout-bar button", "Delete")
+    page.wait_text(".layout-bar", "my robot is deleted.")
+    # A file; one that is broken is named.
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"minirospy layout": 1, "layout": "row("}', encoding="utf-8")
+    for name in (broken, tmp_path / "my robot.json"):
+        root = page.call("DOM.getDocument")["root"]["nodeId"]
+        node = page.call("DOM.querySelector", nodeId=root, selector="input[type=file]")["nodeId"]
+        page.call("DOM.setFileInputFiles", nodeId=node, files=[str(name)])
+        if name is broken:
+            page.wait_text(".layout-bar .error", "broken.json: ")
+            page.evaluate("location.hash = '#/layout'")
+            page.wait_text("button.start", "Workshop")
+    page.wait_text("select.pane-view", "Parameters")
+    # The link opens the same elsewhere.
+    other = browse(link)
+    other.wait("return document.querySelectorAll('.pane').length === 2")
+    assert (
+        other.evaluate("document.querySelector('[data-view=parameters] input[type=search]').value") == "robot"
+    )
+
+
+@needs_chromium
+def test_classroom_shows_the_boards_side_by_side(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    publisher(served, "/red/cmd_vel", Twist)
+    with contextlib.ExitStack() as stack:
+        boards = [stack.enter_context(Board(name)) for name in ("anna", "ben")]
+        page = browse(address(served, "layout?preset=classroom"), width=1400, height=900)
+        page.wait_text("select.pane-view", "Teleop")
+        page.wait_text(".pane-about", "/red/cmd_vel")
+        for board in boards:
+            board.set(7, 1)
+            page.wait(
+                "return [...document.querySelectorAll('.pane:has([data-view=board])')].some(e =>"
+                f" e.querySelector('select[aria-label=Board]').value === '{board.name}'"
+                " && e.querySelector('.lit[aria-label=\"LED GPIO 7 red on\"]'))"
+            )
+
+
+@needs_chromium
+@pytest.mark.parametrize("text", ["<img src=x onerror=alert(1)>", "row(plot", "nothing(plot)"])
+def test_layout_that_cannot_be_read_is_named_as_text(
+    serve: Callable[..., Served], browse: Callable[..., Page], text: str
+) -> None:
+    from urllib.parse import quote
+
+    served = serve()
+    page = browse(address(served, f"layout?tree={quote(text)}"))
+    page.wait_text(".layout-bar .error", "layout")
+    assert page.evaluate("document.querySelectorAll('main img').length") == 0
+
+
+@needs_chromium
+def test_view_that_the_page_does_not_have_is_named(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    _, page = opened(serve, browse, "row(hologram,topics)")
+    page.wait_text(".pane", "This page has no such view.")
+    page.choose(".pane[data-pane='1'] select.pane-view", "console")
+    wait_tree(page, "row(console,topics)")
+
+
+@needs_chromium
+def test_layout_on_a_phone_is_one_column(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    _, page = opened(serve, browse, "row(board,column(console,plot))", width=360, height=700)
+    page.wait("return document.querySelectorAll('.pane').length === 3")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    tops = page.evaluate(
+        "[...document.querySelectorAll('.pane')].map(e => Math.round(e.getBoundingClientRect().top))"
+    )
+    assert tops == sorted(tops)
+    assert len(set(tops)) == 3
