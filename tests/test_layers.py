@@ -73,7 +73,10 @@ PURE_FILES = (
             "web/queue.py",
         )
     }
-    | {PACKAGE / "bridge" / "ros2" / name for name in ("layouts.py", "links.py", "rules.py", "statics.py")}
+    | {
+        PACKAGE / "bridge" / "ros2" / name
+        for name in ("layouts.py", "links.py", "rules.py", "service_links.py", "statics.py")
+    }
     | {PACKAGE / "dashboard" / "views.py"}
     | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 )

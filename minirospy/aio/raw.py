@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, cast
 
-from minirospy.aio.handle import Handle
+from minirospy.aio.handle import Handle, registered
 from minirospy.errors import (
     CallFailed,
     HandshakeRefused,
@@ -17,7 +18,7 @@ from minirospy.errors import (
     WireError,
 )
 from minirospy.idl.protocols import Message
-from minirospy.runtime.node.services import AsyncServiceClient
+from minirospy.runtime.node.services import AsyncHandler, AsyncServiceClient, LoopServiceServer
 from minirospy.wire.framing import Frame
 from minirospy.wire.header import Header
 from minirospy.wire.tcpros import ANY, InterfaceType
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.aio.topics import SubscribedTopic
 
-__all__ = ["RawSubscription", "call_raw", "raw_class", "service_header"]
+__all__ = ["RawService", "RawSubscription", "call_raw", "raw_class", "service_header"]
 
 PROBE_SECONDS = 5.0
 
@@ -54,6 +55,36 @@ class RawSubscription(Handle):
 
     def _end(self) -> None:
         """There is nothing to end: nobody waits."""
+
+
+class RawService(Handle):
+    """A service that works on bytes: ``handler(request, client's connection header)`` returns those of the response.
+
+    What it raises as ServiceException goes to the client as the call's error. ``await`` it until the master knows it.
+    """
+
+    def __init__(self, node: Node, name: str, type_: InterfaceType, handler: AsyncHandler) -> None:
+        self.name = node.resolve(name)
+        self._node = node
+        runtime = node._node
+        self._server = LoopServiceServer(
+            self.name,
+            type_,
+            node.name,
+            handler,
+            request_type=f"{type_.name}Request",
+            response_type=f"{type_.name}Response",
+            workers=runtime.workers,
+        )
+        self._registration = node._spawn(
+            registered(runtime.serve, self._server, f"service [{self.name}]", node.log)
+        )
+
+    async def close(self) -> None:
+        """Stop offering the service; calls under way get their answers. Idempotent."""
+        await asyncio.wait([self._registration])
+        with contextlib.suppress(MasterUnreachableError, RpcError):
+            await self._node._node.unserve(self._server)
 
 
 def raw_class(type_: InterfaceType) -> type[Message]:

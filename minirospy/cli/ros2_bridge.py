@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge`: topics of ROS 1 for ROS 2, and back, beside an installed ROS 2. How to use it: docs/ros2.md."""
+"""`minirospy ros2-bridge`: topics and services of ROS 1 for ROS 2, and back, beside an installed ROS 2 (docs/ros2.md)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from minirospy.cli.verbs import Command
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.ros2.bridge import Pair, Ros2Bridge
+    from minirospy.bridge.ros2.services import ServicePair
 
 __all__ = ["COMMAND", "main"]
 
 _QUIET_LOOKS = 3
+_LONELY_LOOKS = 20
 _LOOK_SECONDS = 0.5
 
 
@@ -28,7 +30,8 @@ def _parser() -> Parser:
     parser = Parser(
         "minirospy ros2-bridge",
         "Passes messages between ROS 1 and ROS 2. It runs beside an installed ROS 2, whose rclpy it imports. "
-        "A topic is bridged while it has a publisher on one side and a subscriber on the other.",
+        "A topic is bridged while it has a publisher on one side and a subscriber on the other, a service while one "
+        "side offers it.",
     )
     parser.add_argument(
         "--topics",
@@ -37,6 +40,21 @@ def _parser() -> Parser:
         metavar="GLOB",
         help="topics that are bridged (all)",
         completer="topics",
+    )
+    parser.add_argument(
+        "--services",
+        action="append",
+        default=[],
+        metavar="GLOB",
+        help="services that are bridged (all)",
+        completer="services",
+    )
+    parser.add_argument(
+        "--call-timeout",
+        type=float,
+        default=60.0,
+        metavar="SECONDS",
+        help="how long a call of a service on the other side may take (60)",
     )
     parser.add_argument(
         "--rules",
@@ -51,21 +69,28 @@ def _parser() -> Parser:
     return parser
 
 
-def _ros2_bridge(topics: Sequence[str], rules: str, list: bool) -> int:
+def _ros2_bridge(
+    topics: Sequence[str], services: Sequence[str], call_timeout: float, rules: str, list: bool
+) -> int:
     from minirospy.bridge.access import NameFilter
     from minirospy.bridge.ros2.bridge import Ros2Bridge, Ros2Options
     from minirospy.bridge.ros2.links import BRIDGE_PREFIX
     from minirospy.bridge.ros2.rules import BUILT_IN, parse_rules
     from minirospy.bridge.ros2.side import RclpySide, require_rclpy
     from minirospy.bridge.serve import run
+    from minirospy.errors import BridgeError
     from minirospy.idl.load import Catalogue
     from minirospy.workspace.packages import Packages
 
+    if not call_timeout > 0:
+        raise BridgeError(f"--call-timeout {call_timeout:g} is not a number of seconds above 0")
     known = BUILT_IN
     if rules:
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
     require_rclpy()
-    options = Ros2Options(NameFilter.of(topics), known)
+    options = Ros2Options(
+        NameFilter.of(topics), NameFilter.of(services), call_seconds=call_timeout, rules=known
+    )
     catalogue = Catalogue(Packages().folders())
 
     async def start(node: Node) -> Ros2Bridge | _Listing:
@@ -88,8 +113,13 @@ class _Listing:
         import asyncio
 
         quiet, before = 0, None
+        looks = 0
         while quiet < _QUIET_LOOKS:
             await asyncio.sleep(_LOOK_SECONDS)
+            looks += 1
+            if looks < _LONELY_LOOKS and not self._bridge.side.nodes():
+                # ROS 2 has not found its nodes yet.
+                continue
             found = await self._bridge.pairs()
             quiet = quiet + 1 if found == before else 0
             before = found
@@ -101,14 +131,19 @@ class _Listing:
         await self._bridge.close()
 
 
-def _table(pairs: Sequence[Pair]) -> list[str]:
+def _table(pairs: Sequence[Pair | ServicePair]) -> list[str]:
+    from minirospy.bridge.ros2.links import Link
+
     if not pairs:
-        return ["no topic has a publisher on one side and a subscriber on the other"]
+        return [
+            "no topic has a publisher on one side and a subscriber on the other, and no service is offered"
+        ]
     lines = []
     for pair in pairs:
         link = pair.link
-        head = f"{link.topic}  {link.direction.value}  ROS 1 {link.ros1_type}  ROS 2 {link.ros2_type}"
-        kept = "  latched" if link.is_latched else ""
+        name = link.topic if isinstance(link, Link) else f"{link.service}  service"
+        head = f"{name}  {link.direction.value}  ROS 1 {link.ros1_type}  ROS 2 {link.ros2_type}"
+        kept = "  latched" if isinstance(link, Link) and link.is_latched else ""
         lines.append(f"{head}  not bridged: {pair.reason}" if pair.reason else f"{head}{kept}")
     return lines
 

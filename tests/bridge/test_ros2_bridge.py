@@ -6,6 +6,7 @@ import asyncio
 import struct
 import sys
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -32,7 +33,7 @@ STRING = Ros2End("/peer", "std_msgs/String")
 
 
 def links_of(ros1: Snapshot, ros2: Mapping[str, Ros2Topic], latched: bool = False) -> list[Link]:
-    return links(ros1, ros2, "/bridge", lambda *_: latched, BUILT_IN.ros1_message)
+    return links(ros1, ros2, lambda *_: latched, BUILT_IN.ros1_message)
 
 
 def snapshot(
@@ -63,7 +64,12 @@ def test_a_topic_with_an_end_on_each_side_is_linked() -> None:
 def test_ends_of_bridges_do_not_count() -> None:
     own = Ros2End(BRIDGE_PREFIX, "std_msgs/String")
     assert links_of(snapshot(("/a",)), {"/t": Ros2Topic(subscribers=(own,))}) == []
-    assert links_of(snapshot(("/bridge",), ("/bridge",)), {"/t": Ros2Topic((STRING,), (STRING,))}) == []
+    assert (
+        links_of(
+            snapshot((f"/{BRIDGE_PREFIX}",), (f"/{BRIDGE_PREFIX}",)), {"/t": Ros2Topic((STRING,), (STRING,))}
+        )
+        == []
+    )
 
 
 def test_a_subscriber_of_any_type_gets_the_type_of_ros2() -> None:
@@ -218,6 +224,35 @@ class FakeSubscription:
         self.is_closed = True
 
 
+@dataclass
+class FakeClient:
+    """A client whose server answers as ``response`` says, or never."""
+
+    is_ready: bool = True
+    response: bytes | None = None
+    requests: list[bytes] = field(default_factory=list)
+    is_closed: bool = False
+
+    def call(self, request: bytes) -> Future[bytes]:
+        self.requests.append(request)
+        answered: Future[bytes] = Future()
+        if self.response is not None:
+            answered.set_result(self.response)
+        return answered
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+@dataclass
+class FakeServer:
+    answer: Callable[[bytes], Future[bytes]]
+    is_closed: bool = False
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
 class FakeSide:
     """A ROS 2 that a test holds in its hands."""
 
@@ -227,6 +262,9 @@ class FakeSide:
         self.graph: dict[str, Ros2Topic] = {}
         self.publishers: dict[str, FakePublisher] = {}
         self.subscriptions: dict[str, FakeSubscription] = {}
+        self.offered: dict[str, str] = {}
+        self.clients: dict[str, FakeClient] = {}
+        self.servers: dict[str, FakeServer] = {}
         self.is_closed = False
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
@@ -251,6 +289,29 @@ class FakeSide:
         self.subscriptions[topic] = FakeSubscription(deliver)
         return self.subscriptions[topic]
 
+    def nodes(self) -> list[tuple[str, str]]:
+        return [("peer", "/")]
+
+    def services(self) -> Mapping[str, str]:
+        return self.offered
+
+    def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
+        known = {
+            "std_srvs/SetBool": ({"data": "boolean"}, {"success": "boolean", "message": "string"}),
+            "example_interfaces/AddTwoInts": ({"a": "int64", "b": "int64"}, {"sum": "int64"}),
+        }
+        if type_ not in known:
+            raise TypesDiffer(f"the service type [{type_}] is not installed in ROS 2")
+        return known[type_]
+
+    def client(self, service: str, type_: str) -> FakeClient:
+        self.clients[service] = FakeClient()
+        return self.clients[service]
+
+    def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> FakeServer:
+        self.servers[service] = FakeServer(answer)
+        return self.servers[service]
+
     def close(self) -> None:
         self.is_closed = True
 
@@ -260,7 +321,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any], topics: NameFilt
     side = FakeSide()
 
     async def run() -> None:
-        async with Node("other", rosout=False) as node, Node("bridge", rosout=False) as own:
+        async with Node("other", rosout=False) as node, Node(BRIDGE_PREFIX, rosout=False) as own:
             bridge = Ros2Bridge(own, side, Ros2Options(topics or NameFilter()), catalogue())
             try:
                 await scene(node, side, bridge)

@@ -25,6 +25,8 @@ PACKAGES = (
     "ros-diagnostic-msgs==5.5.1",
     "ros-rosgraph-msgs==2.3.0",
     "ros-rcl-interfaces==2.3.0",
+    "ros-std-srvs==5.5.1",
+    "ros-test-msgs==2.3.0",
 )
 
 

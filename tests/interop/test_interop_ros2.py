@@ -18,8 +18,9 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from minirospy import Node
-from minirospy.aio.raw import raw_class
-from minirospy.idl.load import message_class
+from minirospy.aio.raw import RawService, call_raw, raw_class
+from minirospy.errors import ServiceException
+from minirospy.idl.load import message_class, service_class
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.wire.tcpros import InterfaceType
@@ -77,6 +78,11 @@ class Peer:
         """Return the next message of a topic: its CDR without the header."""
         found = self.wait(lambda each: each["op"] == "message" and each["topic"] == topic)
         return bytes.fromhex(found["data"])[4:]
+
+    def answer(self, service: str) -> dict[str, str]:
+        """Return the fields of the next response that a call got."""
+        found = self.wait(lambda each: each["op"] == "answer" and each["topic"] == service)
+        return dict(found["fields"])
 
     def wait(self, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         for number, each in enumerate(self._kept):
@@ -151,6 +157,26 @@ class Scene:
             publisher.publish_raw(data)
 
         self.run(publish())
+
+    def serve(self, service: str, type_: str, answer: Callable[[bytes], bytes]) -> Any:
+        """Offer a service of ROS 1; ``answer`` may raise ServiceException."""
+
+        async def handler(request: bytes, _: object) -> bytes:
+            return answer(request)
+
+        async def serve() -> Any:
+            return await RawService(self.node, service, InterfaceType.of(service_class(type_)), handler)
+
+        return self.run(serve())
+
+    def call(self, service: str, type_: str, *requests: bytes) -> list[bytes | BaseException]:
+        """Call a service of ROS 1 so many times at once; return the responses, or what was raised."""
+
+        async def calling() -> list[bytes | BaseException]:
+            calls = (call_raw(self.node, service, service_class(type_)._md5sum, each) for each in requests)
+            return await asyncio.gather(*calls, return_exceptions=True)
+
+        return self.run(calling())
 
     def subscribe(self, topic: str) -> tuple[Any, queue.Queue[bytes]]:
         came: queue.Queue[bytes] = queue.Queue()
@@ -354,7 +380,9 @@ def _until_received(came: queue.Queue[bytes], value: bytes, send: Callable[[], N
 def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
     scene.advertise("/listed", "std_msgs/Time")
     scene.peer.do("subscribe", "/listed", type="std_msgs/Float32")
-    code = "import sys; from minirospy.cli.main import main; sys.exit(main(['ros2-bridge', '--list', '--topics', '/listed']))"
+    scene.peer.do("serve", "/listed_service", type="std_srvs/SetBool", fields={})
+    words = ["ros2-bridge", "--list", "--topics", "/listed", "--services", "/listed*"]
+    code = f"import sys; from minirospy.cli.main import main; sys.exit(main({words}))"
     done = subprocess.run(
         [str(PYTHON), "-c", code],
         env=scene.environment,
@@ -367,4 +395,108 @@ def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
     assert done.stdout == (
         "/listed  1 -> 2  ROS 1 std_msgs/Time  ROS 2 std_msgs/Float32  "
         "not bridged: no rule makes [std_msgs/Time] a [std_msgs/Float32]: write one for --rules\n"
+        "/listed_service  service  1 -> 2  ROS 1 std_srvs/SetBool  ROS 2 std_srvs/SetBool\n"
     )
+
+
+# --- services
+
+ADD = "diagnostic_msgs/AddDiagnostics"
+"""A service with a text in its request, and a text beside ``success`` in its response."""
+
+
+def text(value: str) -> bytes:
+    return len(value).to_bytes(4, "little") + value.encode()
+
+
+def test_a_server_of_ros2_is_called_from_ros1(scene: Scene) -> None:
+    scene.peer.do("serve", "/there", type=ADD, fields={"success": True, "message": "got {}"})
+    scene.until(lambda graph: "/there" in graph.services)
+    assert scene.call("/there", ADD, text("a")) == [b"\1" + text("got a")]
+    numbers = [str(number) for number in range(300)]
+    assert scene.call("/there", ADD, *map(text, numbers)) == [
+        b"\1" + text(f"got {number}") for number in numbers
+    ]
+
+    (refused,) = scene.call("/there", "std_srvs/Empty", b"")
+    assert "md5sums do not match" in str(refused)
+    scene.peer.do("close", "/there")
+    scene.until(lambda graph: "/there" not in graph.services)
+
+
+def test_a_call_of_ros1_ends_with_the_server_of_ros2(scene: Scene) -> None:
+    other = Peer(scene.environment)
+    try:
+        other.do("serve", "/leaves", type=ADD, fields={}, silent=True)
+        scene.until(lambda graph: "/leaves" in graph.services)
+        results: queue.Queue[list[bytes | BaseException]] = queue.Queue()
+        calling = threading.Thread(
+            target=lambda: results.put(scene.call("/leaves", ADD, text("a"), text("b")))
+        )
+        calling.start()
+        for _ in range(2):
+            other.wait(lambda each: each["op"] == "request")
+    finally:
+        other.close()
+    for error in results.get(timeout=LIMIT):
+        assert "has ended during the call" in str(error)
+    calling.join()
+
+
+def test_a_server_of_ros1_is_called_from_ros2(scene: Scene) -> None:
+    def answer(request: bytes) -> bytes:
+        if request == text("bad"):
+            raise ServiceException("not this one")
+        return b"\1" + text("got " + request[4:].decode())
+
+    server = scene.serve("/back", ADD, answer)
+    scene.peer.do("call", "/back", type=ADD, fields=[{"load_namespace": "a"}])
+    assert scene.peer.answer("/back") == {"success": "True", "message": "got a"}
+    numbers = [str(number) for number in range(300)]
+    scene.peer.do("call", "/back", type=ADD, fields=[{"load_namespace": number} for number in numbers])
+    assert {scene.peer.answer("/back")["message"] for _ in numbers} == {f"got {each}" for each in numbers}
+
+    # A response with a place for it names the reason.
+    scene.peer.do("call", "/back", type=ADD, fields=[{"load_namespace": "bad"}])
+    refused = scene.peer.answer("/back")
+    assert refused["success"] == "False"
+    assert "not this one" in refused["message"]
+    scene.end(server)
+    scene.peer.do("close", "/back")
+
+
+def test_a_failure_that_a_response_cannot_name_is_in_the_log_of_ros2(scene: Scene) -> None:
+    def answer(request: bytes) -> bytes:
+        raise ServiceException("broken")
+
+    server = scene.serve("/empty", "std_srvs/Empty", answer)
+    scene.peer.do("subscribe", "/rosout", type="rcl_interfaces/Log", latched=True)
+    scene.peer.do("call", "/empty", type="std_srvs/Empty", fields=[{}])
+    line = b""
+    while b"service [/empty] of ROS 1: service [/empty] responded with an error: broken" not in line:
+        line = scene.peer.message("/rosout")
+    scene.end(server)
+    for name in ("/empty", "/rosout"):
+        scene.peer.do("close", name)
+
+
+def test_a_service_with_nested_types_passes_byte_by_byte(scene: Scene) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    path, pose = sample("nav_msgs/Path"), sample("geometry_msgs/PoseStamped")
+    asked: list[bytes] = []
+
+    def answer(request: bytes) -> bytes:
+        asked.append(request)
+        return path
+
+    server = scene.serve("/plan", "nav_msgs/GetPlan", answer)
+    cdr = bytes(store.ros1_to_cdr(pose, "geometry_msgs/msg/PoseStamped"))
+    # Two poses: the second follows where the first has ended, aligned to a float64.
+    two = cdr + bytes(-(len(cdr) - 4) % 4) + cdr[4:] + bytes(-(len(cdr) - 4) % 4) + b"\0\0\0\x3f"
+    scene.peer.do("call_raw", "/plan", type="nav_msgs/GetPlan", data=two.hex())
+    found = scene.peer.wait(lambda each: each["op"] == "answer")
+    expected = bytes(store.ros1_to_cdr(path, "nav_msgs/msg/Path"))
+    assert bytes.fromhex(found["data"]) == expected
+    assert asked[0][-4:] == b"\0\0\0\x3f"
+    scene.end(server)
+    scene.peer.do("close", "/plan")

@@ -13,8 +13,9 @@ from minirospy.aio.raw import RawSubscription, raw_class
 from minirospy.aio.topics import Publisher
 from minirospy.bridge.access import NameFilter
 from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
-from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, links, marker
+from minirospy.bridge.ros2.links import Direction, Link, Ros2Topic, is_bridge, links, marker
 from minirospy.bridge.ros2.rules import BUILT_IN, Rules
+from minirospy.bridge.ros2.services import ServiceBridge, ServicePair
 from minirospy.bridge.ros2.statics import TF_TYPES, StaticTransforms
 from minirospy.bridge.types import TypeTexts
 from minirospy.errors import (
@@ -40,7 +41,7 @@ from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
-    from minirospy.bridge.ros2.side import Ros2Publisher, Ros2Side, Ros2Subscription
+    from minirospy.bridge.ros2.side import Ros2Handle, Ros2Publisher, Ros2Side
 
 __all__ = ["Pair", "Ros2Bridge", "Ros2Options"]
 
@@ -56,9 +57,14 @@ _ROS1_QUEUE = 100
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """``topics``: which may be bridged. ``slowest_look``: seconds between looks at graphs that do not change."""
+    """``topics``, ``services``: which may be bridged. ``call_seconds``: how long a call of a service may take.
+
+    ``slowest_look``: seconds between looks at graphs that do not change.
+    """
 
     topics: NameFilter = field(default_factory=NameFilter)
+    services: NameFilter = field(default_factory=NameFilter)
+    call_seconds: float = 60.0
     rules: Rules = BUILT_IN
     slowest_look: float = 1.0
 
@@ -119,7 +125,10 @@ class _Types:
 
 
 class Ros2Bridge:
-    """Bridges topics while both sides have an end. On the node's loop; messages of ROS 2 pass in its executor's thread."""
+    """Bridges topics while both sides have an end, and services while one side offers them.
+
+    On the node's loop; messages of ROS 2 pass in its executor's thread.
+    """
 
     def __init__(self, node: Node, side: Ros2Side, options: Ros2Options, catalogue: Catalogue) -> None:
         self.node = node
@@ -128,6 +137,9 @@ class Ros2Bridge:
         self.links: dict[Link, _OpenLink] = {}
         self.refused: dict[Link, str] = {}
         self.header = marker("")
+        self.services = ServiceBridge(
+            node, side, options.services, options.rules, catalogue, options.call_seconds
+        )
         self._types = _Types(side, options.rules, catalogue)
         self._texts = TypeTexts(node)
         self._headers: dict[tuple[str, str], Header] = {}
@@ -147,20 +159,22 @@ class Ros2Bridge:
             await asyncio.gather(watching, return_exceptions=True)
         for link in list(self.links):
             await self._close_link(link)
+        await self.services.close()
         await self._texts.close()
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
-    async def pairs(self) -> list[Pair]:
+    async def pairs(self) -> list[Pair | ServicePair]:
         """Return what would be bridged, and why something is not; opens nothing. Raises as :meth:`look`."""
-        found = []
-        for link in await self._wanted():
+        found: list[Pair | ServicePair] = []
+        snapshot = await self._snapshot()
+        for link in await self._wanted(snapshot):
             try:
                 await self._converter(link)
             except TypesDiffer as error:
                 found.append(Pair(link, str(error)))
             else:
                 found.append(Pair(link))
-        return found
+        return [*found, *await self.services.pairs(snapshot.services)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Return when ``condition`` holds after a look."""
@@ -169,7 +183,8 @@ class Ros2Bridge:
 
     async def look(self) -> bool:
         """Open and close links as the graphs are now; whether any changed. Raises MasterUnreachableError, RpcError."""
-        wanted = await self._wanted()
+        snapshot = await self._snapshot()
+        wanted = await self._wanted(snapshot)
         gone = [link for link in self.links if link not in wanted]
         for link in gone:
             await self._close_link(link)
@@ -181,9 +196,10 @@ class Ros2Bridge:
             except (TypesDiffer, ROSException, ValueError) as error:
                 self.refused[link] = str(error)
                 self.node.log.warning("%s is not bridged (%s): %s", link.topic, link.direction.value, error)
+        has_changed = await self.services.look(snapshot.services)
         self._changed.set()
         self._changed = asyncio.Event()
-        return bool(gone or new)
+        return bool(gone or new) or has_changed
 
     async def _watch(self) -> None:
         pause = _FASTEST_LOOK
@@ -201,11 +217,15 @@ class Ros2Bridge:
             slowest = max(self.options.slowest_look, _FASTEST_LOOK)
             pause = _FASTEST_LOOK if changed else min(pause * 1.5, slowest)
 
-    async def _wanted(self) -> list[Link]:
-        """Return what the graphs have to be bridged."""
+    async def _snapshot(self) -> Snapshot:
+        """Return the graph of ROS 1; notice which one it is."""
         snapshot = await fetch(self.node._node.master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))
+        return snapshot
+
+    async def _wanted(self, snapshot: Snapshot) -> list[Link]:
+        """Return what the graphs have to be bridged."""
         names = self.side.topics()
         ros2 = {
             name: self.side.ends(name)
@@ -213,7 +233,7 @@ class Ros2Bridge:
             if name in snapshot.topics and self.options.topics(name)
         }
         await self._look_at_publishers(snapshot, ros2)
-        return links(snapshot, ros2, self.node.name, self._is_latched, self.options.rules.ros1_message)
+        return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
         """Learn from each new publisher of ROS 1, of a topic with subscribers in ROS 2, its definition and if it latches."""
@@ -222,7 +242,7 @@ class Ros2Bridge:
             for topic, ends in ros2.items()
             if ends.subscribers
             for node in snapshot.publishers.get(topic, ())
-            if node != self.node.name
+            if not is_bridge(node)
         }
         self._headers = {key: header for key, header in self._headers.items() if key in present}
         for topic, node in sorted(present - self._headers.keys()):
@@ -338,7 +358,7 @@ class _ToRos1(_OpenLink):
     ) -> None:
         super().__init__(bridge, link, made)
         self._publisher = publisher
-        self._subscription: Ros2Subscription = bridge.side.subscribe(
+        self._subscription: Ros2Handle = bridge.side.subscribe(
             link.topic,
             link.ros2_type,
             self._deliver,

@@ -8,10 +8,10 @@ from enum import Enum
 
 from minirospy.introspect.snapshot import Snapshot
 
-__all__ = ["BRIDGE_PREFIX", "Direction", "Link", "Ros2End", "Ros2Topic", "links", "marker"]
+__all__ = ["BRIDGE_PREFIX", "Direction", "Link", "Ros2End", "Ros2Topic", "is_bridge", "links", "marker"]
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""How the names of all bridges start, in ROS 2: their ends do not count as ends."""
+"""How the names of all bridges start, on both sides: their ends do not count as ends."""
 
 
 class Direction(Enum):
@@ -54,25 +54,29 @@ class Link:
     is_reliable: bool = True
 
 
+def is_bridge(node: str) -> bool:
+    """Return whether a node is a bridge, by its name on either side."""
+    return node.rpartition("/")[2].startswith(BRIDGE_PREFIX)
+
+
 def links(
     ros1: Snapshot,
     ros2: Mapping[str, Ros2Topic],
-    own_name: str,
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
     """Return what is to be bridged: each topic with an end on either side, other than those of bridges.
 
-    ``own_name``: of the bridge's node in ROS 1. ``is_latched(topic, node)``: whether a publisher of ROS 1 latches.
+    ``is_latched(topic, node)``: whether a publisher of ROS 1 latches.
     ``ros1_type``: a type of ROS 2 -> that of ROS 1, for a subscriber of ROS 1 that takes any type, as `rostopic echo`.
     """
     found = []
     for topic in sorted(ros1.topics & ros2.keys()):
         type_ = ros1.types.get(topic)
-        publishers = [node for node in ros1.publishers.get(topic, ()) if node != own_name]
-        subscribers = [node for node in ros1.subscribers.get(topic, ()) if node != own_name]
-        writers = [end for end in ros2[topic].publishers if not end.node.startswith(BRIDGE_PREFIX)]
-        readers = [end for end in ros2[topic].subscribers if not end.node.startswith(BRIDGE_PREFIX)]
+        publishers = [node for node in ros1.publishers.get(topic, ()) if not is_bridge(node)]
+        subscribers = [node for node in ros1.subscribers.get(topic, ()) if not is_bridge(node)]
+        writers = [end for end in ros2[topic].publishers if not is_bridge(end.node)]
+        readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
             # Who wants the last message is served only by a publisher that keeps it.

@@ -12,14 +12,23 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from types import TracebackType
 from typing import Protocol, cast
 
 from minirospy.bridge.ros2.layouts import TypesDiffer
-from minirospy.bridge.ros2.links import Ros2End, Ros2Topic
+from minirospy.bridge.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic
+from minirospy.bridge.ros2.rclpy_calls import Calls, NotAnsweredError, ServiceClass
 from minirospy.errors import BridgeError
 
-__all__ = ["RclpySide", "Ros2Publisher", "Ros2Side", "Ros2Subscription", "require_rclpy"]
+__all__ = [
+    "RclpySide",
+    "Ros2Client",
+    "Ros2Handle",
+    "Ros2Publisher",
+    "Ros2Side",
+    "require_rclpy",
+]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
@@ -98,8 +107,21 @@ class Ros2Publisher(Protocol):
     def close(self) -> None: ...
 
 
-class Ros2Subscription(Protocol):
-    """A subscription, which calls back until it is closed."""
+class Ros2Handle(Protocol):
+    """A subscription or a service, which calls back until it is closed."""
+
+    def close(self) -> None: ...
+
+
+class Ros2Client(Protocol):
+    """A client of a service; its methods may be called from any thread."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a server is connected."""
+
+    def call(self, request: bytes) -> Future[bytes]:
+        """Send a request and return the future response, both as CDR. It fails with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -129,7 +151,21 @@ class Ros2Side(Protocol):
         depth: int,
         is_reliable: bool,
         is_latched: bool,
-    ) -> Ros2Subscription: ...
+    ) -> Ros2Handle: ...
+
+    def nodes(self) -> list[tuple[str, str]]:
+        """Return the names and namespaces of all nodes but those of bridges."""
+
+    def services(self) -> Mapping[str, str]:
+        """Return the services that others than this bridge offer, and their types."""
+
+    def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
+
+    def client(self, service: str, type_: str) -> Ros2Client: ...
+
+    def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
+        """Offer a service: ``answer`` gets the CDR of a request, in a thread; MinirospyError is why a call fails."""
 
     def close(self) -> None: ...
 
@@ -164,7 +200,6 @@ class RclpySide:
                 name,
                 context=self._context,
                 use_global_arguments=False,
-                enable_rosout=False,
                 start_parameter_services=False,
             )
         except Exception as error:  # rclpy's own errors have no common base but this
@@ -173,8 +208,10 @@ class RclpySide:
             raise BridgeError(f"ROS 2 does not start: {' '.join(str(error).split())}") from error
         self._executor = executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
+        self._calls = Calls(self._node, self._executor)
         self._thread = threading.Thread(target=self._spin, name="ros2-executor", daemon=True)
         self._is_closed = False
+        self._served: set[str] = set()
         self._thread.start()
 
     @property
@@ -212,10 +249,53 @@ class RclpySide:
         depth: int,
         is_reliable: bool,
         is_latched: bool,
-    ) -> Ros2Subscription:
+    ) -> Ros2Handle:
         """Call ``deliver`` with each serialized message, in the executor's thread. Raise TypesDiffer."""
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
         return _Subscription(self._node, self._class(type_), topic, deliver, profile)
+
+    def nodes(self) -> list[tuple[str, str]]:
+        """Return the names and namespaces of all nodes but those of bridges."""
+        found = self._node.get_node_names_and_namespaces()
+        return [(str(name), str(space)) for name, space in found if not name.startswith(BRIDGE_PREFIX)]
+
+    def services(self) -> Mapping[str, str]:
+        """Return the services that others than this bridge offer, and their types."""
+        # Services that have clients only are among them.
+        named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
+        if hasattr(self._node, "count_services"):
+            own = self._served
+            return {
+                name: type_
+                for name, type_ in named.items()
+                if self._node.count_services(name) > (1 if name in own else 0)
+            }
+        # Before ROS 2 Jazzy.
+        offered: dict[str, str] = {}
+        for name, namespace in self.nodes():
+            # A node that has just ended has none.
+            with contextlib.suppress(RuntimeError):
+                found = self._node.get_service_names_and_types_by_node(name, namespace)
+                offered.update((str(service), _short(types[0])) for service, types in found)
+        return offered
+
+    def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the fields of a service's request and response. Raise TypesDiffer where it is not installed."""
+        class_ = self._service_class(type_)
+        return (
+            dict(class_.Request.get_fields_and_field_types()),
+            dict(class_.Response.get_fields_and_field_types()),
+        )
+
+    def client(self, service: str, type_: str) -> Ros2Client:
+        """Return a client. Raise TypesDiffer."""
+        return self._calls.client(service, self._service_class(type_))
+
+    def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
+        """Offer a service. Raise TypesDiffer."""
+        server = self._calls.server(service, self._service_class(type_), answer)
+        self._served.add(service)
+        return _Served(server, lambda: self._served.discard(service))
 
     def close(self) -> None:
         """End the node and its thread. Idempotent."""
@@ -233,6 +313,8 @@ class RclpySide:
                 self._executor.spin()
             except self._shutdown_error:
                 return
+            except NotAnsweredError:
+                continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
                 # Of one callback: the others go on.
                 _log.exception("a message of ROS 2 could not be passed on")
@@ -257,15 +339,30 @@ class RclpySide:
 
     @staticmethod
     def _class(type_: str) -> _MessageClass:
-        package, _, name = type_.partition("/")
-        try:
-            found = getattr(importlib.import_module(f"{package}.msg"), name, None)
-        except ImportError:
-            found = None
+        found = _imported(type_, "msg")
         # minirospy's own packages of ROS 1 have classes, too.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("_MessageClass", found)
+
+    @staticmethod
+    def _service_class(type_: str) -> ServiceClass:
+        found = _imported(type_, "srv")
+        if not hasattr(getattr(found, "Request", None), "get_fields_and_field_types"):
+            raise TypesDiffer(f"the service type [{type_}] is not installed in ROS 2")
+        return cast("ServiceClass", found)
+
+
+class _Served:
+    """A service of the bridge, which is its own until it ends."""
+
+    def __init__(self, server: Ros2Handle, on_close: Callable[[], None]) -> None:
+        self._server = server
+        self._on_close = on_close
+
+    def close(self) -> None:
+        self._server.close()
+        self._on_close()
 
 
 class _Publisher:
@@ -321,6 +418,14 @@ class _Subscription:
                 return
             data = taken[0]
         self._deliver(data)
+
+
+def _imported(type_: str, kind: str) -> object:
+    package, _, name = type_.partition("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), name, None)
+    except ImportError:
+        return None
 
 
 def _short(type_: str) -> str:

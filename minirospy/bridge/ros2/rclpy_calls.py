@@ -1,0 +1,262 @@
+"""Clients and servers of services in ROS 2, by rclpy, which has no raw services.
+
+A request or response is an object of the class that ROS 2 has built for its type; rclpy's own serialization makes it of
+CDR, and back. All of this runs in the executor's thread, but for the methods that say otherwise.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from collections.abc import Callable, Coroutine, Generator
+from concurrent.futures import CancelledError, Future, InvalidStateError
+from typing import Protocol, TypeVar
+
+from minirospy.errors import BridgeError, MinirospyError
+
+__all__ = [
+    "Calls",
+    "Client",
+    "Executor",
+    "Message",
+    "MessageClass",
+    "NotAnsweredError",
+    "RclpyFuture",
+    "Server",
+    "ServiceClass",
+    "ServiceNode",
+]
+
+_REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
+"""Fields in which a response without success tells people why."""
+
+_DEPTH = 1000
+"""Requests or responses that may wait for the bridge."""
+
+_T = TypeVar("_T")
+
+
+# --- what is used of rclpy
+
+
+class Message(Protocol):
+    """An object of a message, request or response."""
+
+    @staticmethod
+    def get_fields_and_field_types() -> dict[str, str]: ...
+
+
+class MessageClass(Protocol):
+    """The class of a message, request or response."""
+
+    def __call__(self) -> Message: ...
+
+    @staticmethod
+    def get_fields_and_field_types() -> dict[str, str]: ...
+
+
+class ServiceClass(Protocol):
+    """The class of a service."""
+
+    Request: MessageClass
+    Response: MessageClass
+
+
+class RclpyFuture(Protocol):
+    """A future of rclpy."""
+
+    def result(self) -> object: ...
+
+    def set_result(self, result: object, /) -> None: ...
+
+    def add_done_callback(self, callback: Callable[[RclpyFuture], None], /) -> None: ...
+
+    def __await__(self) -> Generator[None, None, object]: ...
+
+
+class Executor(Protocol):
+    """An executor of rclpy."""
+
+    def create_task(self, callback: Callable[..., object], *args: object) -> object: ...
+
+    def wake(self) -> None: ...
+
+
+class _RclpyClient(Protocol):
+    def call_async(self, request: Message) -> RclpyFuture: ...
+
+    def remove_pending_request(self, future: RclpyFuture) -> None: ...
+
+    def service_is_ready(self) -> bool: ...
+
+
+class _Logger(Protocol):
+    def error(self, text: str) -> object: ...
+
+
+class ServiceNode(Protocol):
+    """A node of rclpy."""
+
+    def create_client(
+        self, class_: ServiceClass, name: str, *, qos_profile: object, callback_group: object
+    ) -> _RclpyClient: ...
+
+    def create_service(
+        self,
+        class_: ServiceClass,
+        name: str,
+        callback: Callable[[Message, Message], Coroutine[object, None, Message]],
+        *,
+        qos_profile: object,
+        callback_group: object,
+    ) -> object: ...
+
+    def destroy_client(self, client: _RclpyClient) -> bool: ...
+
+    def destroy_service(self, service: object) -> bool: ...
+
+    def get_logger(self) -> _Logger: ...
+
+
+# --- clients and servers
+
+
+class NotAnsweredError(Exception):
+    """A request that gets no response: ROS 2 has no errors of services."""
+
+
+class Calls:
+    """Makes clients and servers on one node."""
+
+    def __init__(self, node: ServiceNode, executor: Executor) -> None:
+        self.node = node
+        self.executor = executor
+        serialization = importlib.import_module("rclpy.serialization")
+        self.serialize: Callable[[object], bytes] = serialization.serialize_message
+        self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
+        self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
+        # A request that waits for its answer does not keep the others waiting.
+        self.options: dict[str, object] = {
+            "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
+            # That of services, with a longer queue.
+            "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
+        }
+
+    def client(self, name: str, class_: ServiceClass) -> Client:
+        """Return a client."""
+        return Client(self, name, class_)
+
+    def server(self, name: str, class_: ServiceClass, answer: Callable[[bytes], Future[bytes]]) -> Server:
+        """Offer a service."""
+        return Server(self, name, class_, answer)
+
+    async def result(self, future: Future[_T]) -> _T:
+        """Return what a future of another thread brings, in a coroutine of the executor."""
+        waiting = self._future(executor=self.executor)
+
+        def done(_: object) -> None:
+            waiting.set_result(None)
+            self.executor.wake()
+
+        future.add_done_callback(done)
+        await waiting
+        return future.result()
+
+
+class Client:
+    """A client of a service."""
+
+    def __init__(self, calls: Calls, name: str, class_: ServiceClass) -> None:
+        self._calls = calls
+        self._class = class_
+        self._client = calls.node.create_client(class_, name, **calls.options)
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is connected. From any thread."""
+        return bool(self._client.service_is_ready())
+
+    def call(self, request: bytes) -> Future[bytes]:
+        """Send a request and return the future response, both as CDR. From any thread."""
+        answered: Future[bytes] = Future()
+        # In the executor's thread: no response arrives before its request is noted.
+        self._calls.executor.create_task(self._send, request, answered)
+        return answered
+
+    def close(self) -> None:
+        """End the client."""
+        self._calls.node.destroy_client(self._client)
+
+    def _send(self, data: bytes, answered: Future[bytes]) -> None:
+        if answered.cancelled():
+            return
+        try:
+            pending = self._client.call_async(self._calls.deserialize(data, self._class.Request))
+        except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            _fail(answered, BridgeError(f"ROS 2 does not send the request: {_line(error)}"))
+            return
+
+        def arrived(done: RclpyFuture) -> None:
+            try:
+                data = self._calls.serialize(done.result())
+            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+                _fail(answered, BridgeError(f"the response of ROS 2 cannot be read: {_line(error)}"))
+                return
+            with contextlib.suppress(InvalidStateError):
+                answered.set_result(data)
+
+        def forget(_: object) -> None:
+            if answered.cancelled():
+                self._calls.executor.create_task(self._client.remove_pending_request, pending)
+
+        pending.add_done_callback(arrived)
+        answered.add_done_callback(forget)
+
+
+class Server:
+    """A service that is offered in ROS 2; ``answer`` gets the CDR of a request and returns that of the response.
+
+    A MinirospyError of its future is why the call fails: the text of a response that has a place for it, and a line of the log.
+    """
+
+    def __init__(
+        self, calls: Calls, name: str, class_: ServiceClass, answer: Callable[[bytes], Future[bytes]]
+    ) -> None:
+        self._calls = calls
+        self._name = name
+        self._class = class_
+        self._answer = answer
+        self._service = calls.node.create_service(class_, name, self._arrived, **calls.options)
+
+    def close(self) -> None:
+        """Offer it no more."""
+        self._calls.node.destroy_service(self._service)
+
+    async def _arrived(self, request: Message, response: Message) -> Message:
+        try:
+            data = await self._calls.result(self._answer(self._calls.serialize(request)))
+        except MinirospyError as error:
+            return self._refusal(response, _line(error))
+        except (CancelledError, RuntimeError) as error:
+            # The bridge ends.
+            raise NotAnsweredError from error
+        return self._calls.deserialize(data, self._class.Response)
+
+    def _refusal(self, response: Message, reason: str) -> Message:
+        self._calls.node.get_logger().error(f"service [{self._name}] of ROS 1: {reason}")
+        fields = response.get_fields_and_field_types()
+        text = next((name for name in _REASONS if fields.get(name) == "string"), "")
+        if fields.get("success") != "boolean" or not text:
+            # Zeros would be taken for an answer.
+            raise NotAnsweredError
+        setattr(response, text, reason)
+        return response
+
+
+def _fail(future: Future[bytes], error: Exception) -> None:
+    with contextlib.suppress(InvalidStateError):
+        future.set_exception(error)
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split())

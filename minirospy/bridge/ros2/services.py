@@ -1,0 +1,408 @@
+"""Services that pass from one side to the other: what is opened and closed, and how a call is answered."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from minirospy.aio.raw import RawService, call_raw, service_header
+from minirospy.bridge.ros2.layouts import TypesDiffer, ros2_spec, transcoder
+from minirospy.bridge.ros2.links import Direction, is_bridge
+from minirospy.bridge.ros2.rules import Rules
+from minirospy.bridge.ros2.service_links import ServiceLink, service_links
+from minirospy.errors import (
+    BridgeError,
+    DefinitionError,
+    DeserializationError,
+    MinirospyError,
+    NotFoundError,
+    ROSException,
+    ServiceException,
+)
+from minirospy.idl.cdr import CDR_HEADER, Transcoder
+from minirospy.idl.digest import service_md5
+from minirospy.idl.load import Catalogue
+from minirospy.idl.spec import MessageSpec, ServiceSpec
+from minirospy.wire.header import Header
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.bridge.access import NameFilter
+    from minirospy.bridge.ros2.side import Ros2Client, Ros2Handle, Ros2Side
+
+__all__ = ["ServiceBridge", "ServiceCodec", "ServicePair"]
+
+_PROBE_SECONDS = 1.0
+_PROBE_AGAIN_SECONDS = 10.0
+_LOOK_SECONDS = 0.5
+_ABSENT_LOOKS = 3
+_MOST_UNDER_WAY = 8
+"""Requests that a server of ROS 2 gets at a time: its queue has 10 places, and those beyond would be lost."""
+
+
+@dataclass(frozen=True)
+class ServicePair:
+    """A service, and why it is not bridged: nothing where it is."""
+
+    link: ServiceLink
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class ServiceCodec:
+    """How the bytes of a service's requests and responses are converted; ``type``: that of ROS 1."""
+
+    type: InterfaceType
+    request: Transcoder
+    response: Transcoder
+
+
+class _Types:
+    """The codecs of services, by the names of both types."""
+
+    def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
+        self._side = side
+        self._rules = rules
+        self._catalogue = catalogue
+        self._codecs: dict[tuple[str, str], ServiceCodec] = {}
+
+    def partner(self, type_: str, direction: Direction) -> str:
+        """Return the type of the side that calls, for that of the side that offers."""
+        if direction is Direction.TO_ROS1:
+            names = self._rules.ros2_services(type_)
+            return next((name for name in names if self._is_in_ros2(name)), names[0])
+        names = self._rules.ros1_services(type_) or (type_,)
+        return next((name for name in names if self._is_in_ros1(name)), names[0])
+
+    def codec(self, ros1_type: str, ros2_type: str) -> ServiceCodec:
+        """Return the codec of a service. Raise TypesDiffer."""
+        key = (ros1_type, ros2_type)
+        if key not in self._codecs:
+            self._codecs[key] = self._made(ros1_type, ros2_type)
+        return self._codecs[key]
+
+    def _made(self, ros1_type: str, ros2_type: str) -> ServiceCodec:
+        spec = self._spec(ros1_type)
+        request_fields, response_fields = self._side.service_fields(ros2_type)
+        lookup = self._catalogue.message
+
+        def half(ros1: MessageSpec, fields: dict[str, str]) -> Transcoder:
+            other = ros2_spec(ros2_type, fields)
+            return transcoder(ros1, lookup, other, self._ros2_spec, self._rules)
+
+        try:
+            type_ = InterfaceType(ros1_type, service_md5(spec, lookup))
+        except (DefinitionError, NotFoundError) as error:
+            raise TypesDiffer(str(error)) from error
+        return ServiceCodec(type_, half(spec.request, request_fields), half(spec.response, response_fields))
+
+    def _ros2_spec(self, name: str) -> MessageSpec:
+        return ros2_spec(name, self._side.fields(name))
+
+    def _spec(self, name: str) -> ServiceSpec:
+        try:
+            return self._catalogue.service(name)
+        except (KeyError, NotFoundError, DefinitionError) as error:
+            why = "" if isinstance(error, KeyError) else f" ({error})"
+            raise TypesDiffer(
+                f"the service type [{name}] is not defined here: put its package on ROS_PACKAGE_PATH{why}"
+            ) from error
+
+    def _is_in_ros1(self, name: str) -> bool:
+        with contextlib.suppress(TypesDiffer):
+            return bool(self._spec(name))
+        return False
+
+    def _is_in_ros2(self, name: str) -> bool:
+        with contextlib.suppress(TypesDiffer):
+            return bool(self._side.service_fields(name))
+        return False
+
+
+class ServiceBridge:
+    """Offers the services of each side to the other one. On the node's loop."""
+
+    def __init__(
+        self,
+        node: Node,
+        side: Ros2Side,
+        services: NameFilter,
+        rules: Rules,
+        catalogue: Catalogue,
+        call_seconds: float,
+    ) -> None:
+        self.links: dict[ServiceLink, _OpenService] = {}
+        self.refused: dict[ServiceLink, str] = {}
+        self._node = node
+        self._side = side
+        self._services = services
+        self._types = _Types(side, rules, catalogue)
+        self._call_seconds = call_seconds
+        self._probes = _Probes(node)
+
+    async def close(self) -> None:
+        """Close all. Idempotent."""
+        for link in list(self.links):
+            await self._close_link(link)
+        await self._probes.close()
+
+    async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServicePair]:
+        """Return what would be bridged of these services of ROS 1 and those of ROS 2, and why something is not."""
+        found = []
+        for link in await self._wanted(ros1):
+            try:
+                self._codec(link)
+            except TypesDiffer as error:
+                found.append(ServicePair(link, str(error)))
+            else:
+                found.append(ServicePair(link))
+        return found
+
+    async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
+        """Open and close services as both sides are now; whether any changed."""
+        wanted = await self._wanted(ros1)
+        gone = [link for link in self.links if link not in wanted]
+        for link in gone:
+            await self._close_link(link)
+
+        self.refused = {link: reason for link, reason in self.refused.items() if link in wanted}
+        new = [link for link in wanted if link not in self.links and link not in self.refused]
+        for link in new:
+            try:
+                await self._open_link(link)
+            except (TypesDiffer, ROSException, ValueError) as error:
+                self.refused[link] = str(error)
+                self._node.log.warning(
+                    "service %s is not bridged (%s): %s", link.service, link.direction.value, error
+                )
+        return bool(gone or new)
+
+    async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
+        ros1 = {name: nodes for name, nodes in ros1.items() if self._services(name)}
+        foreign = {name: [node for node in nodes if not is_bridge(node)] for name, nodes in ros1.items()}
+        ros2 = {name: type_ for name, type_ in self._side.services().items() if self._services(name)}
+        types = await self._probes.types({name: nodes[0] for name, nodes in foreign.items() if nodes})
+        return service_links(ros1, types, ros2, self._types.partner)
+
+    def _codec(self, link: ServiceLink) -> ServiceCodec:
+        codec = self._types.codec(link.ros1_type, link.ros2_type)
+        if link.direction is Direction.TO_ROS1:
+            md5sum = self._probes.md5sum(link.service)
+            if md5sum != codec.type.md5sum:
+                raise TypesDiffer(
+                    f"its md5sum in ROS 1 is [{md5sum}], that of [{link.ros1_type}] here [{codec.type.md5sum}]: "
+                    "use the package that the server was built with"
+                )
+        return codec
+
+    async def _open_link(self, link: ServiceLink) -> None:
+        codec = self._codec(link)
+        opened: _OpenService
+        if link.direction is Direction.TO_ROS2:
+            opened = _InRos1(self._node, self._side, link, codec, self._call_seconds)
+            await opened.open()
+        else:
+            opened = _InRos2(self._node, self._side, link, codec, self._call_seconds)
+        self.links[link] = opened
+        self._node.log.info(
+            "bridging service %s (%s): [%s] and [%s]",
+            link.service,
+            link.direction.value,
+            link.ros1_type,
+            link.ros2_type,
+        )
+
+    async def _close_link(self, link: ServiceLink) -> None:
+        await self.links.pop(link).close()
+        self._node.log.info("no longer bridging service %s (%s)", link.service, link.direction.value)
+
+
+class _OpenService(Protocol):
+    async def close(self) -> None: ...
+
+
+class _InRos1:
+    """A service of ROS 2 that the bridge offers in ROS 1."""
+
+    def __init__(
+        self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
+    ) -> None:
+        self._link = link
+        self._codec = codec
+        self._call_seconds = call_seconds
+        self._ended = asyncio.Event()
+        self._turns = asyncio.Semaphore(_MOST_UNDER_WAY)
+        self._client: Ros2Client = side.client(link.service, link.ros2_type)
+        self._server = RawService(node, link.service, codec.type, self._answer)
+
+    async def open(self) -> None:
+        await self._server
+
+    async def close(self) -> None:
+        # The calls under way are answered with the reason.
+        self._ended.set()
+        await self._server.close()
+        self._client.close()
+
+    async def _answer(self, body: bytes, _: Header) -> bytes:
+        name = self._link.service
+        try:
+            request = self._codec.request.to_cdr(body, CDR_HEADER)
+            async with self._turns:
+                return self._codec.response.to_ros1(await self._call(request))
+        except DeserializationError as error:
+            raise ServiceException(
+                f"the bridge cannot convert a message of service [{name}]: {error}"
+            ) from error
+        except BridgeError as error:
+            raise ServiceException(str(error)) from error
+
+    async def _call(self, request: bytes) -> bytes:
+        loop = asyncio.get_running_loop()
+        end = loop.time() + self._call_seconds
+        name = self._link.service
+        if not await self._becomes_ready():
+            raise BridgeError(f"service [{name}] has no server in ROS 2 any more")
+
+        answered = asyncio.wrap_future(self._client.call(request))
+        ended: asyncio.Future[bool] = asyncio.ensure_future(self._ended.wait())
+        awaited: list[asyncio.Future[bytes] | asyncio.Future[bool]] = [answered, ended]
+        absent = 0
+        try:
+            while not answered.done():
+                limit = min(_LOOK_SECONDS, max(0.0, end - loop.time()))
+                await asyncio.wait(awaited, timeout=limit, return_when=asyncio.FIRST_COMPLETED)
+                if answered.done():
+                    break
+                if loop.time() >= end:
+                    raise BridgeError(
+                        f"service [{name}] of ROS 2 has not answered within {self._call_seconds:g} s"
+                    )
+                absent = 0 if self._client.is_ready else absent + 1
+                if ended.done() or absent >= _ABSENT_LOOKS:
+                    raise BridgeError(f"the server of service [{name}] in ROS 2 has ended during the call")
+        finally:
+            answered.cancel()
+            ended.cancel()
+        return answered.result()
+
+    async def _becomes_ready(self) -> bool:
+        """Wait for the server: the client of a service that was found a moment ago may not be connected yet."""
+        loop = asyncio.get_running_loop()
+        end = loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
+        while not self._client.is_ready:
+            if loop.time() >= end:
+                return False
+            await asyncio.sleep(0.02)
+        return True
+
+
+class _InRos2:
+    """A service of ROS 1 that the bridge offers in ROS 2."""
+
+    def __init__(
+        self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
+    ) -> None:
+        self._node = node
+        self._link = link
+        self._codec = codec
+        self._call_seconds = call_seconds
+        self._loop = asyncio.get_running_loop()
+        self._calls: set[asyncio.Task[None]] = set()
+        self._server: Ros2Handle = side.serve(link.service, link.ros2_type, self._arrived)
+
+    async def close(self) -> None:
+        self._server.close()
+        for task in self._calls:
+            task.cancel()
+        await asyncio.gather(*self._calls, return_exceptions=True)
+
+    def _arrived(self, request: bytes) -> Future[bytes]:
+        """Start a call. In the executor's thread."""
+        answered: Future[bytes] = Future()
+        self._loop.call_soon_threadsafe(self._start, request, answered)
+        return answered
+
+    def _start(self, request: bytes, answered: Future[bytes]) -> None:
+        task = asyncio.ensure_future(_pass_on(self._answer(request), answered))
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
+    async def _answer(self, request: bytes) -> bytes:
+        codec = self._codec
+        try:
+            body = await asyncio.wait_for(
+                call_raw(self._node, self._link.service, codec.type.md5sum, codec.request.to_ros1(request)),
+                self._call_seconds,
+            )
+            return codec.response.to_cdr(body, CDR_HEADER)
+        except asyncio.TimeoutError:
+            raise BridgeError(f"it has not answered within {self._call_seconds:g} s") from None
+
+
+async def _pass_on(work: Awaitable[bytes], answered: Future[bytes]) -> None:
+    """Give what ``work`` returns or raises to a future of another thread."""
+    try:
+        result = await work
+    except asyncio.CancelledError:
+        answered.cancel()
+        raise
+    except (MinirospyError, ROSException, ServiceException) as error:
+        answered.set_exception(BridgeError(str(error)))
+    except Exception as error:  # noqa: BLE001 - the other side waits for the answer, whatever happened here
+        answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
+    else:
+        answered.set_result(result)
+
+
+class _Probes:
+    """The types of services in ROS 1, which the master does not know: each server is queried once."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._headers: dict[tuple[str, str], Header] = {}
+        self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
+        self._again: dict[tuple[str, str], float] = {}
+
+    async def types(self, services: Mapping[str, str]) -> dict[str, str]:
+        """Return the types of services, which are given with their nodes; those that do not answer are left out."""
+        present = set(services.items())
+        now = asyncio.get_running_loop().time()
+        self._headers = {key: header for key, header in self._headers.items() if key in present}
+        self._again = {key: time for key, time in self._again.items() if key in present}
+        for key in present - self._headers.keys() - self._tasks.keys():
+            if now >= self._again.get(key, 0.0):
+                self._tasks[key] = asyncio.ensure_future(self._probe(key))
+        if self._tasks:
+            # One that hangs keeps the others waiting this long, and no longer.
+            await asyncio.wait(self._tasks.values(), timeout=_PROBE_SECONDS)
+        return {service: header["type"] for (service, _), header in self._headers.items()}
+
+    def md5sum(self, service: str) -> str:
+        """Return the md5sum that a server has named."""
+        return next(
+            (header.get("md5sum", "") for (name, _), header in self._headers.items() if name == service), ""
+        )
+
+    async def close(self) -> None:
+        """End the queries. Idempotent."""
+        for task in self._tasks.values():
+            task.cancel()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+
+    async def _probe(self, key: tuple[str, str]) -> None:
+        try:
+            header = await service_header(self._node, key[0])
+            if "type" in header:
+                self._headers[key] = header
+                return
+        except ServiceException:
+            pass
+        finally:
+            del self._tasks[key]
+        self._again[key] = asyncio.get_running_loop().time() + _PROBE_AGAIN_SECONDS
