@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.bridge.tokens import Tokens
 
-__all__ = ["DASHBOARD", "RQT", "RQT_CONSOLE", "RQT_GRAPH", "RQT_IMAGE_VIEW", "RQT_PLOT"]
+__all__ = ["DASHBOARD", "WINDOWS", "dashboard"]
+
+Fields = Mapping[str, Sequence[str]]
+"""The settings of a view, as its link has them."""
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -22,32 +25,15 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
     return _main(DASHBOARD, argv)
 
 
-def rqt(argv: Sequence[str] | None = None) -> int:
-    """Run `rqt`; return its exit status."""
-    return _main(RQT, argv)
+def __getattr__(name: str) -> object:
+    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``): both are in WINDOWS."""
+    command = WINDOWS.get(name.lower())
+    if command is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return command if name.isupper() else partial(_main, command)
 
 
-def rqt_console(argv: Sequence[str] | None = None) -> int:
-    """Run `rqt_console`; return its exit status."""
-    return _main(RQT_CONSOLE, argv)
-
-
-def rqt_plot(argv: Sequence[str] | None = None) -> int:
-    """Run `rqt_plot`; return its exit status."""
-    return _main(RQT_PLOT, argv)
-
-
-def rqt_graph(argv: Sequence[str] | None = None) -> int:
-    """Run `rqt_graph`; return its exit status."""
-    return _main(RQT_GRAPH, argv)
-
-
-def rqt_image_view(argv: Sequence[str] | None = None) -> int:
-    """Run `rqt_image_view`; return its exit status."""
-    return _main(RQT_IMAGE_VIEW, argv)
-
-
-def _main(command: Command, argv: Sequence[str] | None) -> int:
+def _main(command: Command, argv: Sequence[str] | None = None) -> int:
     """Run a command; launch files start it as a node, with remappings among its words."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
@@ -111,8 +97,7 @@ def _dashboard_parser() -> Parser:
     return parser
 
 
-def _rqt_parser() -> Parser:
-    parser = _parser("rqt", "Shows the graph in a browser.")
+def _add_plugin(parser: Parser) -> None:
     parser.add_argument(
         "-s",
         "--standalone",
@@ -121,38 +106,60 @@ def _rqt_parser() -> Parser:
         help="the view to open, as rqt_plot",
         completer="nothing",
     )
-    _add_ignored(parser, "--clear-config", "--force-discover", "--lock-perspective", "--on-top")
+    _add_ignored(parser, "--force-discover", "--lock-perspective", "--on-top")
     _add_ignored(parser, "-p", "--perspective", "--perspective-file", takes_value=True)
-    return parser
 
 
-def _console_parser() -> Parser:
-    parser = _parser("rqt_console", "Shows the log lines of all nodes in a browser.")
-    _add_ignored(parser, "--clear-config")
-    return parser
-
-
-def _plot_parser() -> Parser:
-    parser = _parser("rqt_plot", "Plots numbers of messages in a browser.")
+def _add_plots(parser: Parser) -> None:
     parser.add_argument("-P", "--pause", action="store_true", help="start paused")
-    _add_ignored(parser, "-e", "--empty", "-L", "--buffer-length", "--clear-config")
+    _add_ignored(parser, "-e", "--empty", "-L", "--buffer-length")
     parser.add_argument(
         "topic", nargs="*", help="what to plot: /topic/field, /topic/field:field", completer="topics"
     )
-    return parser
 
 
-def _graph_parser() -> Parser:
-    parser = _parser("rqt_graph", "Shows nodes and topics in a browser.")
-    _add_ignored(parser, "--clear-config")
-    return parser
-
-
-def _image_parser() -> Parser:
-    parser = _parser("rqt_image_view", "Shows images of a topic in a browser.")
-    _add_ignored(parser, "--clear-config")
+def _add_topic(parser: Parser) -> None:
     parser.add_argument("topic", nargs="?", default="", help="the topic of the images", completer="topics")
-    return parser
+
+
+def _add_nodes(parser: Parser) -> None:
+    parser.add_argument("node_name", nargs="*", help="the nodes to open", completer="nodes")
+
+
+def _window(
+    name: str,
+    view: str,
+    what: str,
+    add_arguments: Callable[[Parser], None] | None = None,
+    chosen: Callable[..., tuple[str, Fields]] | None = None,
+) -> Command:
+    """Return the command of a window of rqt.
+
+    ``what`` is the description, ``add_arguments`` adds arguments of its own, of which ``chosen`` makes the view and its settings.
+    """
+
+    def make_parser() -> Parser:
+        parser = _parser(name, f"{what} in a browser.")
+        _add_ignored(parser, "--clear-config")
+        if add_arguments:
+            add_arguments(parser)
+        return parser
+
+    def body(
+        *,
+        port: int | None,
+        no_browser: bool,
+        listen: bool,
+        address: str,
+        read_only: bool,
+        arguments: Sequence[str] = (),
+        ignored: object = None,
+        **own: object,
+    ) -> int:
+        shown, fields = chosen(**own) if chosen else (view, {})
+        return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
+
+    return Command(name, make_parser, body)
 
 
 def _dashboard(
@@ -183,75 +190,25 @@ def _dashboard(
     return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
 
 
-def _rqt(
-    standalone: str,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-    ignored: object = None,
-) -> int:
+def _plugin(standalone: str) -> tuple[str, Fields]:
     from minirospy.dashboard.views import view_of_plugin
 
-    return _serve(view_of_plugin(standalone), {}, port, no_browser, listen, address, read_only, arguments)
+    return view_of_plugin(standalone), {}
 
 
-def _rqt_console(
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-    ignored: object = None,
-) -> int:
-    return _serve("console", {}, port, no_browser, listen, address, read_only, arguments)
-
-
-def _rqt_plot(
-    topic: Sequence[str],
-    pause: bool,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-    ignored: object = None,
-) -> int:
+def _plots(topic: Sequence[str], pause: bool) -> tuple[str, Fields]:
     from minirospy.dashboard.views import plotted_fields
 
-    fields = {"path": plotted_fields(topic), **({"paused": ["1"]} if pause else {})}
-    return _serve("plot", fields, port, no_browser, listen, address, read_only, arguments)
+    return "plot", {"path": plotted_fields(topic), **({"paused": ["1"]} if pause else {})}
 
 
-def _rqt_graph(
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-    ignored: object = None,
-) -> int:
-    return _serve("graph", {}, port, no_browser, listen, address, read_only, arguments)
+def _image(topic: str) -> tuple[str, Fields]:
+    return "image", {"topic": [topic]} if topic else {}
 
 
-def _rqt_image_view(
-    topic: str,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-    ignored: object = None,
-) -> int:
-    return _serve(
-        "image", {"topic": [topic]} if topic else {}, port, no_browser, listen, address, read_only, arguments
-    )
+def _nodes(node_name: Sequence[str]) -> tuple[str, Fields]:
+    names = [name if name.startswith("/") else f"/{name}" for name in node_name]
+    return "reconfigure", {"node": names} if names else {}
 
 
 # --- the page
@@ -381,8 +338,23 @@ def _announce(
 
 
 DASHBOARD = Command("minirospy dashboard", _dashboard_parser, _dashboard)
-RQT = Command("rqt", _rqt_parser, _rqt)
-RQT_CONSOLE = Command("rqt_console", _console_parser, _rqt_console)
-RQT_PLOT = Command("rqt_plot", _plot_parser, _rqt_plot)
-RQT_GRAPH = Command("rqt_graph", _graph_parser, _rqt_graph)
-RQT_IMAGE_VIEW = Command("rqt_image_view", _image_parser, _rqt_image_view)
+
+WINDOWS = {
+    command.name: command
+    for command in (
+        _window("rqt", "topics", "Shows the graph", _add_plugin, _plugin),
+        _window("rqt_console", "console", "Shows the log lines of all nodes"),
+        _window("rqt_graph", "graph", "Shows nodes and topics"),
+        _window("rqt_image_view", "image", "Shows images of a topic", _add_topic, _image),
+        _window("rqt_logger_level", "console", "Shows log lines, and sets the levels of loggers"),
+        _window("rqt_plot", "plot", "Plots numbers of messages", _add_plots, _plots),
+        _window("rqt_publisher", "publish", "Publishes messages by forms"),
+        _window("rqt_reconfigure", "reconfigure", "Changes parameters of running nodes", _add_nodes, _nodes),
+        _window("rqt_robot_monitor", "diagnostics", "Shows aggregated diagnostics as a tree"),
+        _window("rqt_robot_steering", "teleop", "Drives a robot"),
+        _window("rqt_runtime_monitor", "diagnostics", "Shows diagnostics"),
+        _window("rqt_service_caller", "services", "Calls services by forms"),
+        _window("rqt_topic", "topics", "Shows topics with their values"),
+    )
+}
+"""The commands of rqt by name. Each has a line in the registry and in pyproject.toml, too, and a package in ros_packages/."""

@@ -1,4 +1,4 @@
-"""The dashboard as a whole: a bridge at one port, with the page and the board's door in it."""
+"""The dashboard as a whole: a bridge at one port, with the page, the board's door and the tools' door in it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from minirospy.aio.node import Node
 from minirospy.bridge.bridge import Addition, Bridge, BridgeOptions
 from minirospy.dashboard.board_door import BoardDoor
 from minirospy.dashboard.files import handlers, read_folder
+from minirospy.dashboard.tools_door import ToolsDoor
 
 __all__ = ["PORT", "Dashboard"]
 
@@ -18,7 +19,10 @@ class Dashboard:
     def __init__(self, node: Node, options: BridgeOptions) -> None:
         """``options.foxglove_port`` is the port of the page and of its data."""
         self._board = BoardDoor()
-        self.bridge = Bridge(node, options, addition=Addition((self._board,), handlers(read_folder())))
+        self._tools = ToolsDoor()
+        self.bridge = Bridge(
+            node, options, addition=Addition((self._board, self._tools), handlers(read_folder()))
+        )
 
     @property
     def port(self) -> int:
@@ -33,3 +37,4 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         await self.bridge.close()
         await self._board.close()
+        await self._tools.close()

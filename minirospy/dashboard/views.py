@@ -26,6 +26,7 @@ VIEWS = (
     "publish",
     "services",
     "parameters",
+    "reconfigure",
 )
 """The names of the views, as in links; the page has one module for each."""
 
@@ -44,6 +45,7 @@ _PLUGINS = {
     "rqt_runtime_monitor": "diagnostics",
     "rqt_publisher": "publish",
     "rqt_service_caller": "services",
+    "rqt_reconfigure": "reconfigure",
 }
 """rqt's plug-ins -> the view that shows the same."""
 

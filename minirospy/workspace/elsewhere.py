@@ -149,24 +149,12 @@ _QT_PLUGINS = (
     "rqt_nav_view",
     "rqt_pose_view",
     "rqt_py_console",
-    "rqt_reconfigure",
     "rqt_shell",
     "rqt_srv",
     "rqt_tf_tree",
     "rqt_top",
     "rqt_web",
 )
-_VIEWED = (
-    "rqt_logger_level",
-    "rqt_publisher",
-    "rqt_robot_monitor",
-    "rqt_robot_steering",
-    "rqt_runtime_monitor",
-    "rqt_service_caller",
-    "rqt_topic",
-)
-"""Those that have a view in the dashboard."""
-
 _QT_LIBRARIES = (
     "python_qt_binding",
     "qt_dotgraph",
@@ -214,8 +202,6 @@ def advice(name: str) -> str:
         return f"{what}: {_INSTEAD.get(name, there)}"
     if name in _INSTEAD:
         return f"minirospy does not have it: {_INSTEAD[name]}"
-    if name in _VIEWED:
-        return f"a window of Qt: `rqt -s {name}` shows the same in a browser"
     if name in _QT_PLUGINS or name in _QT_LIBRARIES or name == "rqt":
         plugin = name if name in _QT_PLUGINS else "the plug-in"
         return f"a window of Qt, from its source: {_QT.format(repository=_QT_REPOSITORIES.format(plugin=plugin))}"

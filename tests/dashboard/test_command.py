@@ -147,6 +147,7 @@ def test_screen_is_known_by_the_environment() -> None:
         ),
         (["rqt_graph"], "/#/graph"),
         (["rqt_image_view", "/camera/image_raw"], "/#/image?topic=/camera/image_raw"),
+        (["rqt_reconfigure", "lamp"], "/#/reconfigure?node=/lamp"),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
@@ -165,6 +166,8 @@ def test_words_of_rqt_plot_that_are_not_paths_are_usage_errors(capsys: pytest.Ca
 
 def test_rosrun_finds_the_programs_of_rqt() -> None:
     packages = Packages()
-    for name in ("rqt_gui", "rqt_console", "rqt_plot", "rqt_graph", "rqt_image_view"):
+    for name in (*command.WINDOWS, "rqt_gui"):
+        if name == "rqt":
+            continue
         found = packages.find_executable(name, name)
         assert any(Path(str(word)).name == name for word in found), found

@@ -21,7 +21,6 @@ TABLE = sorted(
     {
         *elsewhere._CPP,
         *elsewhere._INSTEAD,
-        *elsewhere._VIEWED,
         *elsewhere._QT_PLUGINS,
         *elsewhere._QT_LIBRARIES,
     }
@@ -36,10 +35,9 @@ def test_advice_is_one_line_that_names_what_to_type(name: str) -> None:
     assert re.search(r"`[a-z]\S* ", text)
 
 
-def test_plug_ins_with_a_view_are_those_of_the_dashboard() -> None:
-    # Of the others of the dashboard there are packages with programs: rqt_plot, ...
-    assert set(elsewhere._VIEWED) == set(views._PLUGINS) - set(Packages.below(*built_in_roots()).names())
-    assert not set(elsewhere._VIEWED) & set(elsewhere._QT_PLUGINS)
+def test_plug_ins_with_a_view_have_programs() -> None:
+    assert set(views._PLUGINS) <= set(Packages.below(*built_in_roots()).names())
+    assert not set(views._PLUGINS) & set(elsewhere._QT_PLUGINS)
 
 
 def test_unknown_names_have_no_advice() -> None:

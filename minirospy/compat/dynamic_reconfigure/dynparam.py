@@ -165,20 +165,14 @@ def _load(node: str, file: str, timeout: float | None) -> None:
 
 
 def _documents(file: str) -> list[object]:
-    """Return the documents of a YAML file; what ROS's dynparam has dumped, an object of Python, as a dict."""
-    import yaml
+    """Return the documents of a YAML file. Raise MinirospyError."""
+    from minirospy.introspect.configurations import configuration_documents
 
-    class Loader(yaml.SafeLoader):
-        pass
-
-    def config(loader: yaml.SafeLoader, _class: str, node: yaml.MappingNode) -> object:
-        return loader.construct_mapping(node, deep=True).get("dictitems", {})
-
-    Loader.add_multi_constructor("tag:yaml.org,2002:python/object/new:", config)
     try:
-        text = Path(file).read_text(encoding="utf-8")
-        return [each for each in yaml.load_all(text, Loader=Loader) if each is not None]
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        return configuration_documents(Path(file).read_text(encoding="utf-8"))
+    except MinirospyError as error:
+        raise MinirospyError(f"{file} is {error}") from error
+    except UnicodeDecodeError as error:
         raise MinirospyError(f"{file} is not YAML: {' '.join(str(error).split())}") from error
 
 

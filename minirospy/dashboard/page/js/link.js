@@ -1,6 +1,7 @@
 // The page's side of the worker: what the bridge offers, subscriptions, calls. Views get what they need from here.
 
 import { parseDefinition } from "./ros1.js";
+import { Tools } from "./tools.js";
 
 export class Link extends EventTarget {
   constructor(token) {
@@ -18,6 +19,7 @@ export class Link extends EventTarget {
     this.answers = new Map();
     this.nextKey = 1;
     this.definitions = new Map();
+    this.tools = new Tools(this);
     this.worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data }) => this.handlers[data.kind](data);
     this.worker.onerror = (event) => this.emit("notice", { level: 2, message: `the worker failed: ${event.message}` });

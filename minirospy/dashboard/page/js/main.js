@@ -12,6 +12,7 @@ import { Layouts } from "./views/layout.js";
 import { Parameters } from "./views/parameters.js";
 import { Plot } from "./views/plot.js";
 import { Publish } from "./views/publish.js";
+import { Reconfigure } from "./views/reconfigure.js";
 import { Services } from "./views/services.js";
 import { Teleop } from "./views/teleop.js";
 import { Topics } from "./views/topics.js";
@@ -31,6 +32,7 @@ const VIEWS = {
   publish: ["Publish", Publish],
   services: ["Services", Services],
   parameters: ["Parameters", Parameters],
+  reconfigure: ["Reconfigure", Reconfigure],
 };
 const STATES = {
   connecting: "connecting …",

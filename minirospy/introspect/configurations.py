@@ -1,0 +1,41 @@
+"""Files of parameter values as dynparam and rqt_reconfigure write them: YAML, in ROS with the tag of a Python object."""
+
+from __future__ import annotations
+
+from minirospy.errors import MinirospyError
+
+__all__ = ["configuration_documents", "parameter_values"]
+
+
+def configuration_documents(text: str) -> list[object]:
+    """Return the documents of a file; what ROS's dynparam has dumped, an object of Python, as a dict.
+
+    Raise MinirospyError where it is not YAML.
+    """
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        pass
+
+    def config(loader: yaml.SafeLoader, _class: str, node: yaml.MappingNode) -> object:
+        return loader.construct_mapping(node, deep=True).get("dictitems", {})
+
+    Loader.add_multi_constructor("tag:yaml.org,2002:python/object/new:", config)
+    try:
+        return [each for each in yaml.load_all(text, Loader=Loader) if each is not None]
+    except (yaml.YAMLError, RecursionError) as error:
+        raise MinirospyError(f"not YAML: {' '.join(str(error).split())}") from error
+
+
+def parameter_values(text: str) -> dict[str, bool | int | float | str]:
+    """Return the values of a file by name, without the states of groups. Raise MinirospyError."""
+    values: dict[str, bool | int | float | str] = {}
+    for document in configuration_documents(text):
+        if not isinstance(document, dict):
+            raise MinirospyError(f"{str(document)[:80]!r} is not a dictionary of values")
+        for name, value in document.items():
+            if isinstance(value, bool | int | float):
+                values[str(name)] = value
+            elif value is not None and not isinstance(value, dict | list):
+                values[str(name)] = str(value)
+    return values
