@@ -10,10 +10,17 @@ import errno
 import os
 import stat
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-__all__ = ["create_file", "open_file", "open_text", "read_file"]
+__all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", "replace_file"]
+
+OPEN_ELSEWHERE_PATIENCE = 1.0
+"""Seconds to wait on Windows for a file that another process has open: a reader of ours, or a virus scanner."""
+
+_REFUSES_OPEN_FILES = sys.platform == "win32"
 
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
@@ -60,7 +67,7 @@ def open_text(path: Path, mode: str) -> IO[str]:
 
 def create_file(path: Path, mode: int = 0o600) -> int:
     """Create ``path`` for writing, in place of what has that name; return the file descriptor. Raises OSError."""
-    path.unlink(missing_ok=True)
+    remove_file(path)
     return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
 
@@ -68,6 +75,34 @@ def read_file(path: Path) -> tuple[bytes, float]:
     """Return the bytes of ``path`` and the time of its last change. Raises OSError."""
     with os.fdopen(open_file(path, os.O_RDONLY), "rb") as stream:
         return stream.read(), os.fstat(stream.fileno()).st_mtime
+
+
+def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
+    """Give ``source`` the name ``target``, in place of what has that name. Raises OSError.
+
+    Windows refuses it while another process has one of them open: there this waits until it is closed, for a second.
+    """
+    _until_closed(lambda: os.replace(source, target))
+
+
+def remove_file(path: Path) -> None:
+    """Remove ``path``, if it exists; on Windows as soon as no other process has it open. Raises OSError."""
+    _until_closed(lambda: path.unlink(missing_ok=True))
+
+
+def _until_closed(action: Callable[[], None]) -> None:
+    end = time.monotonic() + OPEN_ELSEWHERE_PATIENCE
+    pause = 0.002
+    while True:
+        try:
+            action()
+            return
+        except PermissionError:
+            # Elsewhere it is a matter of the folder's permissions, which do not change by waiting.
+            if not _REFUSES_OPEN_FILES or time.monotonic() >= end:
+                raise
+        time.sleep(pause)
+        pause = min(2 * pause, 0.05)
 
 
 def _refusal(path: Path, why: str) -> OSError:

@@ -7,6 +7,7 @@ dies, the next one is, and what was not yet acknowledged is sent again: the call
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import sys
 import threading
@@ -333,13 +334,15 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
         raise BoardError("the virtual board cannot be started: sys.executable is not set")
     root = str(Path(__file__).resolve().parents[2])
     flags = 0
+    windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    with private_files.open_text(place.log_path, "a") as log:
+    with open(os.devnull, "a") if windows else private_files.open_text(place.log_path, "a") as log:
         process = start_outside_of_job(
             [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
+            # On Windows the server writes its log itself: server.py says why.
             stderr=log,
             cwd=place.folder,
             start_new_session=True,

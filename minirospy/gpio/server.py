@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import os
 import secrets
 import sys
@@ -54,6 +55,9 @@ LOCK_PATIENCE = 5.0
 def main(argv: list[str]) -> int:
     """Serve the board NAME of FOLDER until nobody needs it; 0 also when another server has it."""
     place = Place(argv[1], Path(argv[0]))
+    if sys.platform == "win32":
+        # Not the open file that it is elsewhere: Windows could not remove that, nor its folder.
+        sys.stderr = _LogOnDemand(place.log_path)
     # A board that somebody kept stays, also when another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not place.state_path.exists()
     with _locked(place) as owned:
@@ -61,10 +65,21 @@ def main(argv: list[str]) -> int:
             asyncio.run(_Server(place).serve())
     if owned and is_temporary:
         for path in (place.state_path, place.log_path, place.lock_path):
-            # Windows removes no file that is open, such as the log of this process.
             with contextlib.suppress(OSError):
-                path.unlink()
+                private_files.remove_file(path)
     return 0
+
+
+class _LogOnDemand(io.TextIOBase):
+    """A standard error that opens its file for each text, so that the file exists only where something went wrong."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(OSError), private_files.open_text(self._path, "a") as file:
+            file.write(text)
+        return len(text)
 
 
 class _Server:
@@ -92,7 +107,9 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            address.unlink(missing_ok=True)
+            # Where a client keeps it open, the next server replaces it.
+            with contextlib.suppress(OSError):
+                private_files.remove_file(address)
             for client in list(self._clients):
                 client.drop()
             self._save()
@@ -210,7 +227,7 @@ def _write_private(path: Path, data: bytes) -> None:
     fresh = path.with_name(path.name + ".new")
     with os.fdopen(private_files.create_file(fresh), "wb") as file:
         file.write(data)
-    fresh.replace(path)
+    private_files.replace_file(fresh, path)
 
 
 @contextlib.contextmanager

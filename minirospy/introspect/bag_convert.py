@@ -6,6 +6,7 @@ import contextlib
 import os
 from collections.abc import Callable
 
+from minirospy import private_files
 from minirospy.bag.compression import check_compression
 from minirospy.bag.mcap_writer import McapWriter, check_mcap_compression
 from minirospy.bag.writer import BagWriter
@@ -61,7 +62,7 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
                     done += len(message.body)
                     step(done)
                 writer.close()
-            os.replace(partial, target)
+            private_files.replace_file(partial, target)
         except BaseException:
             with contextlib.suppress(OSError):
                 os.unlink(partial)

@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import BinaryIO, Protocol, cast
 
+from minirospy import private_files
 from minirospy.bag.writer import BagWriter, Buffer
 from minirospy.errors import BagFormatError
 from minirospy.recording.disk import DiskThread, QueuedFile
@@ -140,7 +141,7 @@ class BagFile:
         try:
             self._writer.close()
             self._stream.close_file()
-            self._active.replace(self._path)
+            private_files.replace_file(self._active, self._path)
         except Exception as error:  # noqa: BLE001 - also of a chunk's compression: MemoryError, for example
             self._salvage(error)
 
@@ -164,7 +165,7 @@ class BagFile:
         with contextlib.suppress(OSError):
             self._stream.close_file()
             if lost >= 0:
-                self._active.replace(self._path)
+                private_files.replace_file(self._active, self._path)
         self._report(self, error, lost)
 
 

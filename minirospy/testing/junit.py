@@ -189,7 +189,7 @@ class Result:
         part = file.with_name(f"{file.name}.part")
         with os.fdopen(private_files.create_file(part, 0o666), "wb") as stream:
             stream.write(self.xml())
-        part.replace(file)
+        private_files.replace_file(part, file)
 
 
 # --- reading

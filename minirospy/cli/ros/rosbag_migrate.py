@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from minirospy import private_files
 from minirospy.cli.command import complain
 from minirospy.cli.parser import Misuse, Parser
 from minirospy.cli.ros.rosbag_info import report, unreadable
@@ -189,7 +190,7 @@ def _fix(words: list[str], noplugins: bool, force: bool) -> int:
             make_migrator(rule_files, noplugins=noplugins), source, temporary, report, force=force
         )
         if not missing:
-            os.replace(temporary, target)
+            private_files.replace_file(temporary, target)
     except (BagError, OSError) as error:
         if isinstance(error, OSError) and error.filename == temporary:
             error.filename = target

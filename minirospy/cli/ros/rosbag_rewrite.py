@@ -9,6 +9,7 @@ import contextlib
 import os
 from collections.abc import Callable
 
+from minirospy import private_files
 from minirospy.bag import compression
 from minirospy.cli.command import warn
 from minirospy.cli.parser import Misuse, Parser
@@ -142,7 +143,7 @@ def _rewrite(
                 report(f"Skipping {path}. Backup path {backup} already exists.")
             continue
         try:
-            os.replace(path, backup)
+            private_files.replace_file(path, backup)
         except OSError as error:
             report(f"ERROR moving {path} to {backup}: {error}")
             continue
@@ -151,7 +152,7 @@ def _rewrite(
         except BaseException:
             # Ctrl-C, or a disk that is full: the bag is again where it was.
             with contextlib.suppress(OSError):
-                os.replace(backup, path)
+                private_files.replace_file(backup, path)
             raise
     return status
 
@@ -177,7 +178,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
     except OSError as error:
         report(f"ERROR writing to {target}: {error}")
         if source != path:
-            os.replace(source, path)
+            private_files.replace_file(source, path)
         return False
 
     try:
@@ -192,7 +193,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
             os.remove(target)
         report(f"ERROR operating on {path}: {error}")
         if source != path:
-            os.replace(source, path)
+            private_files.replace_file(source, path)
     return True
 
 

@@ -265,9 +265,9 @@ class Journal:
             # Windows replaces no file that is open, and with none that is.
             self._close_file()
             os.close(file)
-            os.replace(self._new_path, self.path)
+            private_files.replace_file(self._new_path, self.path)
             return private_files.open_file(self.path, os.O_RDWR | os.O_APPEND)
-        os.replace(self._new_path, self.path)
+        private_files.replace_file(self._new_path, self.path)
         self._close_file()
         return file
 
@@ -334,7 +334,7 @@ class Journal:
 
     def _set_aside(self) -> Path | None:
         try:
-            os.replace(self.path, self._copy_path)
+            private_files.replace_file(self.path, self._copy_path)
         except OSError:
             return None
         return self._copy_path
