@@ -1,4 +1,4 @@
-"""Builds and checks what is released: `make release`. Out come `dist/*.tar.gz` and `dist/*.whl`; nothing is uploaded.
+"""Builds and checks what is released: `make release`. Out come sdist, wheel and SBOM in `dist/`; nothing is uploaded.
 
 Both are built from the files of the last commit, twice, and have to be the same bytes. Then `twine check`, the wheel's size and
 contents, and `minirospy demo` in a new environment of every Python from 3.10 on that is on the path or of pyenv.
@@ -18,6 +18,8 @@ import tempfile
 import zipfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
+
+from tools.sbom import SbomError, make_sbom
 
 ROOT = Path(__file__).parents[1]
 
@@ -50,21 +52,23 @@ def main() -> int:
         dist = ROOT / "dist"
         with tempfile.TemporaryDirectory() as scratch:
             built = _build(Path(scratch, "first"), epoch)
-            _compare(built, _build(Path(scratch, "second"), epoch))
+            _compare(built, _build(Path(scratch, "second in another folder"), epoch, elsewhere=True))
             _run(sys.executable, "-m", "twine", "check", "--strict", *map(str, built))
             (wheel,) = (path for path in built if path.suffix == ".whl")
             tracked = _run("git", "ls-files", "-z").split("\0")
             if faults := faults_of_wheel(_contents(wheel), wheel.stat().st_size, tracked):
                 raise ReleaseError("\n".join(f"{wheel.name}: {fault}" for fault in faults))
 
-            for python in _pythons():
+            bill = make_sbom(wheel, int(epoch))
+            for python in find_pythons().values():
                 _try_out(python, wheel, Path(scratch))
                 print(f"{python}: installed, `minirospy demo` works", flush=True)
             shutil.rmtree(dist, ignore_errors=True)
             dist.mkdir()
             for path in built:
                 shutil.copy2(path, dist)
-    except ReleaseError as error:
+            (dist / f"{wheel.name.partition('-py3')[0]}.cdx.json").write_text(bill, encoding="utf-8")
+    except (ReleaseError, SbomError) as error:
         print(f"release: ERROR: {error}", file=sys.stderr)
         return 1
 
@@ -124,14 +128,23 @@ def _contents(wheel: Path) -> dict[str, int]:
         return {each.filename: each.file_size for each in archive.infolist()}
 
 
-def _build(folder: Path, epoch: str) -> list[Path]:
-    """Build the last commit, the wheel out of the unpacked sdist; return both files."""
+def _build(folder: Path, epoch: str, *, elsewhere: bool = False) -> list[Path]:
+    """Build the last commit, the wheel out of the unpacked sdist; return both files.
+
+    ``elsewhere``: as in the shell of somebody else, with another time zone, language, file mode and order of sets.
+    """
     source = folder / "minirospy"
     archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as tar:
         tar.extractall(source)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder / "dist"), str(source)]
-    _run(*command, environ={**os.environ, "SOURCE_DATE_EPOCH": epoch})
+    other = {"TZ": "Asia/Kathmandu", "LC_ALL": "C", "PYTHONHASHSEED": "4711"} if elsewhere else {}
+    before = os.umask(0o077) if elsewhere else None
+    try:
+        _run(*command, environ={**os.environ, "SOURCE_DATE_EPOCH": epoch, **other})
+    finally:
+        if before is not None:
+            os.umask(before)
     return sorted((folder / "dist").iterdir())
 
 
@@ -141,28 +154,34 @@ def _compare(first: list[Path], second: list[Path]) -> None:
             raise ReleaseError(f"{one.name}: two builds of one commit differ")
 
 
-def _pythons() -> list[str]:
-    """Return one interpreter of each version from OLDEST on."""
+def find_pythons() -> dict[str, str]:
+    """Return one interpreter of each version from OLDEST on: "3.13" or, of a build without the GIL, "3.13t", and its path."""
     pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv") / "versions"
-    names = [f"python3.{minor}" for minor in range(OLDEST[1], 20)]
+    names = [f"python3.{minor}{build}" for minor in range(OLDEST[1], 20) for build in ("", "t")]
     found = [
         *(path for path in map(shutil.which, names) if path),
         *map(str, pyenv.glob("3.*/bin/python")),
         sys.executable,
     ]
-    versions: dict[tuple[int, int], str] = {}
+    ask = "import sys, sysconfig, ensurepip\n"
+    ask += "print(*sys.version_info[:2], sysconfig.get_config_var('Py_GIL_DISABLED') or 0)"
+    versions: dict[tuple[int, int, int], str] = {}
     for path in found:
         done = subprocess.run(
-            [path, "-c", "import sys, ensurepip; print(*sys.version_info[:2])"],
+            [path, "-c", ask],
             capture_output=True,
             text=True,
             check=False,
         )
         # pyenv's commands exist also for versions that are not chosen; Debian's have no ensurepip without python3-venv.
         if done.returncode == 0:
-            major, minor = map(int, done.stdout.split())
-            versions.setdefault((major, minor), path)
-    return [path for version, path in sorted(versions.items()) if version >= OLDEST]
+            major, minor, is_free = map(int, done.stdout.split())
+            versions.setdefault((major, minor, is_free), path)
+    return {
+        f"{major}.{minor}{'t' * is_free}": path
+        for (major, minor, is_free), path in sorted(versions.items())
+        if (major, minor) >= OLDEST
+    }
 
 
 def _try_out(python: str, wheel: Path, scratch: Path) -> None:
