@@ -14,7 +14,7 @@ CHECKED := tests/graph tests/wire tests/idl tests/introspect tests/overlay \
   tests/test_architecture.py tests/test_layers.py tests/test_names.py tests/test_times.py tests/test_clock.py \
   tests/test_environment.py tests/test_escape.py tests/test_private_files.py tests/test_scanner.py
 
-.PHONY: demo check test interop ros2 windows lint guard bench fuzz mutants release clean help
+.PHONY: demo check test interop ros2 windows pythons lint guard bench fuzz mutants site release clean help
 
 help:
 	@echo "make demo     show the workshop's button and LED on the virtual board"
@@ -22,12 +22,14 @@ help:
 	@echo "make test     run every test: some minutes"
 	@echo "make interop  test against Debian's real ROS 1, which it installs (needs apt-get and root)"
 	@echo "make windows  test on Windows' CPython by Wine, which it installs (needs apt-get and root)"
+	@echo "make pythons  run the fast tests on every Python found, with -X dev"
 	@echo "make ros2     test the bridge to ROS 2 against real ROS 2, which it installs from PyPI"
 	@echo "make lint     check style (ruff) and types (mypy)"
 	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and to the bridge, ten minutes each"
 	@echo "make mutants  put small faults into graph/, wire/ and the journal; list those that no test notices"
+	@echo "make site     write the documentation as a site to build/site"
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"
 
@@ -55,6 +57,9 @@ windows: $(STAMP)
 	@$(BIN)/python -m pytest tests/windows
 	@$(BIN)/python tests/windows/windows.py test $(WINDOWS_TESTS)
 
+pythons: $(STAMP)
+	@$(BIN)/python tools/pythons.py $(PYTHONS) -- $(CHECKED)
+
 ros2: $(STAMP)
 	@$(BIN)/python tests/interop/install_ros2.py
 	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py
@@ -77,6 +82,10 @@ lint: $(STAMP)
 
 mutants: $(STAMP)
 	@$(BIN)/python tests/mutants.py
+
+site: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --clean
 
 release: $(STAMP)
 	@$(BIN)/python -m pip install -q twine

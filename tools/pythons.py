@@ -1,0 +1,78 @@
+"""The fast tests on every Python from 3.10 on that is found: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
+
+Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its test.
+Versions as arguments (`python tools/pythons.py 3.10 3.14t`) choose some; a path of an interpreter is taken as it is. What stands
+behind `--` goes to pytest. Exit status: 1 where a test failed on one of them.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tools.release import find_pythons
+
+ROOT = Path(__file__).parents[1]
+
+FOLDER = ROOT / "build" / "pythons"
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the tests; return the exit status."""
+    split = list(words).index("--") if "--" in words else len(words)
+    chosen, arguments = words[:split], list(words[split + 1 :])
+    pythons = [word for word in chosen if os.sep in word]
+    names = {word for word in chosen if os.sep not in word}
+    found = find_pythons() if names or not chosen else {}
+    if missing := names - set(found):
+        sys.exit(f"not found: {', '.join(sorted(missing))}; there are {', '.join(found)}")
+    pythons += [path for name, path in found.items() if name in names or not chosen]
+
+    failed = []
+    for python in pythons:
+        label = _version(python)
+        start = time.monotonic()
+        passed = _run_tests(_environment(python, label), arguments)
+        print(
+            f"Python {label}: {'passed' if passed else 'FAILED'} in {time.monotonic() - start:.0f} s",
+            flush=True,
+        )
+        if not passed:
+            failed.append(label)
+    if failed:
+        print(f"failed on Python {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def _version(python: str) -> str:
+    """Return a name such as 3.13.0, or 3.14.0t of a build without the GIL."""
+    code = "import sys, sysconfig as s; print(sys.version.split()[0] + 't' * bool(s.get_config_var('Py_GIL_DISABLED')))"
+    return subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def _environment(python: str, label: str) -> Path:
+    """Return the interpreter of an environment with this checkout and what its tests need; it is made once."""
+    folder = FOLDER / label
+    inner = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    stamp = folder / ".installed"
+    if not stamp.exists() or stamp.stat().st_mtime < (ROOT / "pyproject.toml").stat().st_mtime:
+        subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=True)
+        pip = [str(inner), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+        subprocess.run([*pip, "--editable", f"{ROOT}[dev]"], check=True)
+        stamp.touch()
+    return inner
+
+
+def _run_tests(python: Path, arguments: list[str]) -> bool:
+    options = ["-q", "-p", "no:cacheprovider", "-n", "2", "--dist", "worksteal"]
+    command = [str(python), "-X", "dev", "-m", "pytest", *options, *arguments]
+    environ = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "PYTHON"))}
+    return subprocess.run(command, cwd=ROOT, env=environ, check=False).returncode == 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
