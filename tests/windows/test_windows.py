@@ -1,160 +1,26 @@
-"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and what is left of a killed launcher.
-
-`make windows` sets the environment up; without it these tests are skipped.
-"""
+"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and what is left of a killed launcher."""
 
 from __future__ import annotations
 
 import os
-import queue
 import subprocess
 import sys
-import threading
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.conftest import free_port, write_files
-from tests.windows.windows import Windows
-
-WINDOWS = Windows()
-pytestmark = [
-    pytest.mark.skipif(not WINDOWS.is_ready, reason="`make windows` sets it up"),
-    pytest.mark.timeout(900),
-]
-
-SECONDS = 240.0
-"""A process takes seconds to start under Wine, several times as many on a busy machine."""
-
-MANIFEST = """<package><name>pkg</name><version>1.0.0</version><description>d</description>
-<maintainer email="a@b.c">m</maintainer><license>BSD</license></package>"""
-
-TALKER = """#!/usr/bin/env python
-import rospy
-from std_msgs.msg import String
-rospy.init_node("talker")
-publisher = rospy.Publisher("/words", String, queue_size=10)
-while not rospy.is_shutdown():
-    publisher.publish("Größe aus {}".format(rospy.get_param("~place", "nowhere")))
-    rospy.sleep(0.05)
-"""
-
-ESCAPED = r"Gr\xF6\xDFe"
-"""As rostopic prints it, in YAML."""
-
-WAIT = """#!/usr/bin/env python
-import rospy
-rospy.init_node("wait")
-rospy.loginfo("Größe → 1")
-print("waiting: Größe", flush=True)
-rospy.spin()
-"""
-
-
-class Run:
-    """A program of Windows that runs; what it prints is read as it comes."""
-
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
-        self.process = process
-        self.said = ""
-        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def until(self, *words: str) -> str:
-        """Read until all words were printed; return what was printed so far."""
-        end = time.monotonic() + SECONDS
-        while not all(word in self.said for word in words):
-            try:
-                line = self._lines.get(timeout=max(0.0, end - time.monotonic()))
-            except queue.Empty:
-                pytest.fail(f"{words} were not printed, but:\n{self.said}")
-            if not line:
-                pytest.fail(f"it ended before it printed {words}:\n{self.said}")
-            self.said += line
-        return self.said
-
-    def rest(self) -> str:
-        """Return what a program that has ended has printed."""
-        self._reader.join()
-        while line := self._lines.get():
-            self.said += line
-        return self.said
-
-    def close(self) -> None:
-        """End it by force."""
-        self.process.kill()
-        self.process.wait()
-        # Closed by the last that has it: what a launcher has started, too.
-        self._reader.join()
-        assert self.process.stdout
-        self.process.stdout.close()
-
-    def _read(self) -> None:
-        assert self.process.stdout
-        for line in self.process.stdout:
-            self._lines.put(line.decode("cp1252", "replace").replace("\r\n", "\n"))
-        self._lines.put("")
-
-
-Start = Callable[..., Run]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _wine_server() -> Iterator[None]:
-    WINDOWS.start_server()
-    yield
-    WINDOWS.stop_server()
-
-
-@pytest.fixture
-def place(tmp_path: Path) -> Path:
-    """Return a folder whose name has a space and an umlaut."""
-    folder = tmp_path / "Übung eins"
-    folder.mkdir()
-    return folder
-
-
-@pytest.fixture
-def environ(place: Path) -> dict[str, str]:
-    return {
-        "ROS_MASTER_URI": f"http://localhost:{free_port()}",
-        "ROS_HOME": WINDOWS.path(place / "home"),
-        "ROS_PACKAGE_PATH": WINDOWS.path(place),
-        "MINIROSPY_BOARD": place.parent.name,
-        "MINIROSPY_LOCAL": "1",
-        "PYTHONUNBUFFERED": "1",
-    }
-
-
-@pytest.fixture
-def start(place: Path, environ: dict[str, str]) -> Iterator[Start]:
-    """Return a function that starts a command of Windows; in the end all are ended by force, and no process is left."""
-    runs: list[Run] = []
-
-    def start(*words: str, **more: str) -> Run:
-        runs.append(Run(WINDOWS.popen(*words, folder=place, environ={**environ, **more})))
-        return runs[-1]
-
-    yield start
-    for run in runs:
-        run.close()
-    no_process_left()
-
-
-def no_process_left() -> None:
-    """Wait until no Python of Windows runs any more."""
-    end = time.monotonic() + SECONDS
-    while left := WINDOWS.processes():
-        assert time.monotonic() < end, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
-        time.sleep(0.2)
-
-
-def command(name: str) -> str:
-    """Return the file of a command, as pip for Windows made it."""
-    return rf"C:\Python312\Scripts\{name}.exe"
+from tests.conftest import write_files
+from tests.windows.programs import (
+    ESCAPED,
+    MANIFEST,
+    SECONDS,
+    TALKER,
+    WAIT,
+    WINDOWS,
+    Start,
+    command,
+    no_process_left,
+)
 
 
 def test_demo(environ: dict[str, str], place: Path) -> None:

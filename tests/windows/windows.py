@@ -7,11 +7,13 @@ A program, too: ``python tests/windows/windows.py setup``; ``run ARGUMENT ...`` 
 from __future__ import annotations
 
 import os
+import select
 import shutil
 import subprocess
 import sys
 import tarfile
 import tempfile
+import time
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -72,9 +74,18 @@ class Windows:
         self._install_wheel()
 
     def popen(
-        self, *words: str, folder: Path | None = None, environ: Mapping[str, str] | None = None
+        self,
+        *words: str,
+        folder: Path | None = None,
+        environ: Mapping[str, str] | None = None,
+        has_input: bool = False,
+        console: int | None = None,
     ) -> subprocess.Popen[bytes]:
-        """Start a program of Windows: ``.py`` and options go to python.exe. Its streams are pipes, its input is empty."""
+        """Start a program of Windows: ``.py`` and options go to python.exe.
+
+        Its streams are pipes, its input is empty, or with ``has_input`` for the caller to close; or they are ``console``, a
+        terminal of Linux.
+        """
         command = (
             [_wine(), *words]
             if words[0].endswith((".exe", "cmd"))
@@ -83,14 +94,15 @@ class Windows:
         process = subprocess.Popen(
             command,
             # No file and no /dev/null: Python for Windows takes neither for a standard stream in Wine.
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            stdin=subprocess.PIPE if console is None else console,
+            stdout=subprocess.PIPE if console is None else console,
             stderr=subprocess.STDOUT,
             cwd=folder,
             env=self._environment(environ or {}),
+            start_new_session=console is not None,
         )
-        assert process.stdin
-        process.stdin.close()
+        if process.stdin and not has_input:
+            process.stdin.close()
         return process
 
     def run(
@@ -102,10 +114,8 @@ class Windows:
     ) -> tuple[int, str]:
         """Run a program of Windows; return its exit status and what it printed, in Windows' code page."""
         with self.popen(*words, folder=folder, environ=environ) as process:
-            assert process.stdout
-            process.stdin = None
             try:
-                printed, _ = process.communicate(timeout=timeout)
+                printed = _printed_until_exit(process, timeout)
             except BaseException:
                 process.kill()
                 raise
@@ -172,7 +182,6 @@ class Windows:
             # No windows that ask whether to download a browser, and no menu entries of Linux.
             "WINEDLLOVERRIDES": "mscoree,mshtml,winemenubuilder.exe=",
             "WINEPATH": rf"{PYTHON};{PYTHON}\Scripts",
-            "PYTHONDONTWRITEBYTECODE": "1",
             **more,
         }
 
@@ -244,6 +253,28 @@ class Windows:
 
 _PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
 _FOR_WINDOWS = ["--platform", "win_amd64", "--python-version", VERSION, "--only-binary=:all:", "--upgrade"]
+
+
+def _printed_until_exit(process: subprocess.Popen[bytes], timeout: float) -> bytes:
+    """Return what a process prints until it exits: the end of the stream may come late.
+
+    In Wine, unlike in Windows, what it starts keeps its standard error: a virtual board, which goes on for others.
+    """
+    assert process.stdout
+    file = process.stdout.fileno()
+    end = time.monotonic() + timeout
+    printed = b""
+    while time.monotonic() < end:
+        has_exited = process.poll() is not None
+        if select.select([file], [], [], 0.1)[0]:
+            data = os.read(file, 65536)
+            printed += data
+            if not data:
+                process.wait(max(0.0, end - time.monotonic()))
+                return printed
+        elif has_exited:
+            return printed
+    raise subprocess.TimeoutExpired(process.args, timeout, printed)
 
 
 def _wine() -> str:

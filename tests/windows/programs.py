@@ -1,0 +1,113 @@
+"""What the tests of Windows share: programs that run in Wine, the commands, and the files of a node."""
+
+from __future__ import annotations
+
+import queue
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.windows.windows import Windows
+
+WINDOWS = Windows()
+
+SECONDS = 240.0
+"""A process takes seconds to start under Wine, several times as many on a busy machine."""
+
+MANIFEST = """<package><name>pkg</name><version>1.0.0</version><description>d</description>
+<maintainer email="a@b.c">m</maintainer><license>BSD</license></package>"""
+
+TALKER = """#!/usr/bin/env python
+import rospy
+from std_msgs.msg import String
+rospy.init_node("talker")
+publisher = rospy.Publisher("/words", String, queue_size=10)
+while not rospy.is_shutdown():
+    publisher.publish("Größe aus {}".format(rospy.get_param("~place", "nowhere")))
+    rospy.sleep(0.05)
+"""
+
+ESCAPED = r"Gr\xF6\xDFe"
+"""As rostopic prints it, in YAML."""
+
+WAIT = """#!/usr/bin/env python
+import rospy
+rospy.init_node("wait")
+rospy.loginfo("Größe → 1")
+print("waiting: Größe", flush=True)
+rospy.spin()
+"""
+
+
+class Run:
+    """A program of Windows that runs; what it prints is read as it comes."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process = process
+        self.said = ""
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def until(self, *words: str) -> str:
+        """Read until all words were printed; return what was printed so far."""
+        end = time.monotonic() + SECONDS
+        while not all(word in self.said for word in words):
+            try:
+                line = self._lines.get(timeout=max(0.0, end - time.monotonic()))
+            except queue.Empty:
+                pytest.fail(f"{words} were not printed, but:\n{self.said}")
+            if not line:
+                pytest.fail(f"it ended before it printed {words}:\n{self.said}")
+            self.said += line
+        return self.said
+
+    def available(self) -> str:
+        """Return what was printed so far."""
+        while not self._lines.empty():
+            line = self._lines.get()
+            assert line, f"it ended:\n{self.said}"
+            self.said += line
+        return self.said
+
+    def rest(self) -> str:
+        """Return what a program that has ended has printed."""
+        self._reader.join()
+        while line := self._lines.get():
+            self.said += line
+        return self.said
+
+    def close(self) -> None:
+        """End it by force."""
+        self.process.kill()
+        self.process.wait()
+        # Closed by the last that has it: what a launcher has started, too.
+        self._reader.join()
+        assert self.process.stdout
+        self.process.stdout.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout
+        for line in self.process.stdout:
+            self._lines.put(line.decode("cp1252", "replace").replace("\r\n", "\n"))
+        self._lines.put("")
+
+
+Start = Callable[..., Run]
+
+
+def no_process_left() -> None:
+    """Wait until no Python of Windows runs any more."""
+    end = time.monotonic() + SECONDS
+    while left := WINDOWS.processes():
+        assert time.monotonic() < end, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
+        time.sleep(0.2)
+
+
+def command(name: str) -> str:
+    """Return the file of a command, as pip for Windows made it."""
+    return rf"C:\Python312\Scripts\{name}.exe"
