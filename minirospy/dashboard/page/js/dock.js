@@ -1,12 +1,18 @@
 // Several views on one page: panes in rows and columns, resized at their dividers, docked by dragging their heads.
 
 import { addressOf, wordsOf } from "./address.js";
-import { fill, h, setText } from "./dom.js";
+import { fill, h, setText, svg } from "./dom.js";
 import { sideAt } from "./layout.js";
 import { t } from "./texts.js";
 
 const DRAG_PIXELS = 6; // less is a click
 const EDGE_PIXELS = 18; // of the whole layout, where a pane is docked beside all others
+const ICONS = {
+  right: "M2 3h12v10H2zM8 3v10",
+  bottom: "M2 3h12v10H2zM2 8h12",
+  largest: "M2 6V3h4M10 3h4v3M14 10v3h-4M6 13H2v-3",
+  close: "M4 4l8 8M12 4l-8 8",
+};
 const STEP = 0.05; // of a divider that is moved by keys
 
 export class Dock {
@@ -79,15 +85,16 @@ export class Dock {
     for (const [name, [title]] of Object.entries(this.views)) choice.append(h("option", { value: name }, t(title)));
     if (!Object.hasOwn(this.views, node.view)) choice.append(h("option", { value: node.view }, node.view));
     choice.value = node.view;
-    const button = (label, text, react) => h("button", { type: "button", class: "pane-button", title: label, "aria-label": label, onclick: react }, text);
+    const button = (label, icon, react) => h("button", { type: "button", title: label, "aria-label": label, onclick: react },
+      svg("svg", { class: "icon", viewBox: "0 0 16 16", "aria-hidden": "true" }, svg("path", { d: ICONS[icon] })));
     const handle = h("span", { class: "pane-grip", tabindex: 0, role: "button", "aria-label": t("Move this pane: arrow keys, or drag"), title: t("Drag to move"),
       onkeydown: (event) => this.moveByKey(event, node) }, "⠿");
-    const largest = button(t("Maximise"), "⛶", () => this.maximise(node));
+    const largest = button(t("Maximise"), "largest", () => this.maximise(node));
     const head = h("div", { class: "pane-head", ondblclick: (event) => { if (event.target === head) this.maximise(node); } }, handle, choice,
       h("span", { class: "pane-about" }),
-      button(t("Split: another view to the right"), "◫", () => this.split(node, "right")),
-      button(t("Split: another view below"), "⊟", () => this.split(node, "bottom")),
-      largest, button(t("Close this pane"), "×", () => this.remove(node)));
+      button(t("Split: another view to the right"), "right", () => this.split(node, "right")),
+      button(t("Split: another view below"), "bottom", () => this.split(node, "bottom")),
+      largest, button(t("Close this pane"), "close", () => this.remove(node)));
     const body = h("div", { class: "pane-body view" });
     const element = h("section", { class: "pane", onpointerdown: () => this.activate(node.id), onfocusin: () => this.activate(node.id) }, head, body);
     element.dataset.pane = node.id;
