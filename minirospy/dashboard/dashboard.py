@@ -1,10 +1,11 @@
-"""The dashboard as a whole: a bridge at one port, with the page, the board's door and the tools' door in it."""
+"""The dashboard as a whole: a bridge at one port, with the page and the doors of the board, of driving and of tools in it."""
 
 from __future__ import annotations
 
 from minirospy.aio.node import Node
 from minirospy.bridge.bridge import Addition, Bridge, BridgeOptions
 from minirospy.dashboard.board_door import BoardDoor
+from minirospy.dashboard.drive_door import DriveDoor
 from minirospy.dashboard.files import handlers, read_folder
 from minirospy.dashboard.tools_door import ToolsDoor
 
@@ -20,9 +21,8 @@ class Dashboard:
         """``options.foxglove_port`` is the port of the page and of its data."""
         self._board = BoardDoor()
         self._tools = ToolsDoor()
-        self.bridge = Bridge(
-            node, options, addition=Addition((self._board, self._tools), handlers(read_folder()))
-        )
+        doors = (self._board, self._tools, DriveDoor(lambda: self.bridge.graph))
+        self.bridge = Bridge(node, options, addition=Addition(doors, handlers(read_folder())))
 
     @property
     def port(self) -> int:

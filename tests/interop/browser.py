@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import psutil
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -175,6 +176,28 @@ class Page:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._folder.cleanup()
+
+    def start(self, script: str, method: str = "Runtime.evaluate") -> None:
+        """Start a script, as one that hangs, or a method without parameters, and wait for no answer."""
+        params = {"expression": script} if script else {}
+        self._socket.send(json.dumps({"id": next(self._numbers), "method": method, "params": params}))
+
+    def processes(self) -> list[psutil.Process]:
+        """Return the browser and its children; none where it has ended."""
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process = psutil.Process(self._process.pid)
+            return [process, *process.children(recursive=True)]
+        return []
+
+    def kill(self) -> None:
+        """Kill all processes of the browser, as a crash does."""
+        for each in self.processes():
+            with contextlib.suppress(psutil.NoSuchProcess):
+                each.kill()
+        self._process.wait(60)
+        with contextlib.suppress(ConnectionClosed):
+            self._stack.close()
         self._folder.cleanup()
 
     def _connect(self) -> contextlib.AbstractContextManager[ClientConnection]:

@@ -1,9 +1,11 @@
-// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist. Who holds nothing sends nothing: the last message is zero.
+// Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server publishes them,
+// and zero where nothing is held any more, or the page is lost.
 
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
+import { Drive } from "../drive.js";
+import { joyOf } from "../joy.js";
 
 const TYPE = "geometry_msgs/Twist";
-const SCHEMA = `Vector3 linear\nVector3 angular\n${"=".repeat(80)}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n`;
 const PERIOD_MS = 50;
 const RADIUS = 100; // of the stick's way
 const DEAD_ZONE = 0.1; // of a gamepad's stick
@@ -20,7 +22,9 @@ export class Teleop {
     this.keys = new Set();
     this.stick = null; // [forward, left] of -1 to 1 while it is held
     this.isDriving = false;
-    this.isAdvertised = false;
+    this.joyTopic = words.get("joy") ?? "";
+    this.hasJoy = false; // whether a joystick's state was sent that may not be at rest
+    this.drive = new Drive(link, (fields) => this.answered(fields));
     const field = (label, value, attributes) => h("input", { "aria-label": label, value, autocomplete: "off", ...attributes });
     this.where = field("Topic", this.topic, { type: "text", class: "grow", onchange: () => this.choose(this.where.value.trim()) });
     this.topics = h("datalist", { id: uniqueId("twists") });
@@ -28,6 +32,7 @@ export class Teleop {
     const speed = (label, name, usual) => field(label, words.get(name) || usual, { type: "number", min: 0, step: "any", onchange: () => this.remember() });
     this.forward = speed("Metres a second", "linear", "0.5");
     this.turn = speed("Radians a second", "angular", "1");
+    this.joy = h("input", { type: "checkbox", checked: Boolean(this.joyTopic), onchange: () => this.switchJoy() });
     this.knob = svg("circle", { class: "knob", r: 38 });
     this.pad = svg("svg", { class: "stick", viewBox: "-150 -150 300 300", tabindex: 0, role: "application", "aria-label": "Stick: up is forward" },
       svg("circle", { class: "way", r: 138 }), svg("path", { class: "cross", d: "M 0 -130 V 130 M -130 0 H 130" }), this.knob);
@@ -47,7 +52,8 @@ export class Teleop {
       h("div", { class: "bar" }, this.where, this.topics, h("label", {}, this.forward, "m/s"), h("label", {}, this.turn, "rad/s"),
         h("button", { type: "button", class: "stop", onclick: () => this.release(true) }, "Stop")),
       h("div", { class: "panel teleop" }, this.pad, this.values,
-        h("p", { class: "muted hint" }, "Hold the stick, or the arrow keys or W A S D. With a gamepad hold a shoulder button and push its left stick."), this.device, this.problem));
+        h("p", { class: "muted hint" }, "Hold the stick, or the arrow keys or W A S D. With a gamepad hold a shoulder button and push its left stick."), this.device,
+        h("label", { class: "muted hint" }, this.joy, " publish the gamepad as /joy"), this.problem));
     this.ends = [link.watch(["channels", "graph", "state"], () => this.update())];
     this.listen(window, "keydown", (event) => this.key(event));
     this.listen(window, "keyup", (event) => this.key(event));
@@ -66,7 +72,7 @@ export class Teleop {
     clearInterval(this.timer);
     this.release();
     for (const end of this.ends) end();
-    if (this.isAdvertised) this.link.unpublish(this.topic);
+    this.drive.close();
   }
 
   update() {
@@ -75,10 +81,8 @@ export class Teleop {
     // A topic that is only subscribed has no channel yet, and no type here: its name says enough.
     const waiting = [...graph.subscribed.keys()].filter((topic) => topic.endsWith("cmd_vel"));
     fill(this.topics, [...new Set([...typed, ...waiting])].sort().map((topic) => h("option", { value: topic })));
-    if (state !== "open") {
-      this.isAdvertised = false;
-      this.drop();
-    } else {
+    if (state !== "open") this.drop();
+    else {
       const other = channels.get(this.topic);
       setText(this.problem, !mayWrite ? "This token is read-only: it drives nothing." : other && other.type !== TYPE ? `${this.topic} has the type ${other.type}, not ${TYPE}` : "");
     }
@@ -86,8 +90,7 @@ export class Teleop {
 
   choose(topic) {
     this.release();
-    if (this.isAdvertised) this.link.unpublish(this.topic);
-    this.isAdvertised = false;
+    this.drive.send({ leave: this.topic });
     this.topic = topic.startsWith("/") ? topic : `/${topic}`;
     this.where.value = this.topic;
     this.remember();
@@ -95,7 +98,7 @@ export class Teleop {
   }
 
   remember() {
-    this.place.remember({ topic: this.topic, linear: this.forward.value, angular: this.turn.value });
+    this.place.remember({ topic: this.topic, linear: this.forward.value, angular: this.turn.value, joy: this.joyTopic });
   }
 
   // --- what is held
@@ -142,16 +145,39 @@ export class Teleop {
     return sums.map((value) => Math.max(-1, Math.min(1, value)));
   }
 
+  // --- a gamepad as it is
+
+  switchJoy() {
+    if (!this.joy.checked) this.restJoy();
+    this.joyTopic = this.joy.checked ? "/joy" : "";
+    this.remember();
+  }
+
+  sendJoy() {
+    if (!this.joyTopic || !this.place.isActive()) return this.restJoy();
+    const pad = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected);
+    if (!pad) return this.restJoy();
+    this.hasJoy = true;
+    return this.drive.send({ topic: this.joyTopic, ...joyOf(pad) });
+  }
+
+  /** Let the joystick be at rest: the server publishes that. */
+  restJoy() {
+    if (this.hasJoy) this.drive.send({ leave: this.joyTopic });
+    this.hasJoy = false;
+  }
+
   // --- what is sent
 
   tick() {
-    if (this.link.state !== "open" || !this.link.mayWrite || document.hidden) return;
+    if (!this.drive.isOpen || !this.link.mayWrite || document.hidden) return;
+    this.sendJoy();
     const held = this.held();
-    if (held) this.drive(held);
+    if (held) this.push(held);
     else if (this.isDriving) this.release();
   }
 
-  drive([forward, left]) {
+  push([forward, left]) {
     this.isDriving = true;
     const linear = forward * (Number(this.forward.value) || 0);
     const angular = left * (Number(this.turn.value) || 0);
@@ -164,7 +190,8 @@ export class Teleop {
   release(isAlways = false) {
     const wasDriving = this.isDriving || isAlways;
     this.drop();
-    if (wasDriving && this.link.state === "open" && this.link.mayWrite) this.send(0, 0);
+    this.restJoy();
+    if (wasDriving && this.link.mayWrite) this.send(0, 0);
   }
 
   drop() {
@@ -176,12 +203,16 @@ export class Teleop {
     setText(this.values, "stopped");
   }
 
-  async send(linear, angular) {
-    this.isAdvertised = true;
-    try {
-      await this.link.publish(this.topic, TYPE, SCHEMA, { linear: { x: linear, y: 0, z: 0 }, angular: { x: 0, y: 0, z: angular } });
-    } catch (error) {
-      setText(this.problem, error.message);
+  send(linear, angular) {
+    this.drive.send({ topic: this.topic, twist: [linear, 0, 0, 0, 0, angular] });
+  }
+
+  answered({ lost, error, stopped }) {
+    if (lost) {
+      this.hasJoy = false;
+      this.drop();
     }
+    if (error) setText(this.problem, error);
+    if (stopped) setText(this.values, "stopped by the server: this page was silent");
   }
 }
