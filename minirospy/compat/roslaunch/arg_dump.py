@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from minirospy.compat.roslaunch.config import LaunchFile
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.compat.roslaunch.xmlloader import assignments
 from minirospy.launch.load import resolved_arg_docs
-from minirospy.workspace.packages import Packages
 
 __all__ = ["get_args"]
 
 
 def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
     """Return the args that launch files declare: name -> (doc, default)."""
-    packages, found = Packages(), {}
+    packages, found = chosen_packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each
         for arg in resolved_arg_docs(file, assignments(argv), packages):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.errors import MinirospyError
 from minirospy.launch.depends import file_needs, missing_declarations, package_of
-from minirospy.workspace.packages import Packages
 
 __all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps"]
 
@@ -54,7 +54,7 @@ def roslaunch_deps(
     Raises RoslaunchDepsException.
     """
     try:
-        needs = file_needs(files, Packages())
+        needs = file_needs(files, chosen_packages())
         missing = missing_declarations(needs, tests=use_test_depends)
     except MinirospyError as error:
         raise RoslaunchDepsException(str(error)) from error

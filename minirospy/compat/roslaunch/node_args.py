@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from minirospy.compat.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
 from minirospy.compat.roslaunch.core import Machine, Node
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.environment import Environment
 from minirospy.errors import MinirospyError
 from minirospy.launch.command import node_command, node_environment
 from minirospy.launch.spec import NodeSpec
-from minirospy.workspace.packages import Packages
 
 __all__ = [
     "NodeParamsException",
@@ -59,7 +59,7 @@ def print_node_filename(node_name: str, roslaunch_files: Sequence[LaunchFile]) -
 
 def _command(spec: NodeSpec) -> list[str]:
     try:
-        return node_command(spec, Packages())
+        return node_command(spec, chosen_packages())
     except MinirospyError as error:
         raise NodeParamsException(str(error)) from error
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import yaml
 
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.errors import MinirospyError
 from minirospy.launch.load import load_files
-from minirospy.workspace.packages import Packages
 
 __all__ = ["dump_params"]
 
@@ -17,7 +17,7 @@ __all__ = ["dump_params"]
 def dump_params(files: Sequence[str]) -> bool:
     """Print the parameters of launch files as YAML; whether all could be loaded."""
     try:
-        params = load_files(list(files), {}, Packages()).params
+        params = load_files(list(files), {}, chosen_packages()).params
     except MinirospyError as error:
         print(f"Unable to load file {error}", file=sys.stderr)
         return False

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from minirospy.compat.roslaunch.config import LaunchFile, load_config_default
 from minirospy.compat.roslaunch.core import RLException
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.environment import Environment
 from minirospy.errors import MasterUnreachableError, MinirospyError, RpcError
 from minirospy.launch.check import faults_of
@@ -15,7 +16,6 @@ from minirospy.launch.load import find_files
 from minirospy.launch.master import LaunchMaster
 from minirospy.launch.output import Output, warn_of_large_logs
 from minirospy.runtime.rpc.master_proxy import MasterProxy
-from minirospy.workspace.packages import Packages
 
 __all__ = [
     "change_terminal_name",
@@ -35,7 +35,7 @@ def check_log_disk_usage() -> None:
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
     """Return what is wrong with a launch file: all faults and programs that are missing, a line for each; None: nothing."""
-    return "\n".join(map(str, faults_of(f, Packages(), ignore_unset_args=ignore_unset_args))) or None
+    return "\n".join(map(str, faults_of(f, chosen_packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
 def print_file_list(roslaunch_files: Sequence[LaunchFile]) -> None:
@@ -69,7 +69,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
     """Return the paths of the launch files that a command line (package and file, or files) names. Raises RLException."""
     try:
-        return find_files([word for word in args if ":=" not in word], Packages())
+        return find_files([word for word in args if ":=" not in word], chosen_packages())
     except MinirospyError as error:
         raise RLException(str(error)) from error
 

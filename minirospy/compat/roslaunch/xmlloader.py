@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from minirospy.compat.roslaunch.core import RLException
+from minirospy.compat.roslaunch.substitution_args import chosen_packages
 from minirospy.errors import MinirospyError
 from minirospy.launch.load import STDIN, LaunchSource, load_sources
 from minirospy.launch.spec import LaunchSpec
-from minirospy.workspace.packages import Packages
 
 __all__ = ["XmlLoader", "XmlParseException", "assignments"]
 
@@ -32,7 +32,6 @@ class XmlLoader:
         self.resolve_anon = resolve_anon
         self.args_only = args_only
         self.ignore_unset_args = False
-        self._packages = Packages()
 
     def load(
         self,
@@ -53,7 +52,7 @@ class XmlLoader:
 
     def _load(self, source: LaunchSource, config: Configuration) -> None:
         try:
-            config.add(load_sources([source], self._packages))
+            config.add(load_sources([source], chosen_packages()))
         except MinirospyError as error:
             raise XmlParseException(str(error)) from error
 
