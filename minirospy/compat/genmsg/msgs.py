@@ -159,7 +159,7 @@ def is_valid_constant_type(x: str) -> bool:
 
 def bare_msg_type(msg_type: str) -> str:
     """Return a type without its brackets."""
-    return msg_type and msg_type.partition("[")[0]
+    return msg_type[: msg_type.index("[")] if msg_type and "[" in msg_type else msg_type
 
 
 def resolve_type(msg_type: str, package_context: str) -> str:
@@ -175,9 +175,9 @@ def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
     """Return (type without brackets, whether it is an array, its length where that is fixed). Raises ValueError."""
     if not msg_type:
         raise ValueError("Invalid empty type")
-    base, bracket, rest = msg_type.partition("[")
-    if not bracket:
-        return base, False, None
+    if "[" not in msg_type:
+        return msg_type, False, None
+    base, _, rest = msg_type.partition("[")
     if "[" in rest:
         raise ValueError(f"Currently only support 1-dimensional array types: {msg_type}")
     length = rest.removesuffix("]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +20,7 @@ from minirospy.compat.genmsg.msg_loader import (
     parsed_message,
     parsed_service,
 )
-from minirospy.compat.genmsg.msgs import MsgSpec
+from minirospy.compat.genmsg.msgs import Constant, MsgSpec
 from minirospy.compat.genmsg.srvs import SrvSpec
 from minirospy.compat.genpy.base import MsgGenerationException
 from minirospy.errors import DefinitionError
@@ -30,7 +31,9 @@ __all__ = [
     "MsgGenerator",
     "SrvGenerator",
     "compute_outfile_name",
+    "compute_pkg_type",
     "compute_resource_name",
+    "make_python_safe",
     "msg_generator",
     "srv_generator",
 ]
@@ -67,6 +70,29 @@ def compute_resource_name(filename: str, ext: str) -> str:
 def compute_outfile_name(outdir: str, infile_name: str, ext: str) -> str:
     """Return the path of the module for a file's definition."""
     return os.path.join(outdir, f"_{compute_resource_name(infile_name, ext)}.py")
+
+
+def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
+    """Return package and name of a type that definitions in ``package`` use. Raises MsgGenerationException."""
+    words = type_.split("/")
+    if len(words) > 2:
+        raise MsgGenerationException(f"illegal message type: {type_}")
+    return (words[0], words[1]) if len(words) == 2 else (package, words[0])
+
+
+def make_python_safe(spec: MsgSpec) -> MsgSpec:
+    """Return a message whose fields and constants have the names that they have in Python."""
+    constants = [
+        Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
+    ]
+    return MsgSpec(
+        spec.types, [_remap_reserved(name) for name in spec.names], constants, spec.text, spec.full_name
+    )
+
+
+def _remap_reserved(field_name: str) -> str:
+    prefix, dot, name = field_name.rpartition(".")
+    return f"{prefix}{dot}{name}_" if keyword.iskeyword(name) or name == "self" else field_name
 
 
 class Generator:

@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/roslib, http://docs.ros.org/api/roslib/html/python/.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from minirospy.compat.rospkg.common import ResourceNotFound
@@ -123,10 +123,37 @@ def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
         for built in (Path(prefix, "lib", package, name), Path(prefix, "share", package, name)):
             if prefix and built.is_file():
                 yield built
-    for path, folders, names in os.walk(folder):
+    yield from map(Path, _find_resource(str(folder), name))
+
+
+def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] | None = None) -> list[str]:
+    """Return the files of a name below a folder, links followed, folders with a dot in front left out."""
+    # On Windows a program may be named without its suffix, in any case of letters.
+    suffixes = ("", ".exe", ".bat", ".py") if os.name == "nt" else ("",)
+    wanted = [os.path.normcase(resource_name + suffix) for suffix in suffixes]
+    found, seen = [], set()
+
+    for path, folders, names in os.walk(d, followlinks=True):
+        real = os.path.realpath(path)
+        if real in seen:
+            # A link that leads back.
+            folders.clear()
+            continue
+        seen.add(real)
         folders[:] = sorted(each for each in folders if not each.startswith("."))
-        if name in names:
-            yield Path(path, name)
+        there = {os.path.normcase(name) for name in names}
+        found += [os.path.abspath(os.path.join(path, name)) for name in wanted if name in there]
+    return [each for each in found if filter_fn is None or filter_fn(each)]
+
+
+def _get_pkg_subdir_by_dir(
+    package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
+) -> str:
+    """Return a folder of a package by the package's path, made where it is not there if ``required``. Raises OSError."""
+    path = os.path.join(package_dir, subdir)
+    if required:
+        os.makedirs(path, exist_ok=True)
+    return path
 
 
 def _is_program(path: str) -> bool:

@@ -156,6 +156,8 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
     Raises ConnectionRefusedError where no master answers, as ROS's does.
     """
     with _graph(master, ConnectionRefusedError) as graph:
+        # Also where nothing is on the list: a master that does not answer is an error.
+        graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
             nodes.forget_node(graph, node)

@@ -172,11 +172,12 @@ def load_file(
 
 
 def load_str(
-    str: str, filename: str, default_namespace: str | None = None, verbose: bool = False
+    str: str | bytes, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
     """Return [(values, namespace)] of each document of a YAML text, which :func:`load_file` read from ``filename``."""
+    text = str.decode() if isinstance(str, bytes) else str
     try:
-        documents = list(parse_documents(str, filename))
+        documents = list(parse_documents(text, filename))
     except ValueTextError as error:
         raise _YamlError(error) from error
     loaded = []

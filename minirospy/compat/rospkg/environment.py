@@ -37,6 +37,22 @@ ROS_LOG_DIR = "ROS_LOG_DIR"
 ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"
 
 
+def _compute_package_paths(ros_root: str | None, ros_package_path: str | None) -> list[str]:
+    """Return the folders that two variables' values name."""
+    named = (ros_package_path or "").split(os.pathsep)
+    return [path for path in (ros_root or "", *named) if path.strip()]
+
+
+def _resolve_path(p: str) -> str:
+    """Return a path of a variable, ``~`` at its start expanded."""
+    return os.path.expanduser(p) if p and p[0] == "~" else p
+
+
+def _resolve_paths(paths: str) -> str:
+    """Return the paths of a variable, ``~`` at the start of each expanded."""
+    return os.pathsep.join(_resolve_path(path) for path in paths.split(os.pathsep) if path)
+
+
 def get_ros_root(env: Environ | None = None) -> str | None:
     """Return ROS_ROOT, or None."""
     return _environ(env).get("ROS_ROOT")
@@ -49,9 +65,8 @@ def get_ros_package_path(env: Environ | None = None) -> str | None:
 
 def get_ros_paths(env: Environ | None = None) -> list[str]:
     """Return the folders of ROS_PACKAGE_PATH, and those of minirospy's own packages."""
-    environ = _environ(env)
-    named = [environ.get("ROS_ROOT", ""), *environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)]
-    return list(dict.fromkeys([path for path in named if path] + [str(root) for root in built_in_roots()]))
+    named = _compute_package_paths(get_ros_root(env), get_ros_package_path(env))
+    return list(dict.fromkeys([*named, *map(str, built_in_roots())]))
 
 
 def get_ros_home(env: Environ | None = None) -> str:

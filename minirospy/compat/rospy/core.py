@@ -38,11 +38,13 @@ __all__ = [
     "rospyinfo",
     "rospywarn",
     "service_logger",
+    "topics_logger",
 ]
 
 MASTER_NAME = "master"
 ROSRPC = "rosrpc://"
 service_logger = logging.getLogger("rospy.service")
+topics_logger = logging.getLogger("rospy.topics")
 _internal = logging.getLogger("rospy.internal")
 rospydebug = _internal.debug
 rospyinfo = _internal.info

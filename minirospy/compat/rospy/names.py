@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from minirospy import names
 from minirospy.client.session import current_session
 from minirospy.compat.ros_names import is_global, is_private
+from minirospy.compat.rosgraph.names import resolve_name
 from minirospy.errors import ROSException
 
 __all__ = [
@@ -109,7 +110,7 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
     """Return the global name of an argument, not remapped. Raises ParameterInvalid."""
-    return names.resolve(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
+    return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:

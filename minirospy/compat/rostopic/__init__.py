@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +15,7 @@ from minirospy.compat.rosgraph.network import parse_http_host_and_port
 from minirospy.compat.rostopic.echo import CallbackEcho
 from minirospy.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.introspect import topics
-from minirospy.introspect.fields import field_value, parse_path
+from minirospy.introspect.fields import Step, field_value, parse_path
 from minirospy.introspect.graph import Graph
 
 if TYPE_CHECKING:
@@ -111,14 +112,48 @@ def find_by_type(topic_type: str) -> list[str]:
 def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
     """Return a function that takes the field at a path (``/pose/x``) out of a message; None for the message itself.
 
-    None, too, where the path does not parse, which is then said on stderr.
+    None, too, where a bracket of the path does not parse, which is reported on stderr, as is a message without the field.
     """
+    fields = [each for each in pattern.split("/") if each]
     try:
-        steps = parse_path(pattern.strip("/"))
-    except UsageError as error:
-        print(f"rostopic: {error}", file=sys.stderr)
+        steps = parse_path("/".join(fields))
+    except UsageError:
+        if faults := list(filter(None, map(_slice_fault, fields))):
+            print(faults[0], file=sys.stderr)
+            return None
+        # A name that no field can have.
+        steps = tuple(Step(each, None) for each in fields)
+
+    def value(message: Message) -> object:
+        try:
+            return field_value(message, steps)
+        except NotFoundError as error:
+            print(f"no field named {error.name} in {pattern}", file=sys.stderr)
+        except IndexError:
+            print(f"list index out of range: {pattern}", file=sys.stderr)
         return None
-    return (lambda message: field_value(message, steps)) if steps else None
+
+    return value if steps else None
+
+
+def _slice_fault(field: str) -> str:
+    """Return what is wrong with the brackets of a field, in ROS's words; empty where nothing is."""
+    name, bracket, rest = field.partition("[")
+    if not bracket:
+        return ""
+    if not rest.endswith("]"):
+        return f"missing closing ']' in slice spec '{field}'"
+    numbers = rest[:-1].split(":")
+    roles = ("slice start", "slice stop", "slice step") if len(numbers) > 1 else ("array index step",)
+    faults = [
+        f"non-integer {role} '{number}'"
+        for role, number in zip(roles, numbers, strict=False)
+        if number and not re.fullmatch(r"[+-]?\d+", number.strip())
+    ]
+    if len(numbers) > 3:
+        faults.append("too many slice arguments")
+    why = "empty array index" if numbers == [""] else next(iter(faults), "")
+    return why and f"field '{name}' has invalid slice argument '{rest[:-1]}': {why}"
 
 
 def get_info_text(topic: str) -> str:

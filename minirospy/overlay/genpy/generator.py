@@ -4,8 +4,11 @@ from minirospy.compat.genpy.generator import (
     Generator,
     MsgGenerator,
     SrvGenerator,
+    _remap_reserved,
     compute_outfile_name,
+    compute_pkg_type,
     compute_resource_name,
+    make_python_safe,
     msg_generator,
     srv_generator,
 )
@@ -15,7 +18,9 @@ __all__ = [
     "MsgGenerator",
     "SrvGenerator",
     "compute_outfile_name",
+    "compute_pkg_type",
     "compute_resource_name",
+    "make_python_safe",
     "msg_generator",
     "srv_generator",
 ]

@@ -7,6 +7,8 @@ from minirospy.compat.roslib.packages import (
     InvalidROSPkgException,
     MultipleNodesException,
     ROSPkgException,
+    _find_resource,
+    _get_pkg_subdir_by_dir,
     find_node,
     find_resource,
     get_dir_pkg,

@@ -7,6 +7,7 @@ from minirospy.client.topics import Publisher as Publisher
 from minirospy.client.topics import SubscribeListener as SubscribeListener
 from minirospy.client.topics import Subscriber as Subscriber
 from minirospy.client.topics import Topic as Topic
+from minirospy.compat.rospy.core import topics_logger as _logger
 from minirospy.compat.rospy.msg import serialize_message as serialize_message
 from minirospy.compat.rospy.passing import topics_dir as __dir__
 from minirospy.compat.rospy.passing import topics_getattr as __getattr__
