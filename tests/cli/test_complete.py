@@ -543,6 +543,7 @@ def test_packages_are_found_with_a_bad_master_uri(monkeypatch: pytest.MonkeyPatc
         ["2", "rostopic", "nothing", ""],
         ["3", "rostopic", "pub", "'", "\\"],
         ["--one-line"],
+        ["--powershell"],
     ],
 )
 def test_nothing_is_an_error(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:

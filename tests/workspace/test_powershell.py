@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 import pytest
 
+from minirospy.cli.completion.words import POWERSHELL
 from minirospy.cli.registry import COMMANDS
 from minirospy.workspace.setup_files import SetUp, setup_files, shell_text
 
@@ -79,6 +81,52 @@ def test_every_command_is_completed() -> None:
     for entry in COMMANDS:
         if entry.script:
             assert f"'{entry.script}'" in text, entry.script
+
+
+def completed(*words: str, index: int | None = None) -> list[str]:
+    """Return what TAB offers for the last word, by the call that ros.ps1 makes."""
+    call = re.search(r"minirospy complete (\S+) \$index @words", ROS_PS1.read_text())
+    assert call
+    place = str(index or len(words) - 1)
+    done = subprocess.run(
+        [sys.executable, "-m", "minirospy.cli.completion.complete", call[1], place, *words],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.splitlines()
+
+
+def test_candidates_are_words_of_powershell() -> None:
+    assert completed("rosmsg", "sho") == ["show"]
+    # A word that has not been started is not passed on.
+    assert completed("rostopic", "pub", "/t", "std_msgs/Bool", index=4) == ["'data: false'"]
+    assert completed("rostopic", "pub", "'/t'", "std_msgs/String", index=4) == ["'data: '''''"]
+    assert completed("rostopic", "pub", "/t", "std_msgs/String", '"da') == ["\"data: ''\""]
+    assert completed("rostopic", "pub", "/t", "geometry_msgs/Point", "'{x") == ["'{x: 0.0, y: 0.0, z: 0.0}'"]
+    assert completed("C:\\Scripts\\rosmsg.exe", "sho") == ["show"]
+    assert "--once" in completed("rostopic", "pub", "--on")
+
+
+@pytest.mark.parametrize(
+    ("typed", "text", "again"),
+    [
+        ("a", "a b", "'a b'"),
+        ("a` ", "a b", "'a b'"),
+        ("'a ", "a b", "'a b'"),
+        ("'a b'", "a b", "'a b'"),
+        ('"a ', 'a "$x`', '"a `"`$x``"'),
+        ("'it''s", "it's", "'it''s'"),
+        ("a", "a,b", "'a,b'"),
+        ("/a", "/a/b:=c", "/a/b:=c"),
+        ("C:\\a", "C:\\a\\b", "C:\\a\\b"),
+        ("", "@a", "'@a'"),
+        ("", "", ""),
+    ],
+)
+def test_words_are_read_and_written_as_in_powershell(typed: str, text: str, again: str) -> None:
+    assert POWERSHELL.write(text, POWERSHELL.read(typed)) == again
+    assert POWERSHELL.read(again).text == text
 
 
 @pytest.mark.skipif(shutil.which("pwsh") is None, reason="no PowerShell here")

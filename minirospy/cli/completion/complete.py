@@ -2,8 +2,8 @@
 
 The words of a command line come in as the shell holds them (quotes included), INDEX is the place of the word under
 the cursor; candidates go out as the shell is to insert them: quoted where they need it, with a vertical tab for
-each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none). One that ends in ``/`` or ``=``
-goes on; after any other comes a space.
+each line feed inside (`minirospy complete --one-line INDEX WORD...`: with none; `--powershell`: with none, words and
+candidates as PowerShell writes them). One that ends in ``/`` or ``=`` goes on; after any other comes a space.
 
 Verbs and options come from the command's own parser, not from a second list. So does what completes an
 argument or an option's value: see minirospy.cli.parser.Parser.add_argument. Nothing here ends in an error, and the
@@ -17,10 +17,11 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from minirospy.cli.completion import completers
-from minirospy.cli.completion.completers import Completer, Cursor, Text
+from minirospy.cli.completion.completers import Completer, Cursor
+from minirospy.cli.completion.words import POSIX, POWERSHELL, Shell
 from minirospy.cli.parser import completer_of
 from minirospy.cli.registry import COMMANDS, SHELL_FUNCTIONS, Entry, find_script, find_verb
 from minirospy.cli.verbs import Family
@@ -37,21 +38,10 @@ if TYPE_CHECKING:
 __all__ = ["candidates", "main"]
 
 _NUMBER = re.compile(r"-\.?\d")
-_VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
-_LINE_FEED = "\v"
 _SPACES = dict.fromkeys(map(ord, "\n\t"))
 _ONE_LINE = "--one-line"
+_POWERSHELL = "--powershell"
 _OPTIONS = ["-h", "--help", "-V", "--version"]
-_PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
-"""What no shell reads as more than a word."""
-
-
-class _Word(NamedTuple):
-    """A word without its quotes; the one that is still open at its end was opened at ``text[at:]``."""
-
-    text: str
-    quote: str
-    at: int
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,27 +49,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     # An edge: it runs in the middle of somebody's typing, where a fault's only decent form is silence.
     with contextlib.suppress(Exception):
-        one_line = words[0] == _ONE_LINE
+        shell = POWERSHELL if words[0] == _POWERSHELL else POSIX
+        one_line = words[0] in (_ONE_LINE, _POWERSHELL)
         index, *line = words[1:] if one_line else words
-        found = candidates(int(index), line, one_line=one_line)
+        found = candidates(int(index), line, one_line=one_line, shell=shell)
         sys.stdout.reconfigure(errors="surrogateescape")  # type: ignore[union-attr]
         print("\n".join(found), end="", flush=True)
     return 0
 
 
-def candidates(index: int, words: Sequence[str], *, one_line: bool = False) -> list[str]:
-    """Return the candidates for ``words[index]``, as the shell is to insert it; if so asked, never more than one line."""
+def candidates(
+    index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
+) -> list[str]:
+    """Return the candidates for ``words[index]``, as the shell is to insert it; with ``one_line``, each on one line."""
     if not 0 < index <= len(words):
         return []
-    word = _unquoted(words[index] if index < len(words) else "")
-    command, *before = (_at_home(_unquoted(each).text) for each in words[:index])
+    word = shell.read(words[index] if index < len(words) else "")
+    command, *before = (_at_home(shell.read(each).text) for each in words[:index])
     command = re.split(r"[/\\]", command)[-1].removesuffix(".exe")
     try:
         found = _of_command(command, before, word.text)
         fitting = (completers.on_one_line(text) if one_line else text for text in found)
         # What has control characters is not a name to choose; the shell would send them to the terminal.
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
-        return [_quoted(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
+        return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
         # An unknown package or type: the command itself will say so.
         return []
@@ -166,58 +159,8 @@ def _completer(name: str) -> Completer:
 # --- words as shells write them
 
 
-def _unquoted(word: str) -> _Word:
-    """Return a word without its quotes; $NAME outside of single ones is replaced by its value."""
-    text = ""
-    quote = ""
-    at = read = 0
-    while read < len(word):
-        letter = word[read]
-        variable = _VARIABLE.match(word, read) if quote != "'" else None
-        value = os.environ.get(variable[1] or variable[2]) if variable else None
-        read += 1
-
-        if letter == "\\" and quote != "'":
-            text += word[read : read + 1]
-            read += 1
-        elif variable and value is not None:
-            text += value
-            read = variable.end()
-        elif letter == quote:
-            quote = ""
-        elif letter in "'\"" and not quote:
-            quote, at = letter, len(text)
-        else:
-            text += letter
-
-    return _Word(text, quote, at)
-
-
 def _at_home(text: str) -> str:
     return os.path.expanduser(text) if text.startswith("~/") else text
-
-
-def _quoted(text: str, word: _Word) -> str:
-    """Return ``text`` as shells read it: in the quotes that were opened; else a :class:`Text` in double ones."""
-    if word.quote:
-        # A folder's quotes stay open: what is in it comes next.
-        end = "" if text.endswith("/") else word.quote
-        return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
-    if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
-        return f'"{_inside(text, chr(34))}"'
-    return _escaped(text)
-
-
-def _inside(text: str, quote: str) -> str:
-    text = text.replace("\n", _LINE_FEED)
-    if quote == "'":
-        return text.replace("'", r"'\''")
-    # A shell for people puts old commands in place of an exclamation mark, in double quotes too.
-    return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
-
-
-def _escaped(text: str) -> str:
-    return re.sub(r"([^\w@%+=:,./~-])", r"\\\1", text)
 
 
 if __name__ == "__main__":

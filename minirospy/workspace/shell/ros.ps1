@@ -91,7 +91,7 @@ $_ros_complete = {
     $words = @($ast.CommandElements | Where-Object { $_.Extent.StartOffset -lt $cursor } | ForEach-Object { $_.Extent.Text })
     # A word that has not been started is not passed on: Windows PowerShell drops empty arguments of programs.
     $index = if ($word) { $words.Count - 1 } else { $words.Count }
-    minirospy complete --one-line $index @words 2>$null | Where-Object { $_ } | ForEach-Object {
+    minirospy complete --powershell $index @words 2>$null | Where-Object { $_ } | ForEach-Object {
         [System.Management.Automation.CompletionResult]::new($_, $_, 'ParameterValue', $_)
     }
 }
@@ -100,11 +100,11 @@ foreach ($_ros_function in 'roscd', 'rosls', 'rosed', 'roscat', 'roscp', 'rosmv'
     # Functions are completed parameter by parameter: -Native is for programs.
     Register-ArgumentCompleter -CommandName $_ros_function -ParameterName 'target' -ScriptBlock {
         param($command, $parameter, $word, $ast)
-        minirospy complete --one-line 1 $command $word 2>$null | Where-Object { $_ }
+        minirospy complete --powershell 1 $command $word 2>$null | Where-Object { $_ }
     }
     Register-ArgumentCompleter -CommandName $_ros_function -ParameterName 'package' -ScriptBlock {
         param($command, $parameter, $word, $ast)
-        minirospy complete --one-line 1 $command $word 2>$null | Where-Object { $_ }
+        minirospy complete --powershell 1 $command $word 2>$null | Where-Object { $_ }
     }
 }
 Remove-Variable -Name _ros_commands
