@@ -2,6 +2,9 @@
 
 ``versions.json`` in the folder names each package, its version, npm's digest of its archive, and the files that are taken, with
 the SHA-256 of each. A new version: change it there, delete its "integrity", and run this. npm has to be installed.
+
+A package with a "bundle" becomes one file, by the esbuild that is named there: what a script next to this one exports of the
+package, and nothing else. The page has no build step: the file is in the repository.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -42,9 +46,23 @@ def main() -> int:
                     target.parent.mkdir(parents=True, exist_ok=True)
                     target.write_bytes(body)
                     package["files"][path] = hashlib.sha256(body).hexdigest()
+                if bundle := package.get("bundle"):
+                    tar.extractall(Path(scratch, "node_modules"), filter="data")
+                    Path(scratch, "node_modules", "package").rename(Path(scratch, "node_modules", folder))
+                    body = _bundle(bundle, Path(scratch))
+                    (FOLDER / folder / bundle["file"]).write_bytes(body)
+                    bundle["sha256"] = hashlib.sha256(body).hexdigest()
         print(f"{folder}: {name}")
     (FOLDER / "versions.json").write_text(json.dumps(packages, indent=2) + "\n", encoding="utf-8")
     return 0
+
+
+def _bundle(bundle: dict[str, str], scratch: Path) -> bytes:
+    """Return one minified module with what the entry exports; the package is in ``scratch/node_modules``."""
+    entry = Path(shutil.copy(Path(__file__).parent / bundle["entry"], scratch))
+    words = ["npx", "--yes", f"esbuild@{bundle['esbuild']}", entry.name, "--bundle", "--minify"]
+    options = ["--format=esm", "--target=es2022", "--legal-comments=none", "--log-level=error"]
+    return subprocess.run([*words, *options], cwd=scratch, check=True, capture_output=True).stdout
 
 
 def _file_name(path: str) -> str:
