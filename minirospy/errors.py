@@ -22,6 +22,7 @@
     |   |   +-- BuildError              a workspace or package that cannot be built
     |   |   +-- LaunchError             a launch file that does not load
     |   |   +-- UrdfError               a robot description that does not read
+    |   |   +-- RvizFileError           a .rviz file that cannot be read or written
     |   +-- BagError                    a bag that cannot be read or written
     |   |   +-- BagFormatError          bytes that are not what the bag format prescribes
     |   |   +-- BagVersionError         a version of the format that cannot be read
@@ -99,6 +100,7 @@ __all__ = [
     "RpcProtocolError",
     "RpcRefused",
     "RpcUnreachable",
+    "RvizFileError",
     "SerializationError",
     "ServiceException",
     "SourceError",
@@ -298,6 +300,10 @@ class BuildError(SourceError):
 
 class LaunchError(SourceError):
     """A launch file does not load."""
+
+
+class RvizFileError(SourceError):
+    """A .rviz file cannot be read or written."""
 
 
 class UrdfError(SourceError):
