@@ -1,0 +1,75 @@
+// Scans and clouds: points colored by intensity, axis, or their own colors; older ones stay for the decay time.
+
+import { colorsOf, pointsOfCloud, pointsOfOldCloud, pointsOfScan, suitableTransformer, wantedChannels } from "../points.js";
+import { points } from "../shapes.js";
+import { IDENTITY } from "../transforms.js";
+import { TopicDisplay } from "./display.js";
+
+const MOST_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud; of a larger one every second, third, ...
+const MOST_SCANS = 1000;
+
+export class Cloud extends TopicDisplay {
+  changed(path) {
+    if (/Topic$/.test(path) || !this.message) this.restart();
+    else {
+      for (const item of [...this.items]) this.remove(item);
+      this.draw(this.message);
+    }
+  }
+
+  start() {
+    this.message = null;
+    super.start();
+  }
+
+  received(message) {
+    this.message = message;
+    const decay = this.number("Decay Time");
+    if (decay <= 0) for (const item of [...this.items]) this.remove(item);
+    this.draw(message);
+    this.keep(MOST_SCANS);
+  }
+
+  draw(message) {
+    const most = this.context.stage.isSoftware ? MOST_POINTS.software : MOST_POINTS.hardware;
+    const total = message.ranges ? 0 : (message.width ?? 0) * (message.height ?? 0);
+    const stride = Math.max(1, Math.ceil(total / most));
+    const settings = this.colored(message);
+    const found = message.ranges ? pointsOfScan(message) : message.point_step === undefined ? pointsOfOldCloud(message)
+      : pointsOfCloud(message, wantedChannels(settings), stride);
+    const { frame_id: frame } = message.header;
+    const colors = colorsOf(found, settings, this.context.transformNow(frame) ?? IDENTITY);
+
+    const isPixels = settings.Style === "Points";
+    const object = points(found.positions, colors, {
+      rgb: settings["Color Transformer"] === "FlatColor" ? this.color() : [255, 255, 255], alpha: this.number("Alpha", 1),
+      size: isPixels ? this.number("Size (Pixels)", 3) : this.number("Size (m)", 0.01), isMetres: !isPixels, isRound: settings.Style === "Spheres" });
+    const item = this.addAt(message.header, object);
+    item.until = performance.now() + this.number("Decay Time") * 1000;
+    this.setStatus("Points", stride > 1 ? 1 : 0, stride > 1
+      ? `Showing ${found.count} points of ${total}: every ${stride}${["th", "st", "nd", "rd"][stride] ?? "th"}, for this ${this.context.stage.isSoftware ? "software renderer" : "browser"}`
+      : `Showing ${found.count} points from ${message.ranges ? message.ranges.length : found.total}`);
+  }
+
+  /** Return the settings with a transformer, where none is set that which suits the message's fields. */
+  colored(message) {
+    const names = message.ranges ? ["intensity"] : (message.fields ?? message.channels).map(({ name }) => name);
+    if (!this.get("Color Transformer")) this.settings["Color Transformer"] = suitableTransformer(names);
+    const settings = { ...this.settings };
+    const isThere = !(message.ranges && !message.intensities.length) && wantedChannels(settings).some((name) => names.includes(name));
+    // What RViz shows in white: without the field that the colors come from.
+    if (!isThere && settings["Color Transformer"] !== "AxisColor") settings["Color Transformer"] = "FlatColor";
+    return settings;
+  }
+
+  update() {
+    const decay = this.number("Decay Time");
+    if (decay > 0) {
+      const now = performance.now();
+      const items = [...this.items];
+      // The newest stays until another comes.
+      for (const item of items.slice(0, -1)) if (item.until < now) this.remove(item);
+    }
+    super.update();
+  }
+}

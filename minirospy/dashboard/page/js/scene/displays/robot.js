@@ -1,0 +1,137 @@
+// The robot: the links of its description at the frames of TF; where TF has none of them, by the positions of its joints.
+
+import { Group, Mesh } from "../../../vendor/three/three.min.js";
+import { loadMesh } from "../meshes.js";
+import { BALL, bodyMaterial, BOX, ROLL } from "../shapes.js";
+import { compose, missingText, plainName } from "../transforms.js";
+import { linkPoses, parseUrdf } from "../urdf.js";
+import { Display } from "./display.js";
+
+const PLAIN = [180, 180, 180, 1];
+
+export class RobotModel extends Display {
+  start() {
+    this.text = undefined;
+    this.robot = null;
+    this.links = new Map(); // name -> item
+    this.positions = new Map();
+    this.ends = [this.context.link.watch(["parameters", "state"], () => this.read())];
+    const topic = String(this.get("Joint States") ?? "");
+    if (topic) this.ends.push(this.context.link.subscribe({ topic, mode: "latest" }, ({ message }) => message && this.moved(message)));
+  }
+
+  stop() {
+    for (const end of this.ends ?? []) end();
+    this.ends = [];
+    super.stop();
+  }
+
+  moved({ name, position }) {
+    if (!Array.isArray(name) || position === undefined) return;
+    name.forEach((each, index) => this.positions.set(each, position[index] ?? 0));
+    this.poses = null;
+    this.context.received(this);
+  }
+
+  /** Read the description's parameter, where it has changed. */
+  read() {
+    const name = String(this.get("Robot Description") || "robot_description");
+    const key = name.startsWith("/") ? name : `/${name}`;
+    const text = this.context.link.parameters.get(key) ?? null;
+    if (text === this.text) return;
+    this.text = text;
+    for (const item of [...this.items]) this.remove(item);
+    this.links.clear();
+    this.robot = null;
+    if (typeof text !== "string") {
+      this.setStatus("URDF", 2, `Parameter [${name}] does not exist, and was not found by searchParam()`);
+      return;
+    }
+    try {
+      this.robot = parseUrdf(text);
+    } catch (error) {
+      this.setStatus("URDF", 2, `URDF failed Model parse: ${error.message}`);
+      return;
+    }
+    this.setStatus("URDF", 0, "URDF parsed OK");
+    this.poses = null;
+    this.isLoading = 0;
+    this.failed = [];
+    for (const link of this.robot.links.values()) this.links.set(link.name, this.add(this.build(link), this.frameOf(link.name), 0, true));
+    this.context.received(this);
+  }
+
+  frameOf(link) {
+    const prefix = String(this.get("TF Prefix") ?? "");
+    return prefix ? `${prefix}/${link}` : link;
+  }
+
+  build({ visuals, collisions }) {
+    const group = new Group();
+    const shown = [...(this.get("Visual Enabled") === false ? [] : visuals), ...(this.get("Collision Enabled") === true ? collisions : [])];
+    for (const { origin, geometry, color } of shown) {
+      const holder = new Group();
+      holder.position.set(...origin.p);
+      holder.quaternion.set(...origin.q);
+      this.fill(holder, geometry, color);
+      group.add(holder);
+    }
+    return group;
+  }
+
+  fill(holder, geometry, color) {
+    const [r, g, b, a] = color ? [color[0] * 255, color[1] * 255, color[2] * 255, color[3]] : PLAIN;
+    const alpha = a * this.number("Alpha", 1);
+    if (geometry.kind === "mesh") {
+      this.isLoading += 1;
+      loadMesh(this.context.link, geometry.uri, { rgb: [r, g, b], alpha, isForced: Boolean(color) }).then((mesh) => {
+        mesh.scale.multiply({ x: geometry.scale[0], y: geometry.scale[1], z: geometry.scale[2] });
+        holder.add(mesh);
+      }, (error) => this.failed.push(error.message)).finally(() => {
+        this.isLoading -= 1;
+        this.context.stage.invalidate();
+        if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
+        else if (!this.isLoading) this.clearStatus("Meshes");
+      });
+      return;
+    }
+    const material = bodyMaterial([r, g, b], alpha);
+    const shape = new Mesh({ box: BOX, sphere: BALL, cylinder: ROLL }[geometry.kind], material);
+    if (geometry.kind === "box") shape.scale.set(...geometry.size);
+    else if (geometry.kind === "sphere") shape.scale.setScalar(geometry.radius * 2);
+    else shape.scale.set(geometry.radius * 2, geometry.radius * 2, geometry.length);
+    holder.add(shape);
+  }
+
+  update() {
+    if (!this.robot) return;
+    const { frames, fixedFrame } = this.context;
+    const missing = [];
+    for (const [name, item] of this.links) {
+      const frame = this.frameOf(name);
+      if (frames.has(frame) || plainName(frame) === fixedFrame) this.context.place(item);
+      else item.error = { message: `Frame [${frame}] does not exist` };
+      if (item.error && !this.placeByJoints(name, item)) {
+        item.object.visible = false;
+        missing.push([frame, item.error]);
+      }
+    }
+    if (missing.length) {
+      const [[frame, error]] = missing;
+      this.setStatus("Transform", 2, `${missingText(frame, fixedFrame, error)}${missing.length > 1 ? `; and ${missing.length - 1} more links` : ""}`);
+    } else this.setStatus("Transform", 0, "Transform OK");
+  }
+
+  /** Put a link where the positions of the joints have it, below the root link; return whether that is possible. */
+  placeByJoints(name, item) {
+    if (!this.positions.size) return false;
+    this.poses ??= linkPoses(this.robot, this.positions);
+    const { frames, fixedFrame } = this.context;
+    const root = this.frameOf(this.robot.root);
+    // Without any tf data at all the robot is at the origin.
+    const base = this.context.transformNow(root) ?? (frames.known.size && fixedFrame !== root ? null : { p: [0, 0, 0], q: [0, 0, 0, 1] });
+    if (!base || !this.poses.has(name)) return false;
+    this.context.put(item, compose(base, this.poses.get(name)));
+    return true;
+  }
+}

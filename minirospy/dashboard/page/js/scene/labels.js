@@ -1,0 +1,65 @@
+// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names that would cover
+// each other are stacked.
+
+import { Vector3 } from "../../vendor/three/three.min.js";
+import { h, setText } from "../dom.js";
+
+const LINE = 15; // pixels
+const MOST = 400;
+
+export class Labels {
+  constructor() {
+    this.element = h("div", { class: "labels", "aria-hidden": "true" });
+    this.all = new Set();
+  }
+
+  /** Return a new label: its place is a Vector3 in the fixed frame; set isShown. Text has a height in metres, or none for names. */
+  add({ text, kind = "name", metres = null, color = null }) {
+    const label = { text, metres, place: new Vector3(), isShown: false, span: h("span", { class: `label ${kind}` }, text), width: 0 };
+    label.span.hidden = true;
+    if (color) label.span.style.color = color;
+    this.all.add(label);
+    this.element.append(label.span);
+    return label;
+  }
+
+  remove(label) {
+    this.all.delete(label);
+    label.span.remove();
+  }
+
+  change(label, text, color) {
+    setText(label.span, text);
+    label.width = 0;
+    if (color) label.span.style.color = color;
+  }
+
+  draw(stage) {
+    const place = new Vector3();
+    const taken = [];
+    let count = 0;
+    const found = [];
+    for (const label of this.all) {
+      place.copy(label.place).project(stage.camera);
+      const isSeen = label.isShown && Math.abs(place.z) <= 1 && Math.abs(place.x) < 1.2 && Math.abs(place.y) < 1.2 && count < MOST;
+      if (label.span.hidden === isSeen) label.span.hidden = !isSeen;
+      if (!isSeen) continue;
+      count += 1;
+      found.push([label, ((place.x + 1) / 2) * stage.width, ((1 - place.y) / 2) * stage.height]);
+    }
+    // Widths first, then places: the browser lays the page out once.
+    for (const [label] of found) label.width ||= label.span.offsetWidth || 1;
+    for (const [label, x, y] of found) {
+      let top = y;
+      if (label.metres !== null) {
+        const far = stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(label.place);
+        label.span.style.fontSize = `${Math.min(300, Math.max(3, (label.metres * stage.pixelsPerMetre) / far))}px`;
+      } else {
+        const covers = (other) => Math.abs(other.top - top) < LINE && x < other.x + other.width && other.x < x + label.width;
+        for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++) top = other.top + LINE;
+        taken.push({ x, top, width: label.width });
+      }
+      label.span.style.transform = `translate(${x.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    }
+  }
+}

@@ -1,0 +1,163 @@
+// Shapes that several displays draw: arrows, axes, lines, points. All are made of few kinds of geometry, which are shared.
+
+import {
+  BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Group, LineBasicMaterial, LineMaterial, LineSegments,
+  LineSegments2, LineSegmentsGeometry, Mesh, MeshLambertMaterial, Points, Quaternion, ShaderMaterial, SphereGeometry, Vector3 } from "../../vendor/three/three.min.js";
+
+const X_AXIS = new Vector3(1, 0, 0);
+// Cylinder and cone along x from 0 to 1, of diameter 1: an arrow's parts, scaled.
+const SHAFT = new CylinderGeometry(0.5, 0.5, 1, 16).rotateZ(-Math.PI / 2).translate(0.5, 0, 0);
+const HEAD = new ConeGeometry(0.5, 1, 20).rotateZ(-Math.PI / 2).translate(0.5, 0, 0);
+export const BOX = new BoxGeometry(1, 1, 1);
+export const BALL = new SphereGeometry(0.5, 24, 16);
+export const ROLL = new CylinderGeometry(0.5, 0.5, 1, 28).rotateX(Math.PI / 2); // along z
+const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL]);
+
+/** Return the material of a body: color [r, g, b] of 0 to 255. */
+export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
+  const material = new MeshLambertMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: alpha >= 0.9998, ...options });
+  material.color.setRGB(r / 255, g / 255, b / 255);
+  return material;
+}
+
+/** Return an arrow along x: lengths and diameters in metres. */
+export function arrow(material, { shaft, shaftWidth, head, headWidth }) {
+  const body = new Mesh(SHAFT, material);
+  body.scale.set(shaft, shaftWidth, shaftWidth);
+  const point = new Mesh(HEAD, material);
+  point.position.x = shaft;
+  point.scale.set(head, headWidth, headWidth);
+  const group = new Group();
+  group.add(body, point);
+  return group;
+}
+
+/** Turn an object that is along x so that it leads from one point to another. */
+export function directed(object, from, to) {
+  object.position.copy(from);
+  object.quaternion.copy(new Quaternion().setFromUnitVectors(X_AXIS, to.clone().sub(from).normalize()));
+  return object;
+}
+
+const AXES = [[255, 40, 40], [40, 200, 40], [60, 90, 255]].map((rgb) => bodyMaterial(rgb));
+
+/** Return axes as RViz's: x red, y green, z blue. */
+export function axes(length, radius) {
+  const group = new Group();
+  AXES.forEach((material, index) => {
+    const bar = new Mesh(SHAFT, material);
+    bar.scale.set(length, radius * 2, radius * 2);
+    if (index === 1) bar.rotation.z = Math.PI / 2;
+    if (index === 2) bar.rotation.y = -Math.PI / 2;
+    group.add(bar);
+  });
+  return group;
+}
+
+/** Return lines, two points each (numbers in a row): of a width in pixels, or metres. Colors are those of points, three numbers of 0 to 1 each. */
+export function segments(positions, { rgb = [255, 255, 255], colors = null, alpha = 1, pixels = 2, metres = null } = {}) {
+  const geometry = new LineSegmentsGeometry();
+  geometry.setPositions(positions);
+  const material = new LineMaterial({ linewidth: metres ?? pixels, worldUnits: metres !== null, transparent: alpha < 0.9998, opacity: alpha });
+  if (colors) {
+    geometry.setColors(colors);
+    material.vertexColors = true;
+  } else material.color.setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255);
+  return new LineSegments2(geometry, material);
+}
+
+/** Return the points of a chain as pairs, for segments. */
+export function chain(points, size = 3) {
+  const pairs = new Float32Array(Math.max(0, points.length / size - 1) * size * 2);
+  for (let index = 0; index + size < points.length; index += size) {
+    for (let part = 0; part < size * 2; part++) pairs[index * 2 + part] = points[index + part];
+  }
+  return pairs;
+}
+
+/** Return lines of one pixel, for grids. */
+export function hairlines(positions, rgb, alpha) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  const material = new LineBasicMaterial({ transparent: alpha < 0.9998, opacity: alpha, depthWrite: false });
+  material.color.setRGB(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255);
+  const lines = new LineSegments(geometry, material);
+  lines.userData.isUnpicked = true;
+  return lines;
+}
+
+const POINT_VERTEX = `
+uniform float size; uniform float pixels; uniform float isMetres; uniform vec3 flatColor; uniform float isFlat;
+attribute vec3 rgb; varying vec3 shade;
+void main() {
+  shade = isFlat > 0.5 ? flatColor : rgb;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 1.5, 128.0) : size;
+}`;
+const POINT_FRAGMENT = `
+uniform float opacity; uniform float isRound; varying vec3 shade;
+void main() {
+  float light = 1.0;
+  if (isRound > 0.5) {
+    vec2 at = gl_PointCoord * 2.0 - 1.0;
+    float square = dot(at, at);
+    if (square > 1.0) discard;
+    light = 0.55 + 0.45 * sqrt(1.0 - square);
+  }
+  gl_FragColor = vec4(shade * light, opacity);
+}`;
+
+/** Return points: positions (Float32Array), colors (RGB bytes) or null for `rgb`; size in metres or pixels. */
+export function points(positions, colors, { rgb = [255, 255, 255], alpha = 1, size, isMetres, isRound = false }) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  geometry.setAttribute("rgb", new BufferAttribute(colors ?? new Uint8Array(positions.length), 3, true));
+  const material = new ShaderMaterial({
+    vertexShader: POINT_VERTEX, fragmentShader: POINT_FRAGMENT, transparent: alpha < 0.9998, depthWrite: alpha >= 0.9998,
+    uniforms: {
+      size: { value: size }, isMetres: { value: isMetres ? 1 : 0 }, pixels: { value: 1 }, opacity: { value: alpha }, isRound: { value: isRound ? 1 : 0 },
+      isFlat: { value: colors ? 0 : 1 }, flatColor: { value: new Vector3(rgb[0] / 255, rgb[1] / 255, rgb[2] / 255) } } });
+  const found = new Points(geometry, material);
+  found.onBeforeRender = (renderer, scene, camera) => {
+    // Half the height of the picture, times the projection: pixels of a metre at w = 1.
+    material.uniforms.pixels.value = renderer.domElement.height * 0.5 * camera.projectionMatrix.elements[5];
+    material.uniformsNeedUpdate = true;
+  };
+  return found;
+}
+
+/** Return triangles: positions in a row, colors (RGB of 0 to 1) or null. */
+export function triangles(positions, colors, rgb, alpha) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  if (colors) geometry.setAttribute("color", new BufferAttribute(colors, 3));
+  geometry.computeVertexNormals();
+  return new Mesh(geometry, bodyMaterial(colors ? [255, 255, 255] : rgb, alpha, { side: DoubleSide, vertexColors: Boolean(colors) }));
+}
+
+/** Return the ellipsoid of a covariance's upper left three by three (row by row, `width` numbers a row), one standard deviation. */
+export function ellipse(covariance, width = 6) {
+  // In the plane, exactly: what robots on floors have; its height is that of z alone.
+  const [a, b, d] = [covariance[0], covariance[1], covariance[width + 1]];
+  const middle = (a + d) / 2;
+  const part = Math.hypot((a - d) / 2, b);
+  const size = (variance) => 2 * Math.sqrt(Math.max(variance, 1e-8));
+  const ball = new Mesh(BALL, bodyMaterial([204, 51, 204], 0.3));
+  ball.scale.set(size(middle + part), size(middle - part), size(covariance[2 * width + 2]));
+  ball.rotation.z = 0.5 * Math.atan2(2 * b, a - d);
+  return ball;
+}
+
+/** Remove an object with all that the graphics card keeps of it. */
+export function discard(object) {
+  object.removeFromParent();
+  object.traverse((each) => {
+    if (each.geometry && !SHARED.has(each.geometry)) each.geometry.dispose();
+    for (const material of [each.material ?? []].flat()) {
+      if (AXES.includes(material)) continue;
+      material.map?.dispose();
+      material.dispose();
+    }
+    if (each.isInstancedMesh) each.dispose();
+  });
+}
