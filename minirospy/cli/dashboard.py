@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from minirospy.cli.parser import Misuse, Parser
@@ -162,6 +163,26 @@ def _window(
     return Command(name, make_parser, body)
 
 
+def _rviz_parser() -> Parser:
+    parser = _parser("rviz", "Shows robots, sensors and maps in three dimensions, in a browser.")
+    parser.add_argument(
+        "-d",
+        "--display-config",
+        metavar="FILE",
+        default="",
+        help="a .rviz file to open, and to save to",
+        completer="files",
+    )
+    parser.add_argument(
+        "-f", "--fixed-frame", metavar="FRAME", default="", help="the fixed frame", completer="nothing"
+    )
+    _add_ignored(parser, "--fullscreen", "--in-mc-wrapper", "--no-stereo", "--verbose", "--log-level-debug")
+    _add_ignored(parser, "--disable-anti-aliasing")
+    _add_ignored(parser, "-s", "--splash-screen", "-l", "--ogre-log", takes_value=True)
+    _add_ignored(parser, "--opengl", "-t", "--display-title-format", takes_value=True)
+    return parser
+
+
 def _dashboard(
     view: str,
     layout: str,
@@ -211,6 +232,26 @@ def _nodes(node_name: Sequence[str]) -> tuple[str, Fields]:
     return "reconfigure", {"node": names} if names else {}
 
 
+def _rviz(
+    display_config: str,
+    fixed_frame: str,
+    port: int | None,
+    no_browser: bool,
+    listen: bool,
+    address: str,
+    read_only: bool,
+    arguments: Sequence[str] = (),
+    ignored: object = None,
+) -> int:
+    from minirospy.dashboard.rviz_door import read_file
+
+    file = Path(display_config) if display_config else None
+    if file and read_file(file) is None:
+        print(f"rviz: {file} does not exist: it is made when it is saved", file=sys.stderr)
+    fields = {"file": ["1"] if file else [], "frame": [fixed_frame] if fixed_frame else []}
+    return _serve("3d", fields, port, no_browser, listen, address, read_only, arguments, file)
+
+
 # --- the page
 
 
@@ -223,6 +264,7 @@ def _serve(
     address: str,
     read_only: bool,
     arguments: Sequence[str],
+    rviz_file: Path | None = None,
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status."""
     from minirospy.bridge.serve import require_libraries
@@ -271,7 +313,7 @@ def _serve(
                     diagnostics=False,
                     name="minirospy dashboard",
                 )
-                self.dashboard = Dashboard(self._node, options)
+                self.dashboard = Dashboard(self._node, options, rviz_file)
                 self._opened.append(self.dashboard)
                 try:
                     await self.dashboard.start()
@@ -355,6 +397,7 @@ WINDOWS = {
         _window("rqt_runtime_monitor", "diagnostics", "Shows diagnostics"),
         _window("rqt_service_caller", "services", "Calls services by forms"),
         _window("rqt_topic", "topics", "Shows topics with their values"),
+        Command("rviz", _rviz_parser, _rviz),
     )
 }
-"""The commands of rqt by name. Each has a line in the registry and in pyproject.toml, too, and a package in ros_packages/."""
+"""The commands of rqt, and rviz, by name. Each has a line in the registry and pyproject.toml, and a package in ros_packages/."""

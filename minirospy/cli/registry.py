@@ -109,6 +109,7 @@ COMMANDS = (
     Entry("dashboard", "rqt_runtime_monitor", "RQT_RUNTIME_MONITOR", "rqt_runtime_monitor"),
     Entry("dashboard", "rqt_service_caller", "RQT_SERVICE_CALLER", "rqt_service_caller"),
     Entry("dashboard", "rqt_topic", "RQT_TOPIC", "rqt_topic"),
+    Entry("dashboard", "rviz", "RVIZ", "rviz"),
     Entry("ros.rostest", "rosunit", "ROSUNIT", "rosunit"),
     Entry("ros.xacro", "main", "", "xacro", completer="files"),
     Entry("ros.urdf", "check_urdf", "CHECK", "check_urdf"),

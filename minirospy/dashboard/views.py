@@ -19,6 +19,7 @@ VIEWS = (
     "plot",
     "graph",
     "image",
+    "3d",
     "board",
     "turtlesim",
     "teleop",

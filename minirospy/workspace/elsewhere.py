@@ -116,7 +116,7 @@ _CPP = {
     "eigen_conversions": "a C++ library",
     "pluginlib": "plug-ins of C++ programs",
     "class_loader": "plug-ins of C++ programs",
-    "rviz": "a window in three dimensions, in C++",
+    "rviz": "RViz as a library, in C++",
     "spacenav_node": "an input device's driver, in C++",
     "twist_mux": "a node in C++",
     "ps3joy": "an input device's driver",
@@ -128,6 +128,7 @@ _CPP = {
 
 _MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
 _INSTEAD = {
+    "rviz": "`rviz -d FILE` shows the same in a browser",
     "twist_mux": _MUX,
     "yocs_cmd_vel_mux": _MUX,
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",

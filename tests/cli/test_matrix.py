@@ -120,7 +120,9 @@ ROWS = {
     },
 }
 
-ELSEWHERE = re.compile(r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt")
+ELSEWHERE = re.compile(
+    r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt|rviz"
+)
 """Commands with their own matrices or tests."""
 
 USAGE_ERROR = 2

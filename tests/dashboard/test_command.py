@@ -148,6 +148,7 @@ def test_screen_is_known_by_the_environment() -> None:
         (["rqt_graph"], "/#/graph"),
         (["rqt_image_view", "/camera/image_raw"], "/#/image?topic=/camera/image_raw"),
         (["rqt_reconfigure", "lamp"], "/#/reconfigure?node=/lamp"),
+        (["rviz", "-f", "odom"], "/#/3d?frame=odom"),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )

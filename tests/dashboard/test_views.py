@@ -16,7 +16,7 @@ def test_page_has_the_views_that_links_name() -> None:
         r"const VIEWS = \{(.*?)\};", (FOLDER / "js" / "main.js").read_text(encoding="utf-8"), re.DOTALL
     )
     assert table
-    assert tuple(re.findall(r"(\w+): \[", table[1])) == VIEWS
+    assert tuple(re.findall(r'"?(\w+)"?: \[', table[1])) == VIEWS
 
 
 def test_page_has_the_layouts_that_links_name() -> None:

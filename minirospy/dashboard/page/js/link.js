@@ -113,7 +113,7 @@ export class Link extends EventTarget {
     return () => { for (const name of names) this.removeEventListener(name, listener); };
   }
 
-  /** Subscribe: entry is {topic, mode: "latest" or "all", isCounted} or {path, mode: "series"}; return what ends it. */
+  /** Subscribe: entry is {topic, mode: "latest" or "all", isCounted, isOwn} or {path, mode: "series"}; return what ends it. */
   subscribe(entry, received) {
     const key = this.nextKey++;
     this.entries.set(key, received);
@@ -141,8 +141,18 @@ export class Link extends EventTarget {
     return this.request({ command: "publish", topic, type, schema, message });
   }
 
+  /** Advertise a topic before its first message, so that subscribers are connected then. */
+  advertise(topic, type, schema) {
+    this.worker.postMessage({ command: "advertise", topic, type, schema });
+  }
+
   unpublish(topic) {
     this.worker.postMessage({ command: "unpublish", topic });
+  }
+
+  /** Fetch a file by its package:// URI; the promise has its bytes. */
+  asset(uri) {
+    return this.request({ command: "asset", uri });
   }
 
   /** Set a parameter; undefined deletes it. */

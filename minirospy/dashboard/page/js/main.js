@@ -13,6 +13,7 @@ import { Parameters } from "./views/parameters.js";
 import { Plot } from "./views/plot.js";
 import { Publish } from "./views/publish.js";
 import { Reconfigure } from "./views/reconfigure.js";
+import { Scene } from "./views/scene.js";
 import { Services } from "./views/services.js";
 import { Teleop } from "./views/teleop.js";
 import { Topics } from "./views/topics.js";
@@ -25,6 +26,7 @@ const VIEWS = {
   plot: ["Plot", Plot],
   graph: ["Graph", Graph],
   image: ["Image", Image],
+  "3d": ["3D", Scene],
   board: ["Board", Board],
   turtlesim: ["Turtlesim", Turtlesim],
   teleop: ["Teleop", Teleop],

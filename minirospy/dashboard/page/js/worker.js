@@ -75,7 +75,7 @@ const TEXT_HANDLERS = {
     for (const channel of fields.channels) {
       channels.set(channel.topic, channel);
       // A channel that is offered again has another definition.
-      if (topics.has(channel.topic)) subscribeTopic(channel.topic);
+      for (const topic of topics.values()) if (topic.name === channel.topic) subscribeTopic(topic);
     }
     for (const each of wanted.values()) if (each.topic === null) resolvePath(each);
     postChannels();
@@ -85,8 +85,8 @@ const TEXT_HANDLERS = {
     for (const [topic, channel] of channels) {
       if (!gone.has(channel.id)) continue;
       channels.delete(topic);
-      const used = topics.get(topic);
-      if (used?.channelId === channel.id) {
+      for (const used of topics.values()) {
+        if (used.name !== topic || used.channelId !== channel.id) continue;
         bySubscription.delete(used.subscription);
         used.subscription = null;
       }
@@ -124,6 +124,13 @@ function receivedBinary(buffer) {
   } else if (opcode === 3) {
     const length = view.getUint32(9, true);
     finishCall(view.getUint32(5, true), (call) => call.resolve(new Uint8Array(buffer, 13 + length)));
+  } else if (opcode === 4) {
+    const length = view.getUint32(6, true);
+    const isFailed = view.getUint8(5) !== 0;
+    finishCall(view.getUint32(1, true), (call) => {
+      if (isFailed) call.reject(new TextDecoder().decode(new Uint8Array(buffer, 10, length)));
+      else call.resolve(new Uint8Array(buffer, 10 + length));
+    });
   }
 }
 
@@ -195,20 +202,21 @@ function resolvePath(entry) {
 }
 
 function use(entry) {
-  let topic = topics.get(entry.topic);
+  // One of its own gets all that is latched, however many publishers there are.
+  entry.place = entry.isOwn ? `${entry.topic} ${entry.key}` : entry.topic;
+  let topic = topics.get(entry.place);
   if (!topic) {
-    topic = { name: entry.topic, subscription: null, channelId: null, users: new Set(), last: null, definition: null };
-    topics.set(entry.topic, topic);
+    topic = { name: entry.topic, place: entry.place, subscription: null, channelId: null, users: new Set(), last: null, definition: null };
+    topics.set(entry.place, topic);
   }
   topic.users.add(entry);
-  if (topic.subscription === null) subscribeTopic(entry.topic);
+  if (topic.subscription === null) subscribeTopic(topic);
   // A latched message comes once for a subscription, however many share it.
   else if (topic.last && entry.mode !== "all") give(topic, entry, topic.last.seconds, topic.last.bytes);
 }
 
-function subscribeTopic(name) {
-  const topic = topics.get(name);
-  const channel = channels.get(name);
+function subscribeTopic(topic) {
+  const channel = channels.get(topic.name);
   if (!channel || (topic.subscription !== null && topic.channelId === channel.id)) return;
   if (topic.subscription !== null) endSubscription(topic);
   topic.subscription = nextId++;
@@ -233,12 +241,12 @@ function endSubscription(topic) {
 function unsubscribe(key) {
   const entry = wanted.get(key);
   wanted.delete(key);
-  const topic = entry && topics.get(entry.topic);
+  const topic = entry && topics.get(entry.place);
   if (!topic) return;
   topic.users.delete(entry);
   if (!topic.users.size) {
     if (topic.subscription !== null) endSubscription(topic);
-    topics.delete(topic.name);
+    topics.delete(topic.place);
   }
 }
 
@@ -398,16 +406,17 @@ function call({ id, service: name, request }) {
   socket.send(frame);
 }
 
-function publish({ id, topic, type, schema, message }) {
+/** Fetch a file of a package. */
+function asset({ id, uri }) {
   const fail = (error) => post({ kind: "answer", id, error });
   if (socket?.readyState !== WebSocket.OPEN) return fail("the connection is lost");
-  if (!capabilities.has("clientPublish")) return fail("publishing is not allowed: this token is read-only");
-  let body;
-  try {
-    body = encode(definitionOf(type, schema), message);
-  } catch (error) {
-    return fail(error.message);
-  }
+  const requestId = nextId++;
+  calls.set(requestId, { reject: fail, resolve: (bytes) => post({ kind: "answer", id, response: bytes }, [bytes.buffer]) });
+  return send({ op: "fetchAsset", uri, requestId });
+}
+
+/** Return the channel of a topic that is published, which is advertised if it was not. */
+function publication({ topic, type, schema }) {
   let channel = published.get(topic);
   if (channel && channel.type !== type) {
     send({ op: "unadvertise", channelIds: [channel.id] });
@@ -418,6 +427,20 @@ function publish({ id, topic, type, schema, message }) {
     published.set(topic, channel);
     send({ op: "advertise", channels: [{ id: channel.id, topic, encoding: "ros1", schemaName: type, schema, schemaEncoding: "ros1msg" }] });
   }
+  return channel;
+}
+
+function publish({ id, topic, type, schema, message }) {
+  const fail = (error) => post({ kind: "answer", id, error });
+  if (socket?.readyState !== WebSocket.OPEN) return fail("the connection is lost");
+  if (!capabilities.has("clientPublish")) return fail("publishing is not allowed: this token is read-only");
+  let body;
+  try {
+    body = encode(definitionOf(type, schema), message);
+  } catch (error) {
+    return fail(error.message);
+  }
+  const channel = publication({ topic, type, schema });
   const frame = new Uint8Array(5 + body.length);
   const view = new DataView(frame.buffer);
   view.setUint8(0, 1);
@@ -439,7 +462,9 @@ const COMMANDS = {
   subscribe: (command) => subscribe(command.entry),
   unsubscribe: (command) => unsubscribe(command.key),
   call,
+  asset,
   publish,
+  advertise: (command) => { if (socket?.readyState === WebSocket.OPEN && capabilities.has("clientPublish")) publication(command); },
   unpublish({ topic }) {
     const channel = published.get(topic);
     if (channel) send({ op: "unadvertise", channelIds: [channel.id] });

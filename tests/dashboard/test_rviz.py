@@ -1,0 +1,161 @@
+""".rviz files: their YAML, and reading and saving them over WebSocket."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from minirospy.bridge.access import Access
+from minirospy.cli import dashboard as command
+from minirospy.dashboard.rviz_door import SUBPROTOCOL
+from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
+from minirospy.errors import RvizFileError
+
+if TYPE_CHECKING:
+    from tests.dashboard.conftest import Served
+
+FILE = """Panels:
+  - Class: rviz/Displays
+    Property Tree Widget:
+      Expanded: ~
+      Splitter Ratio: 0.5
+Visualization Manager:
+  Displays:
+    - Alpha: 0.029999999329447746
+      Class: rviz/Grid
+      Color: 160; 160; 164
+      Enabled: true
+      Offset:
+        X: 0
+        Y: 0
+        Z: 0
+  Global Options:
+    Fixed Frame: map
+Window Geometry:
+  QMainWindow State: 000000ff00000000fd00000004
+  Odd State: 00000012
+  Width: 1200
+"""
+
+
+def test_file_of_rviz_is_written_as_it_was_read() -> None:
+    found = parse_rviz(FILE)
+    assert found["Window Geometry"] == {
+        "QMainWindow State": "000000ff00000000fd00000004",
+        "Odd State": "00000012",
+        "Width": 1200,
+    }
+    assert json.loads(json.dumps(found)) == found
+    again = format_rviz(found)
+    assert parse_rviz(again) == found
+    lines = set(FILE.splitlines())
+    # A text of digits is quoted, so that every reader takes it as one.
+    assert [line for line in again.splitlines() if line not in lines] == ["  Odd State: '00000012'"]
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("a: 1", 'x.rviz: not a file of RViz: it has no "Visualization Manager"'),
+        ("- 1", 'x.rviz: not a file of RViz: it has no "Visualization Manager"'),
+        ("", 'x.rviz: not a file of RViz: it has no "Visualization Manager"'),
+        ("a:\n  - b\n c: [", "x.rviz:3: not YAML: "),
+        ("a: &x 1\nb: *x", "x.rviz:2: a file of RViz has no aliases (*x)"),
+        ("[" * 60, "x.rviz:1: nested too deeply"),
+        ("a: \0", "x.rviz: not YAML: "),
+        ("x" * 1_000_001, "x.rviz: more than 1000000 characters"),
+        ("a: !!python/object:os.system x", "x.rviz:1: not YAML: could not determine a constructor"),
+    ],
+    ids=range(9),
+)
+def test_text_that_is_not_a_file_of_rviz_is_refused(text: str, error: str) -> None:
+    with pytest.raises(RvizFileError, match="^" + re.escape(error)):
+        parse_rviz(text, "x.rviz")
+
+
+@pytest.fixture
+def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[object], Any]]]:
+    """Return a function that opens the door of a dashboard with this file; what it returns sends an operation."""
+    sockets = ExitStack()
+
+    def opening(file: Path | None, token: str = "", **options: Any) -> Callable[[object], Any]:
+        served = serve(**options)
+        assert served.dashboard
+        served.dashboard.rviz.file = file
+        names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
+        connecting = connect(f"ws://127.0.0.1:{served.port}/", subprotocols=names, compression=None)
+        socket = sockets.enter_context(connecting)
+
+        def send(operation: object) -> Any:
+            socket.send(json.dumps(operation))
+            return json.loads(socket.recv(timeout=60))
+
+        return send
+
+    with sockets:
+        yield opening
+
+
+def test_file_of_the_command_is_read_and_saved(
+    opened: Callable[..., Callable[[object], Any]], tmp_path: Path
+) -> None:
+    file = tmp_path / "my.rviz"
+    send = opened(file)
+    assert send({"read": True}) == {"config": None, "name": "my.rviz", "writes": True}
+    config = parse_rviz(FILE)
+    assert send({"save": config}) == {"name": "my.rviz"}
+    assert parse_rviz(file.read_text(encoding="utf-8")) == config
+    assert send({"read": True})["config"] == config
+    assert [path.name for path in tmp_path.iterdir()] == ["my.rviz"]
+    assert send({"save": {"a": 1}}) == {
+        "error": 'the file: not a file of RViz: it has no "Visualization Manager"'
+    }
+    assert parse_rviz(file.read_text(encoding="utf-8")) == config
+
+
+def test_text_of_the_browser_is_read_and_written(opened: Callable[..., Callable[[object], Any]]) -> None:
+    send = opened(None)
+    config = send({"parse": FILE})["config"]
+    assert parse_rviz(send({"format": config})["text"]) == config
+    assert "not YAML" in send({"parse": "a: ["})["error"]
+    assert "was not started with a .rviz file" in send({"read": True})["error"]
+    assert "was not started with a .rviz file" in send({"save": config})["error"]
+
+
+@pytest.mark.parametrize(
+    "operation", [1, {}, {"remove": 1}, {"parse": 1}, {"save": "x", "read": 1}, None, []]
+)
+def test_what_is_not_an_operation_is_refused(
+    opened: Callable[..., Callable[[object], Any]], operation: object
+) -> None:
+    assert opened(None)(operation)["error"].startswith("not an operation on .rviz files")
+
+
+def test_read_only_token_saves_nothing(
+    opened: Callable[..., Callable[[object], Any]], tmp_path: Path
+) -> None:
+    file = tmp_path / "my.rviz"
+    file.write_text(FILE, encoding="utf-8")
+    access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    send = opened(file, "read-token-00", access=access)
+    found = send({"read": True})
+    assert found["writes"] is False
+    assert send({"save": found["config"]}) == {
+        "error": "this token is read-only: the file cannot be saved with it"
+    }
+    assert file.read_text(encoding="utf-8") == FILE
+
+
+def test_rviz_names_a_file_that_it_cannot_read(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "bad.rviz"
+    file.write_text("a: [", encoding="utf-8")
+    assert command.rviz(["-d", str(file), "--no-browser"]) == 1
+    assert f"{file}:1: not YAML" in capsys.readouterr().err

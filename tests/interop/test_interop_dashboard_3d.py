@@ -1,0 +1,402 @@
+"""The 3D view of the dashboard in Debian's chromium, whose WebGL is drawn in software, used as a person uses it."""
+
+from __future__ import annotations
+
+import io
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PointStamped, PoseStamped, PoseWithCovarianceStamped
+from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from minirospy.dashboard.rviz_file import parse_rviz
+from tests.dashboard.conftest import Served, serve
+from tests.interop import robot_scene
+from tests.interop.browser import PATIENCE, Page
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+
+__all__ = ["browse", "serve"]
+
+pytestmark = needs_chromium
+
+Browse = Callable[..., Page]
+Serve = Callable[..., Served]
+
+
+def publish(served: Served, messages: dict[str, Any]) -> Callable[[str, Any], None]:
+    """Publish latched messages by their topics; return a function that publishes more."""
+    node = served.node("robot")
+    publishers: dict[str, Any] = {}
+
+    def send(topic: str, message: Any) -> None:
+        async def run() -> None:
+            if topic not in publishers:
+                publishers[topic] = await node.advertise(topic, type(message), latch=True)
+            await publishers[topic].publish(message)
+
+        served.run(run())
+
+    for topic, message in messages.items():
+        send(topic, message)
+    return send
+
+
+class Listener:
+    """A subscriber of a topic."""
+
+    def __init__(self, served: Served, topic: str, cls: type) -> None:
+        node = served.node("listener" + topic.replace("/", "_"))
+
+        async def subscribe() -> Any:
+            return await node.subscribe(topic, cls)
+
+        self._served = served
+        self._subscription = served.run(subscribe())
+
+    def connected(self) -> None:
+        """Wait until the page's publisher is connected."""
+        self._served.run(self._subscription.wait_for_publishers(timeout=50))
+
+    def next(self) -> Any:
+        return self._served.run(self._subscription.next(50))
+
+
+def drawn(page: Page) -> int:
+    """Wait for a picture; return the number of pictures."""
+    return int(page.wait("return Number(document.querySelector('canvas.stage')?.dataset.drawn) || 0"))
+
+
+def status(page: Page, name: str, text: str) -> None:
+    """Fold out a display, and wait until its status has this text."""
+    page.wait(
+        f"const d = [...document.querySelectorAll('.display')].find(e => e.dataset.name === {name!r}); if (!d) return false;"
+        "const b = d.querySelector('.display-name'); if (b.getAttribute('aria-expanded') === 'false') b.click();"
+        f"return d.querySelector('.display-status').textContent.includes({text!r})"
+    )
+
+
+def levels(page: Page) -> dict[str, str]:
+    """Return the levels of all displays, by their names."""
+    found = page.evaluate(
+        "Object.fromEntries([...document.querySelectorAll('.displays .display')].map(e => [e.dataset.name, e.dataset.level]))"
+    )
+    return dict(found)
+
+
+def mouse(page: Page, kind: str, x: float, y: float, buttons: int = 0) -> None:
+    """Move (mouseMoved), press or release the mouse: pixels from the middle of the picture, y downwards."""
+    left, top = page.evaluate(
+        "(() => { const r = document.querySelector('canvas.stage').getBoundingClientRect();"
+        "return [r.x + r.width / 2, r.y + r.height / 2] })()"
+    )
+    page.call(
+        "Input.dispatchMouseEvent",
+        type=kind,
+        x=left + x,
+        y=top + y,
+        button="none" if kind == "mouseMoved" else "left",
+        buttons=buttons,
+        clickCount=0 if kind == "mouseMoved" else 1,
+    )
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    mouse(page, "mouseMoved", *start)
+    mouse(page, "mousePressed", *start, buttons=1)
+    mouse(page, "mouseMoved", (start[0] + end[0]) / 2, (start[1] + end[1]) / 2, buttons=1)
+    mouse(page, "mouseMoved", *end, buttons=1)
+    mouse(page, "mouseReleased", *end)
+
+
+def colors(page: Page) -> set[tuple[int, int, int]]:
+    """Return the colors of the picture."""
+    import base64
+
+    from PIL import Image
+
+    data = base64.b64decode(page.call("Page.captureScreenshot", format="png")["data"])
+    image = Image.open(io.BytesIO(data)).convert("RGB")
+    return {color for _, color in image.getcolors(image.width * image.height) or []}  # type: ignore[misc]
+
+
+def is_near(found: set[tuple[int, int, int]], wanted: tuple[int, int, int], most: int = 12) -> bool:
+    return any(all(abs(a - b) <= most for a, b in zip(color, wanted, strict=True)) for color in found)
+
+
+def look_down(page: Page) -> float:
+    """Look from above; return how many pixels a metre has."""
+    page.choose("select[aria-label=View]", "top")
+    page.evaluate("new Promise(requestAnimationFrame)")
+    return float(page.evaluate("document.querySelector('.scene').clientHeight")) / (10 * 0.83)
+
+
+def test_robot_in_its_room_is_shown_without_a_click(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    served.run(served.node("setter").set_param("/robot_description", robot_scene.description()))
+    publish(served, robot_scene.everything())
+    page = browse(address(served, "3d"), width=1280, height=800)
+    count = len(robot_scene.everything()) - 1 + 3  # tf; grid, TF and the robot
+    page.wait(
+        "const all = [...document.querySelectorAll('.displays .display')];"
+        f"return all.length === {count} && all.every(e => e.dataset.level === 'ok')"
+    )
+    labels = page.wait(
+        "const all = [...document.querySelectorAll('.label:not([hidden])')].map(e => e.textContent);"
+        "return all.length >= 8 && all"
+    )
+    assert {"map", "odom", "base_link", "laser", "dock"} <= set(labels)
+    assert "map: OK" in page.wait_text(".scene-side", "OK")
+    drawn(page)
+    found = colors(page)
+    # The background, the map's free cells below its grid, the cloud, the path.
+    for wanted in ((48, 48, 48), (197, 197, 197), (25, 255, 0)):
+        assert is_near(found, wanted, 16), wanted
+
+
+def test_missing_frame_is_named_until_it_comes(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    scan = robot_scene.scan()
+    scan.header.frame_id = "lost"
+    frames = TFMessage([robot_scene.transform("map", "odom", 1, 0)])
+    send = publish(served, {"/scan": scan, "/tf_static": frames})
+    page = browse(address(served, "3d"))
+    status(
+        page,
+        "LaserScan /scan",
+        "Transform: No transform from [lost] to fixed frame [map]: Frame [lost] does not exist",
+    )
+    assert levels(page)["LaserScan /scan"] == "error"
+    send("/tf", TFMessage([robot_scene.transform("odom", "lost", 0, 1)]))
+    status(page, "LaserScan /scan", "Transform: Transform OK")
+    page.choose("select[aria-label='Fixed frame']", "odom")
+    page.wait_text(".scene-side", "odom: OK")
+
+
+def test_without_transforms_the_frame_of_the_messages_is_fixed(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    publish(served, {"/scan": robot_scene.scan()})
+    page = browse(address(served, "3d"))
+    status(page, "LaserScan /scan", "Transform: Transform OK")
+    page.wait_text(".scene-side", "Fixed Frame [laser] does not exist")
+    status(page, "TF", "No tf data")
+
+
+def test_tools_publish_poses_goals_and_points(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames()})
+    estimates = Listener(served, "/initialpose", PoseWithCovarianceStamped)
+    goals = Listener(served, "/move_base_simple/goal", PoseStamped)
+    points = Listener(served, "/clicked_point", PointStamped)
+    page = browse(address(served, "3d"))
+    page.wait_text(".scene-side", "map: OK")
+    metre = look_down(page)
+
+    page.click(".tools button", "2D Pose Estimate")
+    estimates.connected()
+    drag(page, (metre, 0), (metre, -2 * metre))
+    estimate = estimates.next()
+    assert estimate.header.frame_id == "map"
+    position, orientation = estimate.pose.pose.position, estimate.pose.pose.orientation
+    assert (position.x, position.y) == pytest.approx((1, 0), abs=0.05)
+    assert orientation.z == pytest.approx(0.7071, abs=0.01)
+    assert [round(estimate.pose.covariance[index], 4) for index in (0, 7, 35)] == [0.25, 0.25, 0.0685]
+    page.wait_text("[role=status]", "published /initialpose")
+
+    page.click(".tools button", "2D Nav Goal")
+    goals.connected()
+    drag(page, (0, metre), (-metre, metre))
+    goal = goals.next()
+    assert goal.pose.position.y == pytest.approx(-1, abs=0.05)
+    assert abs(goal.pose.orientation.z) == pytest.approx(1, abs=0.01)
+
+    page.click(".tools button", "Publish Point")
+    points.connected()
+    drag(page, (2 * metre, 2 * metre), (2 * metre, 2 * metre))
+    point = points.next().point
+    assert (point.x, point.y, point.z) == pytest.approx((2, -2, 0), abs=0.05)
+
+
+def test_measure_and_focus_find_what_is_under_the_mouse(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    cube = robot_scene.marker(Marker.CUBE, 0, 0)
+    cube.scale.z = 1.0
+    publish(served, {"/shape": cube, "/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    status(page, "Marker /shape", "1 markers")
+    metre = look_down(page)
+    page.click(".tools button", "Measure")
+    drag(page, (-metre, 0), (-metre, 0))
+    drag(page, (-metre, -2 * metre), (-metre, -2 * metre))
+    assert float(page.wait_text(".label.measure", "m").split()[0]) == pytest.approx(2, abs=0.03)
+    page.click(".tools button", "Focus")
+    drag(page, (0, 0), (0, 0))
+    # The top of the cube: half a metre above its middle.
+    page.wait_text("[role=status]", "0.70)")
+
+
+def test_displays_are_added_set_hidden_and_removed(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames(), "/cloud": robot_scene.cloud()})
+    page = browse(address(served, "3d"))
+    status(page, "PointCloud2 /cloud", "Showing 8064 points from 8064")
+    page.choose("[data-name='PointCloud2 /cloud'] select[aria-label='Color Transformer']", "FlatColor")
+    page.evaluate(
+        "(() => { const e = document.querySelector(\"[data-name='PointCloud2 /cloud'] input[type=color]\");"
+        "e.value = '#00ff00'; e.dispatchEvent(new Event('change')) })()"
+    )
+    page.type("[data-name='PointCloud2 /cloud'] input[aria-label='Size (m)']", "0.3")
+    page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
+    page.wait("return Boolean(localStorage.getItem('3d')?.includes('0; 255; 0'))")
+    assert is_near(colors(page), (0, 255, 0), 0)
+    page.click("[data-name='PointCloud2 /cloud'] input[type=checkbox]")
+    page.wait("return document.querySelector(\"[data-name='PointCloud2 /cloud']\").classList.contains('off')")
+    page.call("Page.reload")
+    page.wait("return document.querySelector(\"[data-name='PointCloud2 /cloud']\").classList.contains('off')")
+    drawn(page)
+    assert not is_near(colors(page), (0, 255, 0), 0)
+    page.click("[data-name='PointCloud2 /cloud'] .display-name")
+    page.click("[data-name='PointCloud2 /cloud'] button", "Remove")
+    page.wait("return !document.querySelector(\"[data-name='PointCloud2 /cloud']\")")
+    page.evaluate(
+        "document.querySelector('select[aria-label=\"Add a display\"]').dispatchEvent(new Event('focus'))"
+    )
+    page.choose("select[aria-label='Add a display']", "PointCloud2 /cloud")
+    status(page, "PointCloud2 /cloud", "Showing 8064 points from 8064")
+
+
+def test_markers_come_and_go(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    send = publish(served, {"/tf_static": robot_scene.frames(), "/shapes": robot_scene.markers()})
+    page = browse(address(served, "3d"))
+    status(page, "MarkerArray /shapes", "Markers: 11 markers")
+    page.wait_text(".label.marker", "dock")
+    gone = robot_scene.marker(Marker.TEXT_VIEW_FACING, 0, 0, action=Marker.DELETE)
+    send("/shapes", MarkerArray([gone]))
+    status(page, "MarkerArray /shapes", "Markers: 10 markers")
+    assert not page.evaluate("document.querySelectorAll('.label.marker').length")
+    bad = robot_scene.marker(Marker.CUBE, float("nan"), 0)
+    odd = robot_scene.marker(Marker.LINE_LIST, 0, 0, points=[Marker().pose.position])
+    send("/shapes", MarkerArray([bad]))
+    status(
+        page, "MarkerArray /shapes", "shapes/1: Marker contained invalid floating point values (nans or infs)"
+    )
+    send("/shapes", MarkerArray([odd]))
+    status(page, "MarkerArray /shapes", "shapes/5: a line list needs an even number of points")
+    send("/shapes", MarkerArray([robot_scene.marker(0, 0, 0, action=Marker.DELETEALL)]))
+    status(page, "MarkerArray /shapes", "Markers: 0 markers")
+
+
+STL = (
+    b"\0" * 80
+    + struct.pack("<I", 2)
+    + 2 * (struct.pack("<12f", 0, 0, 1, -1, -1, 0.5, 1, -1, 0.5, 0, 1, 0.5) + b"\0\0")
+)
+
+
+def test_robot_has_its_meshes_and_follows_its_joints_without_transforms(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "my_meshes"
+    package.mkdir()
+    (package / "package.xml").write_text("<package><name>my_meshes</name></package>", encoding="utf-8")
+    (package / "part.stl").write_bytes(STL)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    shape = (
+        '<visual><geometry><mesh filename="package://my_meshes/%s"/></geometry>'
+        '<material name="m"><color rgba="1 0 1 1"/></material></visual>'
+    )
+    setter = served.node("setter")
+    served.run(setter.set_param("/robot_description", robot_scene.description(shape % "part.stl")))
+    send = publish(served, {})
+    page = browse(address(served, "3d"))
+    status(
+        page,
+        "RobotModel",
+        "No transform from [mast] to fixed frame [base_link]: Frame [mast] does not exist; and 4 more links",
+    )
+    send("/joint_states", JointState(name=["left_wheel_joint"], position=[1.0]))
+    status(page, "RobotModel", "Transform: Transform OK")
+    page.wait("return !document.querySelector(\"[data-name='RobotModel']\").textContent.includes('Meshes')")
+    wait_color(page, (255, 0, 255))
+    served.run(setter.set_param("/robot_description", robot_scene.description(shape % "missing.stl")))
+    status(page, "RobotModel", "there is no such file")
+    served.run(setter.set_param("/robot_description", "<robot>"))
+    status(page, "RobotModel", "URDF failed Model parse: line 1: </robot> is missing")
+
+
+def wait_color(page: Page, wanted: tuple[int, int, int]) -> None:
+    """Wait until the picture has a color of about this hue."""
+    end = time.monotonic() + PATIENCE
+    while not any(r > 150 and b > 150 and g < 60 for r, g, b in colors(page)):
+        assert time.monotonic() < end, wanted
+        page.evaluate("new Promise(requestAnimationFrame)")
+
+
+RVIZ = """Visualization Manager:
+  Displays:
+    - {Class: rviz/Grid, Name: Floor, Enabled: true, Plane Cell Count: 4, Color: 255; 0; 0}
+    - Class: rviz/Group
+      Displays:
+        - {Class: rviz/LaserScan, Name: Front, Enabled: true, Topic: /scan, Style: Points, Size (Pixels): 4}
+      Enabled: true
+      Name: Sensors
+    - {Class: moveit_rviz_plugin/MotionPlanning, Name: Planning, Enabled: true, Planned Path: {Loop: true}}
+  Global Options: {Background Color: 10; 20; 30, Fixed Frame: odom, Frame Rate: 30}
+  Tools:
+    - {Class: rviz/SetGoal, Topic: /my/goal}
+  Views:
+    Current: {Class: rviz/TopDownOrtho, Scale: 40, X: 1, Y: 0, Angle: 0, Target Frame: base_link}
+"""
+
+
+def test_file_of_rviz_is_opened_changed_and_saved(serve: Serve, browse: Browse, tmp_path: Path) -> None:
+    file = tmp_path / "my.rviz"
+    file.write_text(RVIZ, encoding="utf-8")
+    served = serve()
+    assert served.dashboard
+    served.dashboard.rviz.file = file
+    publish(
+        served, {"/tf_static": robot_scene.frames(), "/scan": robot_scene.scan(), "/map": robot_scene.grid()}
+    )
+    page = browse(address(served, "3d?file=1"))
+    page.wait_text(
+        "[role=status]", "not shown, but kept when it is saved: Planning (moveit_rviz_plugin/MotionPlanning)"
+    )
+    status(page, "Front", "Transform: Transform OK")
+    page.wait_text(".scene-side", "odom: OK")
+    names = "[...document.querySelectorAll('.displays .display')].map(e => e.dataset.name)"
+    # Nothing is added to what the file has.
+    assert page.evaluate(names) == ["Floor", "Sensors", "Front", "Planning"]
+    drawn(page)
+    assert is_near(colors(page), (10, 20, 30), 2)
+    assert page.evaluate("document.querySelector('select[aria-label=View]').value") == "top"
+    page.click("[data-name='Front'] input[type=checkbox]")
+    page.click(".files button", "Save")
+    page.wait_text("[role=status]", "saved my.rviz")
+    before, after = parse_rviz(RVIZ), parse_rviz(file.read_text(encoding="utf-8"))
+    manager: Any = after["Visualization Manager"]
+    assert manager["Displays"][1]["Displays"][0]["Enabled"] is False
+    assert manager["Displays"][2] == before["Visualization Manager"]["Displays"][2]  # type: ignore[index]
+    assert manager["Views"]["Current"]["Target Frame"] == "base_link"
+    assert manager["Global Options"]["Fixed Frame"] == "odom"
+
+
+def test_read_only_page_publishes_nothing(serve: Serve, browse: Browse) -> None:
+    from minirospy.bridge.access import Access
+
+    access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    served = serve(access=access)
+    page = browse(address(served, "3d?token=read-token-00"))
+    page.wait_text("#state", "connected, read-only")
+    drawn(page)
+    page.click(".tools button", "Publish Point")
+    look_down(page)
+    drag(page, (10, 10), (10, 10))
+    page.wait_text("[role=status]", "/clicked_point: publishing is not allowed: this token is read-only")
