@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -91,14 +92,23 @@ def _is_dumb() -> bool:
 def _own_world() -> Iterator[Path]:
     """Set up a master port and a board of the demo's own, so that it disturbs nobody; yield a folder for its files."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
         os.environ["MINIROSPY_LOCAL"] = "1"
-        os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+        os.environ["ROS_MASTER_URI"] = f"http://localhost:{_free_port()}"
         os.environ["ROS_LOG_DIR"] = folder
         os.environ.setdefault("MINIROSPY_BOARD", f"demo-{os.getpid()}")
         yield Path(folder)
+
+
+def _free_port() -> int:
+    """Return a port for the master, which starts later.
+
+    The system's own choice would be ephemeral, from 32768 or 49152 on: any connection of another program may get it meanwhile.
+    """
+    for port in random.sample(range(20_000, 32_000), 100):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise MinirospyError("the demo's master finds no free port from 20000 to 32000")
 
 
 @contextlib.contextmanager

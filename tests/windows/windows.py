@@ -91,6 +91,9 @@ class Windows:
             if words[0].endswith((".exe", "cmd"))
             else [_wine(), rf"{PYTHON}\python.exe", *words]
         )
+        if console is not None:
+            # The terminal of a new session: then its Ctrl-C is a signal for what runs in it.
+            command = ["setsid", "--ctty", *command]
         process = subprocess.Popen(
             command,
             # No file and no /dev/null: Python for Windows takes neither for a standard stream in Wine.
@@ -99,7 +102,6 @@ class Windows:
             stderr=subprocess.STDOUT,
             cwd=folder,
             env=self._environment(environ or {}),
-            start_new_session=console is not None,
         )
         if process.stdin and not has_input:
             process.stdin.close()

@@ -1,0 +1,97 @@
+"""Launchers that are ended by force, many times; and Ctrl-C in a console, as Wine delivers it."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import write_files
+from tests.windows.programs import MANIFEST, SECONDS, WAIT, WINDOWS, Start, command, no_process_left
+
+TOGETHER = 5
+ROUNDS = 10
+
+if sys.platform != "win32":
+    import pty
+
+
+@pytest.mark.timeout(3000)
+def test_fifty_launches_ended_by_force_leave_no_process(start: Start) -> None:
+    """`minirospy demo` in fives; each ended at another moment, the last when all of its nodes work."""
+    for _ in range(ROUNDS):
+        runs = [
+            start(command("minirospy"), "demo", MINIROSPY_BOARD=f"demo-{number}")
+            for number in range(TOGETHER)
+        ]
+        for run in runs[:2]:
+            run.until("Starting")
+            run.close()
+        for run in runs[2:4]:
+            run.until("1: button 1 pressed")
+            run.close()
+        runs[4].until("2: button 1 pressed")
+        runs[4].close()
+        no_process_left()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Wine's console is a terminal of Linux")
+def test_ctrl_c_in_the_console_ends_roslaunch_and_its_nodes(place: Path, environ: dict[str, str]) -> None:
+    launch = '<launch><node pkg="pkg" type="wait.py" name="a" output="screen"/></launch>'
+    write_files(place / "pkg", {"package.xml": MANIFEST, "wait.py": WAIT, "a.launch": launch})
+    terminal, console = pty.openpty()
+    process = WINDOWS.popen(
+        command("roslaunch"),
+        "pkg",
+        "a.launch",
+        folder=place,
+        environ={**environ, "TERM": "xterm"},
+        console=console,
+    )
+    os.close(console)
+    printed = _Terminal(terminal)
+    try:
+        printed.until("waiting")
+        os.write(terminal, b"\x03")
+        printed.until("shutting down processing monitor complete")
+        assert process.wait(SECONDS) == 0
+        no_process_left()
+    finally:
+        process.kill()
+        process.wait()
+        printed.close()
+
+
+class _Terminal:
+    """What programs print on a pseudo terminal."""
+
+    def __init__(self, file: int) -> None:
+        self._file = file
+        self._changed = threading.Condition()
+        self._said = ""
+        self._thread = threading.Thread(target=self._read)
+        self._thread.start()
+
+    def until(self, words: str) -> None:
+        with self._changed:
+            assert self._changed.wait_for(lambda: words in self._said, SECONDS), self._said
+
+    def close(self) -> None:
+        self._thread.join(SECONDS)
+        os.close(self._file)
+
+    def _read(self) -> None:
+        while True:
+            try:
+                data = os.read(self._file, 65536)
+            except OSError:
+                # The last program has closed its side.
+                return
+            if not data:
+                return
+            with self._changed:
+                self._said += data.decode(errors="replace")
+                self._changed.notify_all()
