@@ -95,7 +95,9 @@ def _own_world() -> Iterator[Path]:
         os.environ["MINIROSPY_LOCAL"] = "1"
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{_free_port()}"
         os.environ["ROS_LOG_DIR"] = folder
-        os.environ.setdefault("MINIROSPY_BOARD", f"demo-{os.getpid()}")
+        if not os.environ.get("MINIROSPY_BOARD"):
+            os.environ["MINIROSPY_BOARD"] = f"demo-{os.getpid()}"
+            os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
         yield Path(folder)
 
 

@@ -337,8 +337,10 @@ def _start_server(place: Place) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
+    # A temporary board is for what the guarded process has started, and need not outlive it.
+    start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(place.log_path, "a") as log:
-        process = start_outside_of_job(
+        process = start(
             [sys.executable, "-c", _SERVE, root, str(place.folder), place.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

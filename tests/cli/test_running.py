@@ -386,3 +386,23 @@ def test_the_demo_shows_the_led_following(started: list[subprocess.Popen[str]]) 
     assert "1: button 1 pressed  -> LED on GPIO 7 on after " in output
     assert "1: button 1 released -> LED on GPIO 7 off after " in output
     assert demo.returncode == 0
+
+
+def test_the_demo_leaves_no_file_of_its_board(
+    started: list[subprocess.Popen[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "boards"
+    monkeypatch.delenv("MINIROSPY_BOARD")
+    monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(folder))
+    demo = start(started, "minirospy", "demo", "--presses", "1")
+    demo.communicate(timeout=50)
+    assert demo.returncode == 0
+
+    boards = [
+        process
+        for process in psutil.process_iter(["cmdline"])
+        if str(folder) in (process.info["cmdline"] or ())
+    ]
+    _, left = psutil.wait_procs(boards, timeout=30)
+    assert not left
+    assert not list(folder.iterdir())
