@@ -22,7 +22,7 @@ __all__ = ["CORE_PARAMETERS", "LaunchMaster"]
 CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_VERSION}
 """Set at each launch, as in ROS."""
 
-_START_SECONDS = 15.0
+_START_SECONDS = 60.0
 
 
 class LaunchMaster:
