@@ -66,6 +66,15 @@ class Run:
             self.said += line
         return self.said
 
+    def reaches(self, words: str) -> bool:
+        """Read until the words were printed; return False where it ends before."""
+        while words not in self.said:
+            line = self._lines.get(timeout=SECONDS)
+            if not line:
+                return False
+            self.said += line
+        return True
+
     def available(self) -> str:
         """Return what was printed so far."""
         while not self._lines.empty():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
 import threading
@@ -12,8 +13,9 @@ import pytest
 from tests.conftest import write_files
 from tests.windows.programs import MANIFEST, SECONDS, WAIT, WINDOWS, Start, command, no_process_left
 
+LAUNCHES = 50
 TOGETHER = 5
-ROUNDS = 10
+MOMENTS = ("Starting", "1: button 1 pressed", "2: button 1 pressed")
 
 if sys.platform != "win32":
     import pty
@@ -21,18 +23,16 @@ if sys.platform != "win32":
 
 @pytest.mark.timeout(3000)
 def test_fifty_launches_ended_by_force_leave_no_process(start: Start) -> None:
-    """`minirospy demo` in fives; each ended at another moment, the last when all of its nodes work."""
-    for _ in range(ROUNDS):
+    """`minirospy demo`, five at a time; ended while it starts, when its nodes work, and in between."""
+    killed = 0
+    moments = itertools.cycle(MOMENTS)
+    while killed < LAUNCHES:
         # Each has a board of its own.
         runs = [start(command("minirospy"), "demo", MINIROSPY_BOARD="") for _ in range(TOGETHER)]
-        for run in runs[:2]:
-            run.until("Starting")
+        for run in runs:
+            # On a very busy machine a demo may give up before its nodes work: that is none of the fifty.
+            killed += run.reaches(next(moments))
             run.close()
-        for run in runs[2:4]:
-            run.until("1: button 1 pressed")
-            run.close()
-        runs[4].until("2: button 1 pressed")
-        runs[4].close()
         no_process_left()
 
 
