@@ -50,7 +50,8 @@ interop: $(STAMP)
 
 # The environment is kept in build/windows; tests that need no Unix run in there, too.
 WINDOWS_TESTS := tests/wire tests/graph tests/idl/test_parse.py tests/test_child_lifetime.py tests/test_signal_dispatch.py \
-  tests/test_names.py tests/test_times.py tests/test_clock.py tests/test_environment.py tests/runtime/node/test_topics.py
+  tests/test_names.py tests/test_times.py tests/test_clock.py tests/test_environment.py tests/test_open_files.py tests/gpio \
+  tests/runtime/node/test_topics.py
 windows: $(STAMP)
 	@sh tests/windows/install_wine.sh
 	@$(BIN)/python tests/windows/windows.py setup
