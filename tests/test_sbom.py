@@ -28,6 +28,7 @@ MANIFEST = (
     "<license>BSD</license></package>"
 )
 SCRIPT = b"export {}"
+BUNDLE = b"export{}"
 
 
 def _wheel(folder: Path, **changed: str) -> Path:
@@ -36,6 +37,7 @@ def _wheel(folder: Path, **changed: str) -> Path:
         "minirospy/share/msgs/std_msgs/package.xml": MANIFEST,
         "minirospy/share/msgs/std_msgs/msg/Bool.msg": "bool data\n",
         f"{VENDOR}dagre/dagre.esm.js": SCRIPT.decode(),
+        f"{VENDOR}dagre/dagre.min.js": BUNDLE.decode(),
         f"{VENDOR}dagre/LICENSE.txt": "MIT",
         f"{VENDOR}versions.json": json.dumps(
             {
@@ -47,6 +49,7 @@ def _wheel(folder: Path, **changed: str) -> Path:
                         "dist/dagre.esm.js": hashlib.sha256(SCRIPT).hexdigest(),
                         "LICENSE": hashlib.sha256(b"MIT").hexdigest(),
                     },
+                    "bundle": {"file": "dagre.min.js", "sha256": hashlib.sha256(BUNDLE).hexdigest()},
                 }
             }
         ),
@@ -95,6 +98,7 @@ def test_sbom_has_what_is_inside_with_licences(bom: dict[str, Any]) -> None:
     assert [file["name"] for file in dagre["components"]] == [
         f"{VENDOR}dagre/dagre.esm.js",
         f"{VENDOR}dagre/LICENSE.txt",
+        f"{VENDOR}dagre/dagre.min.js",
     ]
     assert (messages["name"], messages["version"]) == ("std_msgs", "0.5.13")
     assert messages["licenses"] == [{"license": {"name": "BSD"}}]
@@ -109,6 +113,7 @@ def test_sbom_of_a_wheel_and_a_time_is_always_the_same(tmp_path: Path) -> None:
     ("name", "text", "reason"),
     [
         (f"{VENDOR}dagre/dagre.esm.js", "export {changed}", "not the file that"),
+        (f"{VENDOR}dagre/dagre.min.js", "export{changed}", "not the file that"),
         (
             "minirospy/share/msgs/std_msgs/package.xml",
             "<package><name>std_msgs</name><version>1.0.0</version></package>",

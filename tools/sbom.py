@@ -92,8 +92,11 @@ def _page_libraries(files: dict[str, bytes]) -> list[Json]:
     found: list[Json] = []
     for folder, entry in json.loads(files[f"{VENDOR}versions.json"]).items():
         inside: list[Json] = []
-        for path, expected in entry["files"].items():
-            file = Path(path).name
+        described = {Path(path).name: digest for path, digest in entry["files"].items()}
+        if bundle := entry.get("bundle"):
+            # What esbuild makes of the parts of the library that the page uses.
+            described[bundle["file"]] = bundle["sha256"]
+        for file, expected in described.items():
             name = VENDOR + folder + "/" + (f"{file}.txt" if file == "LICENSE" else file)
             if name not in files:
                 raise SbomError(f"{name}: missing")
