@@ -11,9 +11,9 @@ const frame = { kind: "frame" };
 const isStyle = (...styles) => (settings) => styles.includes(settings.Style);
 const isColored = (transformer) => (settings) => settings["Color Transformer"] === transformer;
 
-const POINTS = (usualColors) => [
+const POINTS = (usualColors, usualSize = 0.02) => [
   ["Style", scheme(["Points", "Squares", "Flat Squares", "Spheres"]), "Flat Squares"],
-  ["Size (m)", number, 0.02, (settings) => settings.Style !== "Points"],
+  ["Size (m)", number, usualSize, (settings) => settings.Style !== "Points"],
   ["Size (Pixels)", number, 3, isStyle("Points")],
   ["Alpha", number, 1],
   ["Decay Time", number, 0],
@@ -49,7 +49,7 @@ export const CLASSES = {
   RobotModel: { settings: [
     ["Robot Description", text, "robot_description"], ["TF Prefix", text, ""], ["Visual Enabled", bool, true], ["Collision Enabled", bool, false], ["Alpha", number, 1],
     ["Joint States", { kind: "topic", types: ["sensor_msgs/JointState"] }, "/joint_states"]] },
-  LaserScan: { types: ["sensor_msgs/LaserScan"], settings: [["Topic", topic, ""], ...POINTS("Intensity")] },
+  LaserScan: { types: ["sensor_msgs/LaserScan"], settings: [["Topic", topic, ""], ...POINTS("Intensity", 0.04)] },
   PointCloud2: { types: ["sensor_msgs/PointCloud2"], settings: [["Topic", topic, ""], ...POINTS("")] },
   PointCloud: { types: ["sensor_msgs/PointCloud"], settings: [["Topic", topic, ""], ...POINTS("")] },
   Map: { types: ["nav_msgs/OccupancyGrid"], settings: [

@@ -92,7 +92,7 @@ attribute vec3 rgb; varying vec3 shade;
 void main() {
   shade = isFlat > 0.5 ? flatColor : rgb;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 1.5, 128.0) : size;
+  gl_PointSize = isMetres > 0.5 ? clamp(size * pixels / gl_Position.w, 2.0, 128.0) : size;
 }`;
 const POINT_FRAGMENT = `
 uniform float opacity; uniform float isRound; varying vec3 shade;

@@ -16,6 +16,8 @@ const MOST_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
 const RATIOS = [1, 0.75, 0.5];
+const MOST_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
+const LEAST_POINTS = 20_000;
 const SOFTWARE = /swiftshader|llvmpipe|software|softpipe|basic render/i;
 
 export class Stage {
@@ -33,6 +35,7 @@ export class Stage {
     this.rendererName = String((about && gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) ?? "");
     this.isSoftware = SOFTWARE.test(this.rendererName);
     this.gl = gl;
+    this.mostPoints = MOST_POINTS[this.isSoftware ? "software" : "hardware"];
 
     this.frame = frame;
     this.scene = new Scene();
@@ -127,12 +130,13 @@ export class Stage {
     return true;
   }
 
-  /** Draw fewer pixels where pictures take long, and again more where they do not. */
+  /** Draw fewer pixels where pictures take long, then fewer points; and again more pixels where they do not. */
   adapt() {
     if (this.milliseconds > SLOW_MS) this.coarser += 1;
     else if (this.milliseconds < FAST_MS) this.coarser -= 0.25;
     this.coarser = Math.max(-40, Math.min(this.coarser, 8));
     if (this.coarser >= 8 && this.ratio < RATIOS.length - 1) this.ratio += 1;
+    else if (this.coarser >= 8) this.mostPoints = Math.max(LEAST_POINTS, Math.round(this.mostPoints / 2));
     else if (this.coarser <= -40 && this.ratio > 0) this.ratio -= 1;
     else return;
     this.coarser = 0;

@@ -5,7 +5,6 @@ import { points } from "../shapes.js";
 import { IDENTITY } from "../transforms.js";
 import { TopicDisplay } from "./display.js";
 
-const MOST_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud; of a larger one every second, third, ...
 const MOST_SCANS = 1000;
 
 export class Cloud extends TopicDisplay {
@@ -31,9 +30,9 @@ export class Cloud extends TopicDisplay {
   }
 
   draw(message) {
-    const most = this.context.stage.isSoftware ? MOST_POINTS.software : MOST_POINTS.hardware;
     const total = message.ranges ? 0 : (message.width ?? 0) * (message.height ?? 0);
-    const stride = Math.max(1, Math.ceil(total / most));
+    // Of a cloud that is too large every second, third, ... point.
+    const stride = Math.max(1, Math.ceil(total / this.context.stage.mostPoints));
     const settings = this.colored(message);
     const found = message.ranges ? pointsOfScan(message) : message.point_step === undefined ? pointsOfOldCloud(message)
       : pointsOfCloud(message, wantedChannels(settings), stride);

@@ -68,6 +68,8 @@ export class MapDisplay extends TopicDisplay {
     const [across, along] = [info.width * info.resolution, info.height * info.resolution];
     const material = new ShaderMaterial({
       vertexShader: VERTEX, fragmentShader: FRAGMENT, transparent: true, depthWrite: false, side: DoubleSide,
+      // What is drawn on the map is above it.
+      polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 16,
       uniforms: { cells: { value: texture }, colors: { value: colors }, opacity: { value: this.number("Alpha", 0.7) } } });
     material.addEventListener("dispose", () => [texture, colors].forEach((each) => each.dispose()));
     const plane = new Mesh(new PlaneGeometry(across, along).translate(across / 2, along / 2, this.get("Draw Behind") ? -0.005 : 0), material);
