@@ -179,6 +179,21 @@ def test_missing_frame_is_named_until_it_comes(serve: Serve, browse: Browse) -> 
     page.wait_text(".scene-side", "odom: OK")
 
 
+def test_frames_that_are_not_published_any_more_are_hidden_and_named(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    frames = TFMessage([robot_scene.transform("map", "moving", 1, 0)])
+    publish(served, {"/tf": frames, "/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    status(page, "TF", "9 frames")
+    page.type("[data-name='TF'] input[aria-label='Frame Timeout']", "0.1")
+    page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
+    status(page, "TF", "Timeout: no transform for 0.1 s: moving")
+    page.wait(
+        "return ![...document.querySelectorAll('.label:not([hidden])')].some(e => e.textContent === 'moving')"
+    )
+    page.wait_text(".label", "base_link")
+
+
 def test_without_transforms_the_frame_of_the_messages_is_fixed(serve: Serve, browse: Browse) -> None:
     served = serve()
     publish(served, {"/scan": robot_scene.scan()})

@@ -113,7 +113,14 @@ export class TF extends Display {
     for (const name of names) if (!this.frames.has(name)) this.frames.set(name, this.make(name));
 
     const missing = [];
+    const silent = [];
     for (const [name, each] of this.frames) {
+      if (this.isSilent(name)) {
+        if (each.item.object.visible) this.context.stage.invalidate();
+        each.item.object.visible = false;
+        silent.push(name);
+        continue;
+      }
       this.context.place(each.item);
       if (each.item.error) missing.push(missingText(name, this.context.fixedFrame, each.item.error));
     }
@@ -125,8 +132,17 @@ export class TF extends Display {
       const parent = this.frames.get(frames.parent(name))?.item.object;
       this.point(line.object, item.object.position, isSeen && parent?.visible && this.get("Show Arrows") !== false ? parent.position : null);
     }
+    if (silent.length) this.setStatus("Timeout", 1, `no transform for ${this.number("Frame Timeout", 15)} s: ${silent.slice(0, 5).join(", ")}${silent.length > 5 ? ` and ${silent.length - 5} more` : ""}`);
+    else this.clearStatus("Timeout");
     if (missing.length) this.setStatus("Transforms", 1, missing.length > 3 ? `${missing.slice(0, 3).join("; ")}; and ${missing.length - 3} more` : missing.join("; "));
     else if (names.size) this.setStatus("Transforms", 0, `${names.size} frames`);
+  }
+
+  /** Return whether nobody has published a frame's transform for the timeout; while time is simulated, it may stand still. */
+  isSilent(name) {
+    const edge = this.context.frames.edges.get(name);
+    const timeout = this.number("Frame Timeout", 15) * 1000;
+    return Boolean(edge) && !edge.isStatic && timeout > 0 && this.context.link.time === null && performance.now() - edge.heard > timeout;
   }
 
   point(shape, from, to) {
