@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from minirospy.errors import MinirospyError
 from minirospy.teleop.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, LARGEST, Event
+from minirospy.teleop.rumble import Rumble, RumbleError, event_device
 
 __all__ = [
     "Device",
@@ -50,14 +51,20 @@ class Device(Protocol):
     def wait(self, seconds: float) -> Event | None:
         """Return the next event; None where none has come within that time. Raises DeviceError where it is disconnected."""
 
+    def rumble(self, strong: float, weak: float) -> None:
+        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+
     def close(self) -> None:
         """Close it."""
 
 
-def open_device(path: str) -> Device:
-    """Open a joystick by its path; elsewhere than on Linux the path's number counts. Raises DeviceError."""
+def open_device(path: str, feedback_path: str = "") -> Device:
+    """Open a joystick by its path; elsewhere than on Linux the path's number counts. Raises DeviceError.
+
+    ``feedback_path``: Linux's device of its motors, where that is not the one which belongs to the joystick.
+    """
     if sys.platform == "linux" or os.path.exists(path):
-        return LinuxDevice(path)
+        return LinuxDevice(path, feedback_path)
     match = re.search(r"\d+$", path)
     return PygameDevice(int(match[0]) if match else 0)
 
@@ -65,7 +72,9 @@ def open_device(path: str) -> Device:
 class LinuxDevice:
     """A joystick of Linux: a file that events are read from, each eight bytes."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, feedback_path: str = "") -> None:
+        self._feedback_path = feedback_path or event_device(path)
+        self._motors: Rumble | None = None
         try:
             # The first events are the state; that of the first time it is opened may be the one when it was closed last.
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
@@ -95,9 +104,22 @@ class LinuxDevice:
         self._rest = b""
         return Event(kind, number, value)
 
+    def rumble(self, strong: float, weak: float) -> None:
+        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+        if self._motors is None:
+            if not self._feedback_path:
+                raise RumbleError(
+                    "the joystick has no device for force feedback; _dev_ff:=/dev/input/eventN names one"
+                )
+            self._motors = Rumble(self._feedback_path)
+        self._motors.play(strong, weak)
+
     def close(self) -> None:
         """Close it."""
         os.close(self._file)
+        if self._motors is not None:
+            self._motors.close()
+            self._motors = None
 
 
 def _name_of(file: int) -> str:
@@ -171,6 +193,11 @@ class PygameDevice:
                     return None
                 time.sleep(min(_POLL_SECONDS, left))
         return self._events.pop(0)
+
+    def rumble(self, strong: float, weak: float) -> None:
+        """Run the motors at shares of their full power for a second. Raises RumbleError."""
+        if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
+            raise RumbleError("the joystick has no motors that SDL knows")
 
     def _has_gone(self) -> bool:
         removed = self._pygame.event.get(self._pygame.JOYDEVICEREMOVED)

@@ -1,28 +1,34 @@
 """joy_node: a joystick -> `joy` (sensor_msgs/Joy), and its state on /diagnostics.
 
-Parameters: ~dev (/dev/input/js0), ~dev_name, ~deadzone (0.05), ~autorepeat_rate (0: none), ~coalesce_interval (0.001 s),
-~default_trig_val, ~sticky_buttons (false). Source: http://wiki.ros.org/joy.
+`joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs its motors: id 0 the strong one, any other id the weak one.
+
+Parameters: ~dev (/dev/input/js0), ~dev_ff (the event device that belongs to ~dev), ~dev_name, ~deadzone (0.05), ~autorepeat_rate
+(0: none), ~coalesce_interval (0.001 s), ~default_trig_val, ~sticky_buttons (false). Source: http://wiki.ros.org/joy.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from sensor_msgs.msg import Joy, JoyFeedbackArray
+from sensor_msgs.msg import Joy, JoyFeedback, JoyFeedbackArray
 
 from minirospy import client as rospy
 from minirospy.teleop.devices import Device, DeviceError, find_by_name, open_device
 from minirospy.teleop.joystick import Joystick, JoystickOptions
+from minirospy.teleop.rumble import RumbleError
 
-__all__ = ["JoyNode", "main"]
+__all__ = ["JoyNode", "Motors", "main"]
 
 _LOOK_SECONDS = 0.2
 """How soon a shutdown is noticed."""
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
+_RUMBLE_SECONDS = 0.5
+"""How long motors run before they are started again: half of what a device makes of it."""
 
 
 def main() -> int:
@@ -52,7 +58,8 @@ class JoyNode:
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("joy", Joy, queue_size=1)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
-        self._feedback = rospy.Subscriber("joy/set_feedback", JoyFeedbackArray, _refuse_feedback)
+        self._motors = Motors()
+        self._feedback_path = str(rospy.get_param("~dev_ff", ""))
         options = JoystickOptions(
             _number("~deadzone", 0.05),
             _number("~autorepeat_rate", 0.0),
@@ -70,6 +77,7 @@ class JoyNode:
         rospy.on_shutdown(self._ended.set)
         self._events = self._published = 0
         self._last_diagnostics = time.monotonic()
+        rospy.Subscriber("joy/set_feedback", JoyFeedbackArray, self._motors.set)
 
     def _chosen_path(self) -> str:
         if self._device_name:
@@ -104,7 +112,7 @@ class JoyNode:
         is_first = True
         while not rospy.is_shutdown():
             try:
-                device = open_device(self._path)
+                device = open_device(self._path, self._feedback_path)
             except DeviceError as error:
                 if is_first:
                     text = "Couldn't open joystick %s. Will retry every second. (%s)"
@@ -125,6 +133,7 @@ class JoyNode:
         joystick = Joystick(self._options, time.monotonic())
         while not rospy.is_shutdown():
             now = time.monotonic()
+            self._motors.run(device, now)
             left = _LOOK_SECONDS if joystick.deadline is None else joystick.deadline - now
             event = device.wait(min(max(left, 0.0), _LOOK_SECONDS))
             now = time.monotonic()
@@ -183,7 +192,29 @@ class JoyNode:
         self._last_diagnostics = now
 
 
-def _refuse_feedback(_message: JoyFeedbackArray) -> None:
-    rospy.logwarn_throttle(
-        60, "joy_node: the joystick cannot be made to rumble here: joy/set_feedback is ignored"
-    )
+class Motors:
+    """What `joy/set_feedback` requests of the motors; they run until a message changes it, as with the real node."""
+
+    def __init__(self) -> None:
+        self._wanted = (0.0, 0.0)
+        self._running = (0.0, 0.0)
+        self._again = 0.0
+
+    def set(self, message: JoyFeedbackArray) -> None:
+        """Take in a message: the newest intensity (0 to 1) of each motor counts, other feedback does not."""
+        strong, weak = self._wanted
+        for each in message.array:
+            if each.type == JoyFeedback.TYPE_RUMBLE and not math.isnan(each.intensity):
+                strong, weak = (each.intensity, weak) if each.id == 0 else (strong, each.intensity)
+        self._wanted = strong, weak
+
+    def run(self, device: Device, now: float) -> None:
+        """Pass a change on to the device, and what is to last, before it ends there; ``now`` in seconds."""
+        wanted = self._wanted
+        if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
+            return
+        self._running, self._again = wanted, now + _RUMBLE_SECONDS
+        try:
+            device.rumble(*wanted)
+        except RumbleError as error:
+            rospy.logwarn_throttle(60, f"joy_node: the joystick does not rumble: {error}")

@@ -1,0 +1,94 @@
+"""The motors of a joystick on Linux: the force feedback of its event device, with the kernel's own structures.
+
+Source: https://www.kernel.org/doc/html/latest/input/ff.html, linux/input.h.
+"""
+
+from __future__ import annotations
+
+import array
+import os
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+
+from minirospy.errors import MinirospyError
+
+__all__ = ["Rumble", "RumbleError", "event_device", "pack_effect", "pack_event"]
+
+_EV_FF = 0x15
+_FF_RUMBLE = 0x50
+_FF_GAIN = 0x60
+_LARGEST = 0xFFFF
+_MILLISECONDS = 1000
+"""How long an effect lasts: the node plays it again meanwhile."""
+
+_EFFECT = struct.Struct("=HhHHHHHxxHH")
+"""Type, id, direction, trigger (2), replay (length, delay); the union starts at byte 16 with the two magnitudes."""
+_EFFECT_SIZE = 48 if struct.calcsize("P") == 8 else 44
+_EVIOCSFF = 0x40004580 | _EFFECT_SIZE << 16
+_ID_AT = 2
+
+_INPUT = Path("/sys/class/input")
+
+
+class RumbleError(MinirospyError):
+    """A joystick cannot be made to rumble: one line with the reason."""
+
+
+def event_device(joystick: str, folder: Path = _INPUT) -> str:
+    """Return the event device of the joystick at a path (`/dev/input/js0`); empty where it has none."""
+    found = sorted((folder / Path(joystick).name / "device").glob("event*"))
+    return f"/dev/input/{found[0].name}" if found else ""
+
+
+def pack_effect(number: int, strong: float, weak: float) -> bytes:
+    """Return struct ff_effect with the motors' shares of their full power; ``number`` is -1 for a new one."""
+    low, high = (round(min(max(share, 0.0), 1.0) * _LARGEST) for share in (strong, weak))
+    fields = _EFFECT.pack(_FF_RUMBLE, number, 0, 0, 0, _MILLISECONDS, 0, low, high)
+    return fields + bytes(_EFFECT_SIZE - len(fields))
+
+
+def pack_event(code: int, value: int) -> bytes:
+    """Return struct input_event that plays the effect ``code``, or sets the gain."""
+    return struct.pack("@llHHi", 0, 0, _EV_FF, code, value)
+
+
+class Rumble:
+    """The motors of one event device. Every method raises RumbleError."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+        except OSError as error:
+            raise self._error(error) from error
+        try:
+            self._number = self._upload(-1, (0, 0))
+            os.write(self._file, pack_event(_FF_GAIN, _LARGEST))
+        except OSError as error:
+            os.close(self._file)
+            raise self._error(error) from error
+
+    def play(self, strong: float, weak: float) -> None:
+        """Run the motors at shares of their full power for a second."""
+        try:
+            self._upload(self._number, (strong, weak))
+            os.write(self._file, pack_event(self._number, 1))
+        except OSError as error:
+            raise self._error(error) from error
+
+    def close(self) -> None:
+        """Close the device, which stops its motors."""
+        os.close(self._file)
+
+    def _upload(self, number: int, magnitudes: Sequence[float]) -> int:
+        import fcntl
+
+        # The kernel writes the number of a new effect into it.
+        effect = array.array("B", pack_effect(number, *magnitudes))
+        fcntl.ioctl(self._file, _EVIOCSFF, effect)
+        found: int = struct.unpack_from("=h", effect, _ID_AT)[0]
+        return found
+
+    def _error(self, error: OSError) -> RumbleError:
+        return RumbleError(f"{self._path} takes no force feedback: {error.strerror or error}")
