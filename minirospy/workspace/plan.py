@@ -221,16 +221,19 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Raise BuildError where definitions are not generated; warn of those that no macro names."""
-        if self._definitions and self._message_depends is None:
-            raise _error(
-                next(iter(self._definitions.values())),
-                "generate_messages() is missing: messages, services and actions are added, but not generated",
-            )
+        """Warn of definitions that no macro names, and where nothing is generated of those that are."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
                     self._warnings.append(f"{path} is not built: no {macro}() names it")
+        if self._definitions and self._message_depends is None:
+            first = next(iter(self._definitions.values()))
+            text = (
+                "generate_messages() is missing: messages, services and actions are added, but not generated"
+            )
+            self.warn(first.file, first.line, text)
+            # As in catkin, which goes on.
+            self._definitions.clear()
 
     def plan(self) -> Plan:
         """Return what all commands require."""

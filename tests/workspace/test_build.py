@@ -311,7 +311,6 @@ def good(cmake: str) -> str:
         ),
         (good("add_service_files(FILES Led.srv)"), 3, "add_service_files: folder [srv] does not exist"),
         (good("add_message_files(FILES Led)"), 3, "[Led] does not end in .msg"),
-        ("add_message_files(FILES Led.msg)", 3, "generate_messages() is missing"),
         (
             "generate_messages(DEPENDENCIES std_msgs)\nadd_message_files(FILES Led.msg)",
             4,
@@ -488,6 +487,25 @@ def test_missing_package_with_a_similar_name_is_a_warning(scene: Scene) -> None:
     assert reports["p"].warnings == (
         f"{folder / 'CMakeLists.txt'}:3: package [std_msg] is not installed; going on without it;"
         " did you mean std_msgs?",
+    )
+
+
+def test_missing_generate_messages_is_a_warning(scene: Scene) -> None:
+    folder = scene.package(
+        "p",
+        "find_package(catkin REQUIRED COMPONENTS message_generation)\nadd_message_files(FILES Led.msg)",
+        "std_msgs",
+        {"msg/Led.msg": "int8 x\n"},
+    )
+    scene.messages("q", {"msg/A.msg": "int8 a\n"})
+
+    reports = scene.build()
+
+    assert reports["q"].made == "1 message"
+    assert reports["p"].made == ""
+    assert reports["p"].warnings == (
+        f"{folder / 'CMakeLists.txt'}:4: generate_messages() is missing: messages, services and actions are added, "
+        "but not generated",
     )
 
 
