@@ -125,9 +125,13 @@ def _topic(value: object) -> str:
 def _numbers(values: object) -> tuple[float, ...]:
     if not isinstance(values, list) or len(values) > _MOST_VALUES:
         raise ValueError(f"numbers are an array, of {_MOST_VALUES} at most")
-    if not all(isinstance(each, int | float) and math.isfinite(each) for each in values):
+    try:
+        numbers = tuple(float(each) for each in values if isinstance(each, int | float))
+    except OverflowError:
+        numbers = ()
+    if len(numbers) != len(values) or not all(map(math.isfinite, numbers)):
         raise ValueError("its numbers are not finite")
-    return tuple(float(each) for each in values)
+    return numbers
 
 
 class DriveDoor:

@@ -63,7 +63,7 @@ class ToolsSession:
             fields = json.loads(text)
             number = int(fields["id"])
             method = self._METHODS[fields["do"]]
-        except (ValueError, TypeError, LookupError, RecursionError) as error:
+        except (ValueError, TypeError, LookupError, OverflowError, RecursionError) as error:
             self._send({"error": f"not a request: {error}"[:300]})
             return
         if len(self._running) >= _MOST_WAITING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from minirospy.errors import MinirospyError
+from minirospy.introspect.values import check_yaml
 
 __all__ = ["configuration_documents", "parameter_values"]
 
@@ -10,7 +11,7 @@ __all__ = ["configuration_documents", "parameter_values"]
 def configuration_documents(text: str) -> list[object]:
     """Return the documents of a file; what ROS's dynparam has dumped, an object of Python, as a dict.
 
-    Raise MinirospyError where it is not YAML.
+    Raise MinirospyError where it is not YAML, or unfolds to too much.
     """
     import yaml
 
@@ -22,8 +23,9 @@ def configuration_documents(text: str) -> list[object]:
 
     Loader.add_multi_constructor("tag:yaml.org,2002:python/object/new:", config)
     try:
+        check_yaml(text)
         return [each for each in yaml.load_all(text, Loader=Loader) if each is not None]
-    except (yaml.YAMLError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise MinirospyError(f"not YAML: {' '.join(str(error).split())}") from error
 
 

@@ -53,6 +53,7 @@ def test_commands_are_parsed() -> None:
         ('{"topic": "/a", "twist": [1]}', "a twist has 6 numbers"),
         ('{"topic": "/a", "twist": [1, 2, 3, 4, 5, NaN]}', "not finite"),
         ('{"topic": "/a", "twist": [1, 2, 3, 4, 5, "6"]}', "not finite"),
+        ('{"topic": "/a", "twist": [1, 2, 3, 4, 5, 1' + "0" * 400 + "]}", "not finite"),
         ('{"topic": "/a b", "twist": [1, 2, 3, 4, 5, 6]}', "topic [/a b]"),
         ('{"topic": 1, "twist": [1, 2, 3, 4, 5, 6]}', "a topic is a name"),
         ('{"topic": "/a", "axes": [], "buttons": [1e12]}', "a button is 0 or 1"),

@@ -63,6 +63,8 @@ def test_values_of_a_file_are_read(serve: Callable[..., Served]) -> None:
         }
         assert "not YAML" in tools.request(do="yaml", text="{")["error"]
         assert "is not a dictionary" in tools.request(do="yaml", text="- 1")["error"]
+        bomb = "a0: &a0 [1, 1]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" for n in range(1, 60))
+        assert "unfold to more than" in tools.request(do="yaml", text=bomb)["error"]
         assert "too large" in tools.request(do="yaml", text="a" * 1_000_001)["error"]
 
 
@@ -76,6 +78,7 @@ def test_values_of_a_file_are_read(serve: Callable[..., Served]) -> None:
         '{"id": "x", "do": "yaml"}',
         '{"id": 1, "do": "exec"}',
         '{"id": 1, "do": []}',
+        '{"id": Infinity, "do": "yaml"}',
     ],
 )
 def test_what_is_not_a_request_is_refused(serve: Callable[..., Served], text: str) -> None:
