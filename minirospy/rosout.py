@@ -171,6 +171,7 @@ class RosoutNode:
             f"{stamp.secs}.{stamp.nsecs:09d} {LEVEL_NAMES.get(message.level, message.level)} {message.name} "
             f"[{message.file}:{message.line}({message.function})]{topics} "
         )
+
         parts: list[str] = []
         # A text may have several lines, as in the real file; nothing else may.
         for text, keep in ((head, ""), (message.msg, "\n\t")):

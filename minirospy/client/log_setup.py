@@ -40,6 +40,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
         raise ValueError(
             f"log_level [{log_level}] is not one of rospy.DEBUG (1), INFO (2), WARN (4), ERROR (8), FATAL (16)"
         )
+
     path = (
         Path(log_file).absolute()
         if log_file
@@ -49,6 +50,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
+
     # For a configuration file of the user's, and for programs that look for their log.
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not _configured_by_file(session):
@@ -57,6 +59,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
         _log_to_file(session, path)
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
+
     # Warnings of the library itself go to the same places.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)

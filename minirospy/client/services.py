@@ -343,6 +343,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
     seconds = timeout.to_sec() if isinstance(timeout, Duration) else timeout
     if seconds == 0:
         raise ValueError("timeout must be non-zero")
+
     start = time.monotonic()
     end = None if seconds is None else start + seconds
     reported: set[str] = set()

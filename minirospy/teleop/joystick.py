@@ -65,6 +65,7 @@ class JoystickOptions:
         if interval < 0:
             warnings.append(f"joy_node: coalesce_interval ({interval:f}) less than 0, setting to 0.")
             interval = 0.0
+
         limited = replace(self, deadzone=deadzone, autorepeat_rate=rate, coalesce_interval=interval)
         return limited, warnings
 

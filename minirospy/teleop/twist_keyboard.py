@@ -250,6 +250,7 @@ def _run() -> None:
         return
     rospy.on_shutdown(output.close)
     output.set(teleop.motion)
+
     # The terminal is set up before the help is shown: what was typed until then is dropped.
     with Keys(end=_QUIT) as keys:
         print(HELP)

@@ -167,6 +167,7 @@ class HttpReader:
                     if not length:
                         self._head = first
                         return None
+
         if data:
             self._buffer += data
         else:

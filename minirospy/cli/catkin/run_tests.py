@@ -38,6 +38,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
     wanted = {_flat(name) for name in chosen or [plan.name for plan in plans]}
     for name in sorted(wanted - targets.keys()):
         raise NotFoundError("package or test", name, targets, f"the workspace is {workspace.root}")
+
     worst = 0
     total = Counts()
     for plan in plans:
@@ -65,6 +66,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
                 total = total.plus(counts)
         if plan.tests:
             print(f"{plan.name}: results are in {results}")
+
     print(f"Summary: {total}" + (" (a test could not be run)" if worst and not total.is_bad else ""))
     return int(worst)
 

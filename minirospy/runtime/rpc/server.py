@@ -99,7 +99,8 @@ class RpcServer:
         """The connections that they are for; those that read last are at the end."""
         self.turns = Turns()
         self.connections: OrderedDict[Connection, None] = OrderedDict()
-        """Those that spoke last stand at the end."""
+        """Those that spoke last are at the end."""
+
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
@@ -118,6 +119,7 @@ class RpcServer:
         # Those that wait for the next iteration: new ones, and those that have requested something before.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
+
         self.deadlines: Deadlines[Connection] = Deadlines(Connection.end)
         """Until when a request has to be whole, or an answer taken; idle connections are not in here."""
         self._limited_log = RateLimitedLogger(_log)
