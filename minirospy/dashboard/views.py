@@ -24,6 +24,7 @@ VIEWS = (
     "turtlesim",
     "teleop",
     "diagnostics",
+    "panels",
     "publish",
     "services",
     "parameters",

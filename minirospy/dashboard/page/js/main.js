@@ -10,6 +10,7 @@ import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
 import { Layouts } from "./views/layout.js";
 import { Parameters } from "./views/parameters.js";
+import { Panels } from "./views/panels.js";
 import { Plot } from "./views/plot.js";
 import { Publish } from "./views/publish.js";
 import { Reconfigure } from "./views/reconfigure.js";
@@ -31,6 +32,7 @@ const VIEWS = {
   turtlesim: ["Turtlesim", Turtlesim],
   teleop: ["Teleop", Teleop],
   diagnostics: ["Diagnostics", Diagnostics],
+  panels: ["Panels", Panels],
   publish: ["Publish", Publish],
   services: ["Services", Services],
   parameters: ["Parameters", Parameters],
@@ -87,8 +89,10 @@ function route() {
   current = new View(link, words, main, shown);
   document.title = `${title} · minirospy`;
   for (const tab of tabs.children) {
-    if (tab.dataset.view === chosen) tab.setAttribute("aria-current", "page");
-    else tab.removeAttribute("aria-current");
+    if (tab.dataset.view === chosen) {
+      tab.setAttribute("aria-current", "page");
+      tab.scrollIntoView({ block: "nearest", inline: "center" });
+    } else tab.removeAttribute("aria-current");
   }
 }
 
