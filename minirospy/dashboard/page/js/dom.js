@@ -1,5 +1,11 @@
 // Elements. Text of topics, nodes and log lines always goes in by textContent: it never becomes HTML.
+// What a person reads on buttons, labels and in hints is translated here; texts with values in them, and those of setText, by t().
 
+import { t } from "./texts.js";
+
+const SPOKEN = new Set(["title", "aria-label", "placeholder", "label"]);
+const WORDED = new Set(["button", "label", "option", "h2", "h3", "legend", "strong", "p", "summary"]);
+const IS_PHRASE = /\p{Lu}|\S\s+\S/u; // a single word in lower case may be a name of the robot's
 const SVG = "http://www.w3.org/2000/svg";
 
 /** Return an element: h("button", {class: "x", onclick: f, title: "y"}, "text", child, ...). */
@@ -17,16 +23,16 @@ function filled(element, properties, children) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (name === "value" || name === "checked" || name === "inert") element[name] = value;
-    else element.setAttribute(name, value === true ? "" : value);
+    else element.setAttribute(name, value === true ? "" : SPOKEN.has(name) ? t(value) : value);
   }
-  append(element, children);
+  append(element, children, WORDED.has(element.tagName.toLowerCase()));
   return element;
 }
 
-function append(element, children) {
+function append(element, children, isWorded = false) {
   for (const child of children.flat(Infinity)) {
     if (child === null || child === undefined || child === false) continue;
-    element.append(child instanceof Node ? child : document.createTextNode(String(child)));
+    element.append(child instanceof Node ? child : document.createTextNode(isWorded && IS_PHRASE.test(child) ? t(String(child)) : String(child)));
   }
 }
 

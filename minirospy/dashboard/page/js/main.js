@@ -1,6 +1,8 @@
 // The shell: views by the fragment of the address (#/plot?path=/a/b), the state of the connection, dark and light.
 
 import { addressOf, fragmentOf } from "./address.js";
+import { listenForKeys, openHelp } from "./help.js";
+import { LANGUAGES, chooseLanguage, language, t } from "./texts.js";
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
 import { Board } from "./views/board.js";
@@ -87,7 +89,7 @@ function route() {
   fill(main);
   shown = placeOf(chosen);
   current = new View(link, words, main, shown);
-  document.title = `${title} · minirospy`;
+  document.title = `${t(title)} · minirospy`;
   for (const tab of tabs.children) {
     if (tab.dataset.view === chosen) {
       tab.setAttribute("aria-current", "page");
@@ -98,7 +100,7 @@ function route() {
 
 function showState() {
   const element = document.getElementById("state");
-  setText(element, STATES[link.state] + (link.state === "open" && !link.mayWrite ? ", read-only" : ""));
+  setText(element, t(STATES[link.state]) + (link.state === "open" && !link.mayWrite ? t(", read-only") : ""));
   element.dataset.state = link.state;
 }
 
@@ -123,13 +125,51 @@ function switchTheme() {
   link.emit("theme");
 }
 
+/** Show the page in the language that was chosen, else the browser's. */
+function showLanguage() {
+  chooseLanguage(localStorage.getItem("language"), navigator.languages);
+  document.documentElement.lang = language;
+  const others = Object.keys(LANGUAGES).filter((each) => each !== language);
+  const button = document.getElementById("language");
+  setText(button, others[0].toUpperCase());
+  button.lang = others[0];
+  button.title = LANGUAGES[others[0]];
+  button.setAttribute("aria-label", LANGUAGES[others[0]]);
+  for (const [id, title] of [["theme", "Dark or light"], ["help", "Keys"]]) {
+    const element = document.getElementById(id);
+    element.title = t(title);
+    element.setAttribute("aria-label", t(title));
+  }
+  setText(document.getElementById("skip"), t("To the view"));
+  tabs.setAttribute("aria-label", t("Views"));
+  for (const tab of tabs.children) setText(tab, t(VIEWS[tab.dataset.view][0]));
+}
+
+function switchLanguage() {
+  localStorage.setItem("language", Object.keys(LANGUAGES).find((each) => each !== language));
+  showLanguage();
+  showState();
+  route();
+}
+
+/** Show the view before (-1) or after (1) this one. */
+function step(by) {
+  const names = Object.keys(VIEWS);
+  location.hash = fragmentOf(names[(names.indexOf(main.dataset.view) + by + names.length) % names.length], {});
+}
+
 if (localStorage.getItem("theme")) document.documentElement.dataset.theme = localStorage.getItem("theme");
 document.getElementById("theme").addEventListener("click", switchTheme);
+document.getElementById("language").addEventListener("click", switchLanguage);
+document.getElementById("help").addEventListener("click", openHelp);
+document.getElementById("skip").addEventListener("click", () => main.focus());
+listenForKeys(step);
 for (const [name, [title]] of Object.entries(VIEWS)) {
   const tab = h("a", { href: `#/${name}` }, title);
   tab.dataset.view = name;
   tabs.append(tab);
 }
+showLanguage();
 link.watch(["state"], showState);
 link.addEventListener("notice", ({ detail }) => showNotice(detail));
 link.addEventListener("withdrawn", ({ detail }) => {

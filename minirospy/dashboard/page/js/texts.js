@@ -15,8 +15,24 @@ export function chooseLanguage(wanted, offered = []) {
   table = TABLES[language];
 }
 
-/** Return a text in the chosen language; {name} in it becomes values.name. */
+const missing = new Set();
+const made = new Set();
+let isWatched = false;
+
+/** Note from now on the texts that have no translation; return the set of them. For tests. */
+export function watchMissing() {
+  isWatched = true;
+  return missing;
+}
+
+/** Return a text in the chosen language; {name} in it becomes values.name. A text without a translation stays as it is. */
 export function t(text, values = null) {
-  const found = Object.hasOwn(table, text) ? table[text] : text;
-  return values ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all)) : found;
+  const isKnown = Object.hasOwn(table, text);
+  const found = isKnown ? table[text] : text;
+  const result = values ? found.replace(/\{(\w+)\}/g, (all, name) => (Object.hasOwn(values, name) ? String(values[name]) : all)) : found;
+  if (isWatched) {
+    if (!isKnown && !made.has(text)) missing.add(text);
+    made.add(result);
+  }
+  return result;
 }

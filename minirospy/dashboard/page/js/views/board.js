@@ -1,6 +1,7 @@
 // The workshop's board: lights, buttons (mouse, touch, keys 1 and 2), and the room of the scanner with a person to drag.
 
 import { fill, h, setText, svg } from "../dom.js";
+import { t } from "../texts.js";
 
 const SVG_LIGHTS = { green: ["#0d3b1c", "#37e06b"], yellow: ["#44380a", "#ffd84a"], red: ["#451111", "#ff5148"] };
 const METRES = 200; // pixels a metre in the room
@@ -20,7 +21,7 @@ export class Board {
     this.others = h("div", { class: "muted pins" });
     this.picture = svg("svg", { class: "board", viewBox: "0 0 560 300", role: "group", "aria-label": "The board" });
     this.room = svg("svg", { class: "room", viewBox: "-130 -220 260 260", role: "img", "aria-label": "The scanner's fields and a person" });
-    this.awayButton = h("button", { type: "button", onclick: () => this.send({ person: this.state?.person ? null : [0.6, 0] }) });
+    this.awayButton = h("button", { type: "button", onclick: () => this.send({ person: this.state?.person ? null : [0.6, 0] }) }, "Let a person come");
     main.append(h("div", { class: "bar" }, h("label", {}, "Board", this.boards), this.problem),
       h("div", { class: "boards" }, h("div", { class: "panel" }, this.picture, h("p", { class: "muted hint" }, "Hold a button with the mouse or a finger, or the keys 1 and 2.")),
         h("div", { class: "panel" }, this.room, h("div", { class: "bar hint" }, this.awayButton, this.where = h("span", { class: "muted" })))),
@@ -73,7 +74,7 @@ export class Board {
       return;
     }
     this.state = state;
-    setText(this.problem, state.writes ? "" : "This token is read-only.");
+    setText(this.problem, state.writes ? "" : t("This token is read-only."));
     const names = [...new Set([...state.boards, state.name])].sort();
     if (names.join() !== this.names) {
       this.names = names.join();
@@ -84,13 +85,13 @@ export class Board {
       const led = this.leds.get(pin);
       led.setAttribute("fill", SVG_LIGHTS[color][level]);
       led.parentNode.classList.toggle("lit", level === 1);
-      led.parentNode.setAttribute("aria-label", `LED GPIO ${pin} ${color} ${level ? "on" : "off"}`);
+      led.parentNode.setAttribute("aria-label", `LED GPIO ${pin} ${t(color)} ${level ? t("on") : t("off")}`);
     }
     for (const [pin, level] of state.buttons) {
       this.buttons.get(pin).classList.toggle("down", level === 1);
       this.buttons.get(pin).setAttribute("aria-pressed", String(level === 1));
     }
-    setText(this.others, state.pins.length ? `Other pins: ${state.pins.map(([pin, kind, level]) => `GPIO ${pin} ${kind} ${level}`).join(", ")}` : "");
+    setText(this.others, state.pins.length ? `${t("Other pins:")} ${state.pins.map(([pin, kind, level]) => `GPIO ${pin} ${kind} ${level}`).join(", ")}` : "");
     this.showPerson(state);
   }
 
@@ -114,7 +115,7 @@ export class Board {
     this.buttons = new Map();
     [11, 12].forEach((pin, index) => {
       const x = 190 + index * 180;
-      const button = svg("g", { class: "push", tabindex: 0, role: "button", "aria-label": `Button GPIO ${pin}`, "aria-pressed": "false" },
+      const button = svg("g", { class: "push", tabindex: 0, role: "button", "aria-label": t("Button GPIO {pin}", { pin }), "aria-pressed": "false" },
         svg("rect", { x: x - 32, y: 192, width: 64, height: 64, rx: 8, class: "frame" }), svg("circle", { cx: x, cy: 224, r: 22, class: "cap" }),
         svg("text", { x, y: 229, class: "number" }, String(index + 1)), svg("text", { x, y: 276 }, `GPIO ${pin}`));
       button.dataset.pin = pin;
@@ -156,7 +157,7 @@ export class Board {
 
   drawRoom() {
     this.fields = svg("g", {});
-    this.person = svg("g", { class: "person", tabindex: 0 }, svg("circle", { r: REACH * METRES, class: "body" }), svg("circle", { r: 9, class: "face" }));
+    this.person = svg("g", { class: "person", tabindex: 0, role: "img", "aria-label": "The person: drag, or the arrow keys" }, svg("circle", { r: REACH * METRES, class: "body" }), svg("circle", { r: 9, class: "face" }));
     this.room.append(svg("rect", { x: -130, y: -220, width: 260, height: 260, class: "floor" }), this.fields,
       svg("rect", { x: -10, y: -8, width: 20, height: 16, rx: 4, class: "scanner" }), this.person);
     const move = (event) => {
@@ -186,13 +187,14 @@ export class Board {
   showPerson({ person, fields }) {
     const distance = person ? Math.max(0, Math.hypot(...person) - REACH) : Infinity;
     if (!this.fields.children.length) {
-      const names = ["warning field", "protective field"];
+      const names = [t("warning field"), t("protective field")];
       fields.forEach((radius, index) => this.fields.append(svg("circle", { r: radius * METRES, class: `field f${index}` }), svg("text", { y: -radius * METRES + 14 }, names[index])));
     }
     fields.forEach((radius, index) => this.fields.children[index * 2].classList.toggle("hit", distance < radius));
     this.person.classList.toggle("away", !person);
     if (person) this.person.setAttribute("transform", `translate(${-person[1] * METRES} ${-person[0] * METRES})`);
-    setText(this.awayButton, person ? "Send the person away" : "Let a person come");
-    setText(this.where, person ? `${person[0].toFixed(2)} m ahead, ${person[1].toFixed(2)} m to the left${distance < fields[1] ? ": in the protective field" : distance < fields[0] ? ": in the warning field" : ""}` : "nobody before the scanner");
+    setText(this.awayButton, person ? t("Send the person away") : t("Let a person come"));
+    const inside = distance < fields[1] ? t(": in the protective field") : distance < fields[0] ? t(": in the warning field") : "";
+    setText(this.where, person ? t("{ahead} m ahead, {left} m to the left", { ahead: person[0].toFixed(2), left: person[1].toFixed(2) }) + inside : t("nobody before the scanner"));
   }
 }

@@ -3,6 +3,7 @@
 import { download, fill, h, setText } from "../dom.js";
 import { LEVELS, NAMES, csv, filterOf, lineOf, plainText, timeText } from "../logs.js";
 import { VirtualList } from "../virtual_list.js";
+import { t } from "../texts.js";
 
 const MOST_LINES = 50_000;
 const ROW = 26; // pixels, as .line in style.css
@@ -44,7 +45,7 @@ export class Console {
     this.nodes = new Set();
 
     this.buttons = new Map(LEVELS.map(([level, name]) => [level,
-      h("button", { type: "button", class: `level l${level}`, "aria-pressed": String(this.levels.has(level)), onclick: () => this.switchLevel(level) }, h("span", {}, name), " ", h("span", { class: "count" }, "0"))]));
+      h("button", { type: "button", class: `level l${level}`, "aria-pressed": String(this.levels.has(level)), onclick: () => this.switchLevel(level) }, h("span", {}, t(name)), " ", h("span", { class: "count" }, "0"))]));
     this.node = h("select", { "aria-label": "Node", onchange: () => this.change() }, h("option", { value: "" }, "all nodes"));
     this.text = h("input", { type: "search", placeholder: "Search messages and nodes", "aria-label": "Search", value: words.get("text") ?? "", oninput: () => this.change() });
     this.isRegex = h("input", { type: "checkbox", checked: words.get("regex") === "1", onchange: () => this.change() });
@@ -61,7 +62,7 @@ export class Console {
     this.loggers = h("div", { class: "panel details loggers", hidden: true });
     main.append(
       h("div", { class: "bar" }, [...this.buttons.values()], this.node, this.text,
-        h("label", {}, this.isRegex, "regex"), h("label", {}, this.isExcluded, "exclude"), this.problem),
+        h("label", {}, this.isRegex, t("regex")), h("label", {}, this.isExcluded, t("exclude")), this.problem),
       h("div", { class: "bar" }, this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),
@@ -146,7 +147,7 @@ export class Console {
   showCount() {
     for (const [level, button] of this.buttons) setText(button.querySelector(".count"), String(counts.get(level)));
     const waiting = this.isPaused ? removed + lines.length - this.seen : 0;
-    setText(this.count, `${this.shown.length} of ${lines.length} lines${this.isPaused ? `, paused, ${waiting} new` : ""}`);
+    setText(this.count, t("{count} of {all} lines", { count: this.shown.length, all: lines.length }) + (this.isPaused ? t(", paused, {waiting} new", { waiting }) : ""));
     this.latest.hidden = this.list.isFollowing;
   }
 
@@ -163,7 +164,7 @@ export class Console {
     row.dataset.level = line.level;
     const [time, word, node, text] = row.children;
     setText(time, timeText(line.stamp));
-    setText(word, NAMES.get(line.level) ?? String(line.level));
+    setText(word, t(NAMES.get(line.level) ?? String(line.level)));
     setText(node, line.node);
     setText(text, line.text);
   }
@@ -172,7 +173,7 @@ export class Console {
     this.selected = this.selected === line ? null : line;
     this.details.hidden = !this.selected;
     if (this.selected) {
-      fill(this.details, h("div", { class: "bar" }, h("strong", {}, `${NAMES.get(line.level) ?? line.level} · ${line.node}`),
+      fill(this.details, h("div", { class: "bar" }, h("strong", {}, `${t(NAMES.get(line.level) ?? String(line.level))} · ${line.node}`),
         h("span", { class: "muted" }, `${timeText(line.stamp)} · ${line.file}:${line.line} ${line.function}`),
         h("button", { type: "button", onclick: () => { this.node.value = line.node; this.change(); } }, "Only this node")), h("pre", {}, line.text));
     }
@@ -188,7 +189,7 @@ export class Console {
   pause() {
     this.isPaused = !this.isPaused;
     this.pauseButton.setAttribute("aria-pressed", String(this.isPaused));
-    setText(this.pauseButton, this.isPaused ? "Continue" : "Pause");
+    setText(this.pauseButton, this.isPaused ? t("Continue") : t("Pause"));
     if (!this.isPaused) this.filter();
     this.showCount();
   }
@@ -205,12 +206,12 @@ export class Console {
     const text = chosen.map(plainText).join("\n");
     try {
       await navigator.clipboard.writeText(text);
-      setText(button, `Copied ${chosen.length}`);
+      setText(button, t("Copied {count}", { count: chosen.length }));
     } catch {
       // Without https a browser allows it on localhost only.
-      setText(button, "The browser refuses");
+      setText(button, t("The browser refuses"));
     }
-    setTimeout(() => setText(button, "Copy"), 1500);
+    setTimeout(() => setText(button, t("Copy")), 1500);
   }
 
   save() {
@@ -229,7 +230,7 @@ export class Console {
     const choice = h("select", { "aria-label": "Node of the loggers", onchange: () => this.showLoggersOf(choice.value, list) },
       h("option", { value: "" }, "choose a node"), nodes.map((name) => h("option", { value: name }, name)));
     fill(this.loggers, h("div", { class: "bar" }, h("strong", {}, "Logger levels"), choice,
-      h("span", { class: "muted" }, this.link.mayWrite ? "what a node logs, from this level on" : "this token is read-only")), list);
+      h("span", { class: "muted" }, this.link.mayWrite ? t("what a node logs, from this level on") : t("This token is read-only."))), list);
   }
 
   async showLoggersOf(node, list) {

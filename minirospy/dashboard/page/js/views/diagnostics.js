@@ -1,6 +1,7 @@
 // Diagnostics: the tree of /diagnostics_agg, or what /diagnostics has while nobody aggregates; levels in color, values on a click.
 
 import { fill, h, setText } from "../dom.js";
+import { t } from "../texts.js";
 
 const TYPE = "diagnostic_msgs/DiagnosticArray";
 const AGGREGATED = "/diagnostics_agg";
@@ -20,7 +21,7 @@ export class Diagnostics {
     this.folded = new Set();
     this.end = null;
     this.choice = h("select", { "aria-label": "Topic", onchange: () => this.choose(this.choice.value) });
-    this.counts = LEVELS.map((name, level) => h("span", { class: `badge d${level}` }, name, " ", h("span", { class: "count" }, "0")));
+    this.counts = LEVELS.map((name, level) => h("span", { class: `badge d${level}` }, t(name), " ", h("span", { class: "count" }, "0")));
     this.isBad = h("input", { type: "checkbox", checked: words.get("problems") === "1", onchange: () => { this.remember(); this.draw(); } });
     this.tree = h("div", { class: "panel tree", role: "tree", "aria-label": "Diagnostics" });
     this.empty = h("p", { class: "empty" });
@@ -136,7 +137,7 @@ export class Diagnostics {
       after = row;
     }
     this.tree.hidden = !shown.length;
-    setText(this.empty, shown.length || this.link.state !== "open" ? "" : nodes.length ? "Nothing reports a problem." : `Nothing has come on ${this.subscribed}.`);
+    setText(this.empty, shown.length || this.link.state !== "open" ? "" : nodes.length ? t("Nothing reports a problem.") : t("Nothing has come on {topic}.", { topic: this.subscribed }));
     this.showChosen(nodes);
   }
 
@@ -162,7 +163,7 @@ export class Diagnostics {
     fold.classList.toggle("leaf", !hasChildren);
     fold.setAttribute("aria-expanded", String(!this.folded.has(path)));
     badge.className = `badge d${level}`;
-    setText(badge, LEVELS[level]);
+    setText(badge, t(LEVELS[level]));
     setText(name, label);
     setText(text, status?.message ?? "");
   }
@@ -181,8 +182,8 @@ export class Diagnostics {
     const content = JSON.stringify([node.path, level, status?.message, status?.hardware, status?.values]);
     if (content === this.shown) return;
     this.shown = content;
-    fill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, LEVELS[level]), " ", status?.message ?? ""),
-      status?.hardware ? h("p", { class: "muted" }, "hardware: ", status.hardware) : null,
+    fill(this.side, h("h2", {}, status?.name ?? node.path), h("p", {}, h("span", { class: `badge d${level}` }, t(LEVELS[level])), " ", status?.message ?? ""),
+      status?.hardware ? h("p", { class: "muted" }, t("hardware: "), status.hardware) : null,
       h("table", { class: "values" }, h("tbody", {}, (status?.values ?? []).map(({ key, value }) => h("tr", {}, h("th", { scope: "row" }, key), h("td", {}, value))))));
   }
 }

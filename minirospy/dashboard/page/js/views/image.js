@@ -3,6 +3,7 @@
 import { fill, h, number, setText } from "../dom.js";
 import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
+import { t } from "../texts.js";
 
 const TYPES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 
@@ -45,7 +46,7 @@ export class Image {
     if (!this.topic && topics.length === 1) this.choose(topics[0]);
     this.choice.value = this.topic;
     if (this.topic && !this.end) this.subscribe();
-    setText(this.empty, this.pixels ? "" : this.topic ? `Waiting for ${this.topic} …` : "Start a camera, or play a bag with images.");
+    setText(this.empty, this.pixels ? "" : this.topic ? t("Waiting for {topic} …", { topic: this.topic }) : t("Start a camera, or play a bag with images."));
   }
 
   choose(topic) {
@@ -146,7 +147,7 @@ async function decompressed({ data, format }) {
   try {
     bitmap = await createImageBitmap(new Blob([data]));
   } catch {
-    throw new Error(`a compressed image of format "${format}" cannot be shown by this browser`);
+    throw new Error(t('a compressed image of format "{format}" cannot be shown by this browser', { format }));
   }
   return { width: bitmap.width, height: bitmap.height, bitmap, range: null };
 }

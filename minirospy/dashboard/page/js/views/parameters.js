@@ -1,6 +1,7 @@
 // Parameters: all that are set, live; set and deleted.
 
 import { h, setText } from "../dom.js";
+import { t } from "../texts.js";
 
 export class Parameters {
   constructor(link, words, main, place) {
@@ -50,14 +51,14 @@ export class Parameters {
   }
 
   makeRow(name) {
-    const input = h("input", { "aria-label": `Value of ${name}`, autocomplete: "off" });
+    const input = h("input", { "aria-label": t("Value of {name}", { name }), autocomplete: "off" });
     const row = { input, text: "" };
     const element = h("form", { class: "row parameter", role: "listitem", onsubmit: (event) => {
       event.preventDefault();
       input.blur();
       this.link.setParameter(name, parsed(input.value));
     } }, h("span", { class: "name" }, name), input,
-    h("button", { type: "button", class: "small", title: `Delete ${name}`, onclick: () => this.link.setParameter(name, undefined) }, "delete"));
+    h("button", { type: "button", class: "small", title: t("Delete {name}", { name }), onclick: () => this.link.setParameter(name, undefined) }, t("delete")));
     input.addEventListener("blur", () => { if (!input.value.trim()) input.value = row.text; });
     row.element = element;
     element.dataset.name = name;
@@ -71,7 +72,7 @@ export class Parameters {
       row.element.hidden = !`${name} ${row.text}`.toLowerCase().includes(words);
       count += !row.element.hidden;
     }
-    setText(this.count, `${count} of ${this.rows.size} parameters`);
+    setText(this.count, t("{count} of {all} parameters", { count, all: this.rows.size }));
   }
 
   add() {

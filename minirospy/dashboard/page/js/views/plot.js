@@ -3,6 +3,7 @@
 import { download, h, number, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
+import { t } from "../texts.js";
 
 const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
 const USUAL_WINDOW = "10";
@@ -41,7 +42,7 @@ export class Plot {
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
-        h("span", { class: "muted tips" }, "drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
+        h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow"))),
       this.area, this.legend);
     this.area.append(this.hint);
     this.pause(this.isPaused);
@@ -83,7 +84,7 @@ export class Plot {
 
   add(path) {
     if (this.ends.has(path)) return;
-    this.problems.set(path, `waiting for ${path}`);
+    this.problems.set(path, t("waiting for {path}", { path }));
     this.ends.set(path, this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)));
     this.remember();
     this.showProblems();
@@ -155,7 +156,7 @@ export class Plot {
     swatch.style.background = color;
     const axis = h("button", { type: "button", class: "small", title: "Move to the other axis", onclick: () => {
       series.axis = series.axis === "y" ? "y2" : "y";
-      setText(axis, series.axis === "y" ? "left axis" : "right axis");
+      setText(axis, series.axis === "y" ? t("left axis") : t("right axis"));
       this.rebuild();
     } }, "left axis");
     series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, axis,
@@ -170,7 +171,7 @@ export class Plot {
     this.isPaused = isPaused;
     this.pausedAt = isPaused ? this.newest() : null;
     this.pauseButton.setAttribute("aria-pressed", String(isPaused));
-    setText(this.pauseButton, isPaused ? "Continue" : "Pause");
+    setText(this.pauseButton, isPaused ? t("Continue") : t("Pause"));
     this.isDirty = true;
   }
 

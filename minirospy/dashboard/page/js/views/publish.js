@@ -2,6 +2,7 @@
 
 import { fill, h, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
+import { t } from "../texts.js";
 
 const LEAST_MS = 10;
 
@@ -78,7 +79,7 @@ export class Publish {
     try {
       await this.link.publish(this.topic, this.type, this.schema, this.form.value());
       this.sent += 1;
-      setText(this.result, `${this.sent} published`);
+      setText(this.result, t("{count} published", { count: this.sent }));
     } catch (error) {
       this.result.classList.add("error");
       setText(this.result, error.message);
@@ -95,7 +96,7 @@ export class Publish {
     }
     this.timer = setInterval(() => this.send(), Math.max(LEAST_MS, 1000 / Math.max(0.1, Number(this.rate.value) || 1)));
     this.repeat.setAttribute("aria-pressed", "true");
-    setText(this.repeat, "Stop");
+    setText(this.repeat, t("Stop"));
     this.send();
   }
 
@@ -103,6 +104,6 @@ export class Publish {
     clearInterval(this.timer);
     this.timer = null;
     this.repeat.setAttribute("aria-pressed", "false");
-    setText(this.repeat, "Repeat");
+    setText(this.repeat, t("Repeat"));
   }
 }

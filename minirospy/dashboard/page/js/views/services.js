@@ -2,6 +2,7 @@
 
 import { fill, h, setText } from "../dom.js";
 import { MessageForm } from "../form.js";
+import { t } from "../texts.js";
 
 export class Services {
   constructor(link, words, main, place) {
@@ -26,7 +27,7 @@ export class Services {
 
   update() {
     const names = [...this.link.services.keys()];
-    fill(this.choice, h("option", { value: "" }, names.length ? `choose one of ${names.length} services` : "no services"), names.map((name) => h("option", { value: name }, name)));
+    fill(this.choice, h("option", { value: "" }, names.length ? t("choose one of {count} services", { count: names.length }) : t("no services")), names.map((name) => h("option", { value: name }, name)));
     this.choice.value = this.link.services.has(this.name) ? this.name : "";
     const service = this.link.services.get(this.name);
     if (service && service.type !== this.type) this.show(service);
@@ -58,9 +59,9 @@ export class Services {
     let request;
     try {
       request = this.form.value();
-      setText(this.answer, "waiting for the answer …");
+      setText(this.answer, t("waiting for the answer …"));
       const response = await this.link.call(this.name, request);
-      setText(this.answer, yaml(response) || "done: the answer has no fields");
+      setText(this.answer, yaml(response) || t("done: the answer has no fields"));
     } catch (error) {
       this.answer.classList.add("error");
       setText(this.answer, error.message);

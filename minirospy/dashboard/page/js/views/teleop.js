@@ -4,6 +4,7 @@
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
 import { Drive } from "../drive.js";
 import { joyOf } from "../joy.js";
+import { t } from "../texts.js";
 
 const TYPE = "geometry_msgs/Twist";
 const PERIOD_MS = 50;
@@ -45,7 +46,7 @@ export class Teleop {
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
       this.pad.addEventListener(name, (event) => { if (this.pointer === event.pointerId) this.letGo(); });
     }
-    this.values = h("p", { class: "mono", role: "status" }, "stopped");
+    this.values = h("p", { class: "mono", role: "status" }, t("stopped"));
     this.device = h("p", { class: "muted hint" });
     this.problem = h("p", { class: "error", role: "alert" });
     main.append(
@@ -53,7 +54,7 @@ export class Teleop {
         h("button", { type: "button", class: "stop", onclick: () => this.release(true) }, "Stop")),
       h("div", { class: "panel teleop" }, this.pad, this.values,
         h("p", { class: "muted hint" }, "Hold the stick, or the arrow keys or W A S D. With a gamepad hold a shoulder button and push its left stick."), this.device,
-        h("label", { class: "muted hint" }, this.joy, " publish the gamepad as /joy"), this.problem));
+        h("label", { class: "muted hint" }, this.joy, "publish the gamepad as /joy"), this.problem));
     this.ends = [link.watch(["channels", "graph", "state"], () => this.update())];
     this.listen(window, "keydown", (event) => this.key(event));
     this.listen(window, "keyup", (event) => this.key(event));
@@ -84,7 +85,8 @@ export class Teleop {
     if (state !== "open") this.drop();
     else {
       const other = channels.get(this.topic);
-      setText(this.problem, !mayWrite ? "This token is read-only: it drives nothing." : other && other.type !== TYPE ? `${this.topic} has the type ${other.type}, not ${TYPE}` : "");
+      setText(this.problem, !mayWrite ? t("This token is read-only: it drives nothing.")
+        : other && other.type !== TYPE ? t("{topic} has the type {type}, not {wanted}", { topic: this.topic, type: other.type, wanted: TYPE }) : "");
     }
   }
 
@@ -129,7 +131,7 @@ export class Teleop {
   /** Return [forward, left] of a gamepad whose deadman button is held, or null. */
   gamepad() {
     const pads = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
-    setText(this.device, pads.length ? `Gamepad: ${pads[0].id}` : "");
+    setText(this.device, pads.length ? `${t("Gamepad:")} ${pads[0].id}` : "");
     if (!this.place.isActive()) return null;
     const pad = pads.find(({ buttons }) => DEADMAN.some((index) => buttons[index]?.pressed));
     if (!pad) return null;
@@ -200,7 +202,7 @@ export class Teleop {
     this.pointer = null;
     this.isDriving = false;
     this.knob.removeAttribute("transform");
-    setText(this.values, "stopped");
+    setText(this.values, t("stopped"));
   }
 
   send(linear, angular) {
@@ -213,6 +215,6 @@ export class Teleop {
       this.drop();
     }
     if (error) setText(this.problem, error);
-    if (stopped) setText(this.values, "stopped by the server: this page was silent");
+    if (stopped) setText(this.values, t("stopped by the server: this page was silent"));
   }
 }

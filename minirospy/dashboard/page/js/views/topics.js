@@ -3,6 +3,7 @@
 import { bandwidth, fill, h, setText, shown } from "../dom.js";
 import { numberOf } from "../paths.js";
 import { Rate } from "../rates.js";
+import { t } from "../texts.js";
 
 // Measuring these costs the bandwidth of a camera: only when opened.
 const HEAVY = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud",
@@ -87,9 +88,9 @@ export class Topics {
       row.element.hidden = !words.every((word) => text.includes(word));
       count += !row.element.hidden;
     }
-    setText(this.count, `${count} of ${this.rows.size} topics`);
-    setText(this.empty, this.rows.size ? (count ? "" : "No topic fits the filter.")
-      : this.link.state === "open" ? "Nothing is published yet. Start a node: its topics appear here." : "");
+    setText(this.count, t("{count} of {all} topics", { count, all: this.rows.size }));
+    setText(this.empty, this.rows.size ? (count ? "" : t("No topic fits the filter."))
+      : this.link.state === "open" ? t("Nothing is published yet. Start a node: its topics appear here.") : "");
   }
 
   refresh() {
@@ -150,7 +151,7 @@ class Row {
 
   refresh() {
     const rate = this.rate.at(performance.now() / 1000);
-    setText(this.hz, rate ? `${rate.hz < 10 ? rate.hz.toFixed(2) : rate.hz.toFixed(1)} Hz` : HEAVY.has(this.channel.type) && !this.end ? "open to measure" : "–");
+    setText(this.hz, rate ? `${rate.hz < 10 ? rate.hz.toFixed(2) : rate.hz.toFixed(1)} Hz` : HEAVY.has(this.channel.type) && !this.end ? t("open to measure") : "–");
     setText(this.bandwidth, rate ? bandwidth(rate.bytes) : "");
     if (this.isStale && !this.isOpen) setText(this.preview, this.error ?? oneLine(this.message));
     if (this.isOpen) setText(this.preview, "");
@@ -215,7 +216,7 @@ class Field {
   constructor(label, path) {
     this.path = path;
     this.value = h("span", { class: "value" });
-    this.plot = h("a", { class: "plot", href: `#/plot?path=${encodeURIComponent(path)}`, title: `Plot ${path}`, hidden: true }, "plot");
+    this.plot = h("a", { class: "plot", href: `#/plot?path=${encodeURIComponent(path)}`, title: t("Plot {path}", { path }), hidden: true }, t("plot"));
     this.head = h("button", { type: "button", class: "field", disabled: true, onclick: () => this.toggle() }, h("span", { class: "key" }, label));
     this.element = h("li", {}, this.head, this.value, this.plot);
     this.tree = null;
@@ -234,7 +235,7 @@ class Field {
     this.isOpen ??= value.length === undefined;
     this.head.disabled = false;
     this.head.setAttribute("aria-expanded", String(this.isOpen));
-    setText(this.value, this.isOpen ? (value.length === undefined ? "" : `${value.length} values${value.length > MOST_ITEMS ? `, the first ${MOST_ITEMS} are shown` : ""}`) : shown(value));
+    setText(this.value, this.isOpen ? (value.length === undefined ? "" : t("{count} values", { count: value.length }) + (value.length > MOST_ITEMS ? t(", the first {count} are shown", { count: MOST_ITEMS }) : "")) : shown(value));
     if (this.isOpen) {
       if (!this.tree) {
         this.tree = new Tree(this.path);

@@ -1,6 +1,7 @@
 // The turtles of turtlesim on their paper: drawn from their poses, with the trails of their pens; spawn, kill, clear, reset, pens.
 
 import { fill, h, number, setText, svg } from "../dom.js";
+import { t } from "../texts.js";
 
 const PIXELS = 500; // width and height of the paper, as in turtlesim
 const METRE = 45; // pixels
@@ -78,7 +79,7 @@ export class Turtlesim {
       for (const button of row.querySelectorAll("button")) button.disabled = !this.link.services.has(`${name}/set_pen`);
     }
     const isDark = this.link.state === "open" && !this.turtles.size;
-    setText(this.empty, isDark ? "There is no turtle: start rosrun turtlesim turtlesim_node" : "");
+    setText(this.empty, isDark ? t("There is no turtle: start rosrun turtlesim turtlesim_node") : "");
     this.readBackground();
   }
 
@@ -120,15 +121,15 @@ export class Turtlesim {
     const turtle = { name, shape, pen: { ...USUAL_PEN }, pose: null, color: null, resting: 0, wasPainted: false };
     turtle.swatch = h("span", { class: "ink", title: "The color under the turtle" });
     turtle.text = h("span", { class: "mono" });
-    const ink = h("input", { type: "color", value: "#b3b8ff", "aria-label": `pen of ${name}` });
-    const width = h("input", { type: "number", min: 1, max: 255, value: "3", "aria-label": `width of the pen of ${name}` });
+    const ink = h("input", { type: "color", value: "#b3b8ff", "aria-label": t("pen of {name}", { name }) });
+    const width = h("input", { type: "number", min: 1, max: 255, value: "3", "aria-label": t("width of the pen of {name}", { name }) });
     const isOff = h("input", { type: "checkbox" });
     const pen = () => this.setPen(turtle, [1, 3, 5].map((start) => parseInt(ink.value.slice(start, start + 2), 16)), Number(width.value), isOff.checked);
     turtle.row = h("div", { class: "turtle-row" },
-      h("div", { class: "bar" }, turtle.swatch, h("strong", {}, name), h("a", { href: `#/teleop?topic=${encodeURIComponent(`${name}/cmd_vel`)}` }, "drive"),
-        h("button", { type: "button", class: "small", onclick: () => this.kill(turtle) }, "kill")),
+      h("div", { class: "bar" }, turtle.swatch, h("strong", {}, name), h("a", { href: `#/teleop?topic=${encodeURIComponent(`${name}/cmd_vel`)}` }, t("drive")),
+        h("button", { type: "button", class: "small", onclick: () => this.kill(turtle) }, t("kill"))),
       turtle.text,
-      h("div", { class: "bar pen" }, ink, width, h("label", {}, isOff, "off"), h("button", { type: "button", class: "small", onclick: pen }, "set pen")));
+      h("div", { class: "bar pen" }, ink, width, h("label", {}, isOff, t("off")), h("button", { type: "button", class: "small", onclick: pen }, "set pen")));
     turtle.row.dataset.name = name;
     const ends = [
       this.link.subscribe({ topic: `${name}/pose`, mode: "all" }, (item) => this.moved(turtle, item)),

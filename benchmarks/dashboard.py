@@ -1,0 +1,236 @@
+"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients]`: what the dashboard's page draws, and what its server costs.
+
+page: a layout in headless chromium with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and the
+topics with the scan open; frames a second by requestAnimationFrame. clients: ten programs that speak what the page speaks, on
+50 topics in fast motion: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
+CPU is that of a process, in percent of one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from tests.conftest import free_port
+
+BIN = Path(sys.executable).parent
+
+SENSORS = """
+import rospy
+from sensor_msgs.msg import Image, LaserScan
+rospy.init_node("sensors")
+scan = rospy.Publisher("/scan", LaserScan, queue_size=5)
+image = rospy.Publisher("/camera/image_raw", Image, queue_size=2)
+ranges = [1.0 + index / 1651 for index in range(1651)]
+frames = [Image(height=480, width=640, encoding="rgb8", step=1920, data=bytes((index * 16 + x) % 256 for x in range(921600)))
+          for index in range(4)]
+rospy.Timer(rospy.Duration(1 / 30), lambda event: image.publish(frames[int(event.current_real.to_sec() * 30) % 4]))
+rate, count = rospy.Rate(33), 0
+while not rospy.is_shutdown():
+    count += 1
+    ranges[0:20] = [(count + index) % 100 / 50 for index in range(20)]
+    scan.publish(LaserScan(ranges=ranges, range_max=5.0))
+    rate.sleep()
+"""
+
+MANY = """
+import sys
+import rospy
+from std_msgs.msg import Float64MultiArray
+rospy.init_node("many")
+publishers = [rospy.Publisher(f"/many/t{index}", Float64MultiArray, queue_size=10) for index in range(50)]
+message = Float64MultiArray(data=[float(index) for index in range(50)])
+rate = rospy.Rate(float(sys.argv[1]))
+while not rospy.is_shutdown():
+    for each in publishers:
+        each.publish(message)
+    rate.sleep()
+"""
+
+FRAMES = """
+new Promise(resolve => {
+  const times = [];
+  const step = now => {
+    times.push(now);
+    if (now - times[0] < %d) return requestAnimationFrame(step);
+    const gaps = times.slice(1).map((each, index) => each - times[index]).sort((a, b) => a - b);
+    resolve({ fps: gaps.length / (now - times[0]) * 1000, p99: gaps[Math.floor(gaps.length * 0.99)], longest: gaps.at(-1),
+              heap: performance.memory.usedJSHeapSize });
+  };
+  requestAnimationFrame(step);
+})
+"""
+
+
+@contextlib.contextmanager
+def graph() -> Iterator[tuple[psutil.Process, int]]:
+    """Run a master and a dashboard; return the dashboard's process and port."""
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{free_port()}"
+    os.environ["ROS_HOSTNAME"] = "localhost"
+    with tempfile.TemporaryDirectory() as home, contextlib.ExitStack() as stack:
+        os.environ["ROS_HOME"] = home
+        start(stack, str(BIN / "roscore"), "-p", os.environ["ROS_MASTER_URI"].rpartition(":")[2])
+        wait_for_master()
+        dashboard = start(stack, str(BIN / "minirospy"), "dashboard", "--no-browser", "--port", "0")
+        assert dashboard.stdout
+        found = re.search(rb":(\d+)/", dashboard.stdout.readline())
+        assert found, "the dashboard prints no link"
+        yield psutil.Process(dashboard.pid), int(found[1])
+
+
+def start(stack: contextlib.ExitStack, *words: str) -> subprocess.Popen[bytes]:
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+    def end() -> None:
+        process.terminate()
+        process.communicate(timeout=30)
+
+    stack.callback(end)
+    return process
+
+
+def wait_for_master() -> None:
+    from xmlrpc.client import ServerProxy
+
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        with contextlib.suppress(OSError), ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+            master.getPid("/benchmark")
+            return
+        time.sleep(0.1)
+    raise SystemExit("the master does not start")
+
+
+def cpu(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+def measure_page(seconds: float) -> None:
+    """Print the frames a second of a page with a scan, an image and ten plots."""
+    from tests.interop.browser import Page
+
+    plots = ",".join(f"plot?path=%252Fscan%252Franges[{index}:{index + 2}]" for index in range(0, 20, 2))
+    tree = f"row(column(image?topic=%252Fcamera%252Fimage_raw,topics?open=%252Fscan),{columns(plots)})"
+    with graph() as (server, port), contextlib.ExitStack() as stack:
+        start(stack, sys.executable, "-c", SENSORS)
+        page = Page(f"http://localhost:{port}/#/layout?tree={tree}", width=1600, height=900)
+        try:
+            page.wait_text(".status", "30")
+            page.wait(
+                "return [...document.querySelectorAll('.series .num')].filter(e => /[0-9]/.test(e.textContent)).length === 20"
+            )
+            before, spent = time.monotonic(), cpu(server)
+            found = page.evaluate(FRAMES % (seconds * 1000))
+            share = (cpu(server) - spent) / (time.monotonic() - before) * 100
+            drawn = page.evaluate("document.querySelector('.status').textContent")
+        finally:
+            page.close()
+    print(
+        f"page: {found['fps']:.1f} frames a second, 99 % within {found['p99']:.0f} ms, longest {found['longest']:.0f} ms; "
+        f"heap {found['heap'] / 1e6:.0f} MB; server {share:.0f} % CPU; image {drawn}"
+    )
+
+
+def columns(plots: str) -> str:
+    all_plots = plots.split(",")
+    return f"column({','.join(all_plots[:5])}),column({','.join(all_plots[5:])})"
+
+
+class Client(threading.Thread):
+    """Subscribes to all topics of a name's beginning, as the page does, and counts."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(daemon=True)
+        self.messages = self.bytes = self.topics = 0
+        self._socket = connect(
+            f"ws://localhost:{port}/",
+            subprotocols=[Subprotocol("foxglove.sdk.v1")],
+            compression=None,
+            max_size=None,
+            ping_interval=None,
+        )
+
+    def run(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            for data in self._socket:
+                if isinstance(data, bytes):
+                    self.messages += 1
+                    self.bytes += len(data)
+                    continue
+                fields = json.loads(data)
+                if fields["op"] == "advertise":
+                    new = [each["id"] for each in fields["channels"] if each["topic"].startswith("/many/")]
+                    self.topics += len(new)
+                    wanted = [{"id": each, "channelId": each} for each in new]
+                    self._socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def measure_clients(seconds: float, rate: float) -> None:
+    """Print memory and CPU with ten clients on 50 topics."""
+    with graph() as (server, port), contextlib.ExitStack() as stack:
+        start(stack, sys.executable, "-c", MANY, str(rate))
+        clients = [Client(port) for _ in range(10)]
+        for each in clients:
+            stack.callback(each.close)
+            each.start()
+        limit = time.monotonic() + 60
+        while not all(each.topics == 50 and each.messages for each in clients):
+            assert time.monotonic() < limit, [each.topics for each in clients]
+            time.sleep(0.1)
+        time.sleep(3)
+
+        own = psutil.Process()
+        memory = [(server.memory_info().rss, own.memory_info().rss)]
+        before, spent = time.monotonic(), cpu(server)
+        counts = [(each.messages, each.bytes) for each in clients]
+        for _ in range(10):
+            time.sleep(seconds / 10)
+            memory.append((server.memory_info().rss, own.memory_info().rss))
+        used, elapsed = cpu(server) - spent, time.monotonic() - before
+        messages = sum(each.messages - count for each, (count, _) in zip(clients, counts, strict=True))
+        megabytes = sum(each.bytes - size for each, (_, size) in zip(clients, counts, strict=True)) / 1e6
+    hours = messages / (10 * 50 * 10 * 3600)
+    sizes = ", ".join(f"{server_size / 1e6:.1f}" for server_size, _ in memory)
+    print(
+        f"clients: {messages} messages, {megabytes:.0f} MB in {elapsed:.0f} s ({hours:.2f} hours of 50 topics at 10 Hz); "
+        f"server {used / elapsed * 100:.0f} % CPU, {used / megabytes * 1000:.1f} ms a MB"
+    )
+    print(
+        f"clients: server's memory in MB: {sizes}; all clients: {memory[0][1] / 1e6:.1f} -> {memory[-1][1] / 1e6:.1f}"
+    )
+
+
+def main() -> None:
+    """Measure what the words name, by default all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients"])
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--rate", type=float, default=100.0, help="of each of the 50 topics, in Hz")
+    words = parser.parse_args()
+    if "page" in words.what:
+        measure_page(words.seconds)
+    if "clients" in words.what:
+        measure_clients(words.seconds, words.rate)
+
+
+if __name__ == "__main__":
+    main()

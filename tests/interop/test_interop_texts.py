@@ -1,0 +1,200 @@
+"""German and English, keys, names for screen readers: the page in Debian's chromium, as a person who does not use the mouse."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Bool
+
+from minirospy.dashboard.views import VIEWS
+from tests.dashboard.conftest import Served, serve
+from tests.interop.browser import Page
+from tests.interop.page_modules import needs_node, run_script
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher
+
+__all__ = ["browse", "serve"]
+
+TRANSLATED = (
+    "layout",
+    "topics",
+    "console",
+    "image",
+    "board",
+    "turtlesim",
+    "teleop",
+    "diagnostics",
+    "panels",
+    "publish",
+    "services",
+    "parameters",
+)
+"""The views whose texts have German ones; add yours."""
+
+SETTINGS = {
+    "plot": "?path=/button_state/data",
+    "layout": "?tree=row(topics,console)",
+    "topics": "?open=/button_state",
+    "panels": "?edit=1&p=kind%3Dlamp%26path%3D%252Fbutton_state",
+    "publish": "?topic=/button_state",
+}
+
+
+@needs_node
+def test_language_is_the_chosen_one_else_the_first_of_the_browser_that_is_there() -> None:
+    body = """
+      const cases = [[null, ["fr-CH", "de-AT", "en"]], ["en", ["de"]], ["xx", []], ["de", []]];
+      const found = cases.map(([wanted, offered]) => {
+        chooseLanguage(wanted, offered);
+        return t("Pause");
+      });
+      return [...found, t("Pause {none}", { count: 1 }),
+        t("{count} of {all} topics", { count: 1, all: "<b>" }), t("constructor")];
+    """
+    assert run_script("chooseLanguage, t", "js/texts.js", body) == [
+        "Anhalten", "Pause", "Pause", "Anhalten", "Pause {none}", "1 von <b> Topics", "constructor",
+    ]  # fmt: skip
+
+
+def speak_german(page: Page) -> None:
+    page.evaluate("localStorage.setItem('language', 'de')")
+    page.call("Page.reload")
+    page.wait("return document.documentElement.lang === 'de'")
+    page.wait_text("#state", "verbunden")
+
+
+def fill_graph(served: Served) -> None:
+    """Publish something for the views to show."""
+    served.run(publisher(served, "/button_state", Bool, latch=True).publish(True))
+    line = Log(level=4, name="/talker", msg="Pause", file="a.py", function="f")
+    served.run(publisher(served, "/rosout_agg", Log, latch=True).publish(line))
+
+
+@needs_chromium
+def test_views_have_no_text_without_its_german_one(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    fill_graph(served)
+    page = browse(address(served, "topics"))
+    page.wait_text("#state", "connected")
+    speak_german(page)
+    page.evaluate("import('/js/texts.js').then(module => { window.missing = module.watchMissing(); })")
+    for view in TRANSLATED:
+        page.evaluate(f"location.hash = '#/{view}{SETTINGS.get(view, '')}'")
+        page.wait(f"return document.getElementById('view').dataset.view === '{view}'")
+        page.wait("return document.getElementById('view').children.length > 1")
+        # What a view shows of the graph has come when the next one is opened: this is not a wait for it.
+        page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
+    missing = [each for each in page.evaluate("[...window.missing]") if not each.startswith("/")]
+    names = {"\u00d7", "←", "→", "✎", "?", ", .", "1 2", "/", "x", "y", "theta", "GPIO 2"}
+    data = ("/talker_", "LED GPIO", "std_msgs/", "rosgraph_msgs/", "geometry_msgs/", "minirospy", "W A S D")
+    left = [each for each in missing if each not in names and not any(word in each for word in data)]
+    assert left == [], json.dumps(left)
+
+
+@needs_chromium
+def test_language_is_switched_and_kept_and_data_stay_as_they_are(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    fill_graph(served)
+    page = browse(address(served, "console"))
+    page.wait_text(".line .text", "Pause")
+    page.wait_text(".line .word", "Warn")
+    page.click("#language")
+    page.wait_text("#tabs", "Konsole")
+    page.wait_text("main button", "Anhalten")
+    page.wait_text("main .bar", "1 von 1 Zeilen")
+    page.wait_text(".line .word", "Warnung")
+    # A log line is data.
+    assert page.wait_text(".line .text", "") == "Pause"
+    assert page.evaluate("document.title") == "Konsole · minirospy"
+    page.call("Page.reload")
+    page.wait_text("#state", "verbunden")
+    page.click("#language")
+    page.wait_text("#tabs", "Console")
+
+
+def press_key(page: Page, key: str, code: int, text: str = "") -> None:
+    pressed = "keyDown" if text else "rawKeyDown"
+    for kind, typed in ((pressed, text), ("keyUp", "")):
+        page.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, text=typed)
+
+
+FOCUSED = """(() => { const e = document.activeElement;
+  const name = e.id || e.dataset.view || e.getAttribute('aria-label') || e.textContent.trim();
+  return [name, e.matches(':focus-visible'), getComputedStyle(e).outlineStyle]; })()"""
+
+
+@needs_chromium
+def test_tab_goes_through_the_page_in_the_order_that_is_seen(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "parameters"))
+    page.wait_text("#state", "connected")
+    page.evaluate("document.activeElement.blur()")
+    seen = []
+    for _ in range(len(VIEWS) + 9):
+        press_key(page, "Tab", 9)
+        name, is_visible, outline = page.evaluate(FOCUSED)
+        assert is_visible, name
+        assert outline != "none", name
+        seen.append(name)
+    shell = ["skip", "minirospy", *VIEWS, "language", "help", "theme"]
+    assert seen[: len(shell)] == shell
+    assert seen[len(shell) :][0] == "Filter"
+    assert seen[-1] in ("Set", "Its value", "Name of a new parameter")
+
+
+@needs_chromium
+def test_keys_of_the_page_show_help_and_other_views(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    press_key(page, "?", 191, "?")
+    page.wait_text("dialog.help", "The view before and after this one")
+    page.click("dialog.help button", "Close")
+    page.wait("return !document.querySelector('dialog')")
+    following = VIEWS[VIEWS.index("topics") + 1]
+    press_key(page, ".", 190, ".")
+    page.wait(f"return document.getElementById('view').dataset.view === '{following}'")
+    press_key(page, ",", 188, ",")
+    page.wait("return document.getElementById('view').dataset.view === 'topics'")
+    press_key(page, "/", 191, "/")
+    page.wait("return document.activeElement.type === 'search'")
+    # In a field they are text.
+    page.call("Input.insertText", text="a")
+    press_key(page, ".", 190, ".")
+    assert page.evaluate("document.activeElement.value") == "a."
+    page.evaluate("document.activeElement.blur()")
+    page.evaluate("document.getElementById('skip').focus()")
+    press_key(page, "Enter", 13, "\r")
+    page.wait("return document.activeElement.id === 'view'")
+
+
+NAMELESS = """[...document.querySelectorAll(
+    'a[href], button, input, select, textarea, [tabindex="0"], [role=button], [role=img], svg[role]')]
+  .filter(e => e.getClientRects().length)
+  .filter(e => !(e.getAttribute('aria-label') || e.title || e.labels?.length || e.placeholder
+    || (!/INPUT|SELECT/.test(e.tagName) && e.textContent.trim())))
+  .map(e => e.outerHTML.slice(0, 150))"""
+
+
+@needs_chromium
+@pytest.mark.parametrize("view", VIEWS)
+def test_whatever_can_be_used_has_a_name_for_screen_readers(
+    serve: Callable[..., Served], browse: Callable[..., Page], view: str
+) -> None:
+    served = serve()
+    fill_graph(served)
+    page = browse(address(served, view + SETTINGS.get(view, "")))
+    page.wait_text("#state", "connected")
+    page.wait(f"return document.getElementById('view').dataset.view === '{view}'")
+    page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
+    found: Any = page.evaluate(NAMELESS)
+    assert found == [], json.dumps(found)
