@@ -14,8 +14,8 @@ LAYERS = [
     {"compat"},
     {"cli"},
     {"testing"},
-    {"launch"},
     {"dashboard"},
+    {"launch"},
     {"bridge"},
     {"frames"},
     {

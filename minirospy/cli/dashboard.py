@@ -119,6 +119,13 @@ def _add_plots(parser: Parser) -> None:
     )
 
 
+def _add_bags(parser: Parser) -> None:
+    _add_ignored(parser, "--clock")
+    parser.add_argument(
+        "bagfiles", nargs="*", help="bags, or MCAP files; the first is opened", completer="bag_files"
+    )
+
+
 def _add_topic(parser: Parser) -> None:
     parser.add_argument("topic", nargs="?", default="", help="the topic of the images", completer="topics")
 
@@ -227,6 +234,15 @@ def _image(topic: str) -> tuple[str, Fields]:
     return "image", {"topic": [topic]} if topic else {}
 
 
+def _bags(bagfiles: Sequence[str]) -> tuple[str, Fields]:
+    from minirospy.errors import NotFoundError
+
+    for name in bagfiles:
+        if not Path(name).is_file():
+            raise NotFoundError("bag", name)
+    return "bag", {"file": bagfiles} if bagfiles else {}
+
+
 def _nodes(node_name: Sequence[str]) -> tuple[str, Fields]:
     names = [name if name.startswith("/") else f"/{name}" for name in node_name]
     return "reconfigure", {"node": names} if names else {}
@@ -278,11 +294,15 @@ def _serve(
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.bridge.serve import run
     from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.dashboard.bag_folder import BagFolder
     from minirospy.dashboard.dashboard import PORT, Dashboard
     from minirospy.environment import Environment
     from minirospy.errors import BridgeError
     from minirospy.names import anonymous_name
 
+    # Bags of the command line may be anywhere.
+    given = fields.get("file", ()) if view == "bag" else ()
+    bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
     if not is_loopback(address) and not listen:
         raise Misuse(f"--address {address} lets other machines connect: add --listen")
@@ -313,7 +333,7 @@ def _serve(
                     diagnostics=False,
                     name="minirospy dashboard",
                 )
-                self.dashboard = Dashboard(self._node, options, rviz_file)
+                self.dashboard = Dashboard(self._node, options, rviz_file, bags)
                 self._opened.append(self.dashboard)
                 try:
                     await self.dashboard.start()
@@ -385,6 +405,7 @@ WINDOWS = {
     command.name: command
     for command in (
         _window("rqt", "topics", "Shows the graph", _add_plugin, _plugin),
+        _window("rqt_bag", "bag", "Records topics, and shows and plays bags", _add_bags, _bags),
         _window("rqt_console", "console", "Shows the log lines of all nodes"),
         _window("rqt_graph", "graph", "Shows nodes and topics"),
         _window("rqt_image_view", "image", "Shows images of a topic", _add_topic, _image),

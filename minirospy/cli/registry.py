@@ -97,6 +97,7 @@ COMMANDS = (
     Entry("ros.rosmsg_proto", "main", "COMMAND", "rosmsg-proto"),
     Entry("doctor", "roswtf", "ROSWTF", "roswtf"),
     Entry("dashboard", "rqt", "RQT", "rqt"),
+    Entry("dashboard", "rqt_bag", "RQT_BAG", "rqt_bag"),
     Entry("dashboard", "rqt_console", "RQT_CONSOLE", "rqt_console"),
     Entry("dashboard", "rqt_graph", "RQT_GRAPH", "rqt_graph"),
     Entry("dashboard", "rqt_image_view", "RQT_IMAGE_VIEW", "rqt_image_view"),

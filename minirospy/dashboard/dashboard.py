@@ -1,4 +1,4 @@
-"""The dashboard as a whole: a bridge at one port, with the page and the doors of the board, of driving and of tools in it."""
+"""The dashboard as a whole: a bridge at one port, with the page and its doors in it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 
 from minirospy.aio.node import Node
 from minirospy.bridge.bridge import Addition, Bridge, BridgeOptions
+from minirospy.dashboard.bag_door import BagDoor
+from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.board_door import BoardDoor
 from minirospy.dashboard.drive_door import DriveDoor
 from minirospy.dashboard.files import handlers, read_folder
@@ -20,12 +22,24 @@ PORT = 8766
 class Dashboard:
     """Serves the page. On the node's loop."""
 
-    def __init__(self, node: Node, options: BridgeOptions, rviz_file: Path | None = None) -> None:
-        """``options.foxglove_port`` is the port of the page and of its data; the 3D view opens ``rviz_file``."""
+    def __init__(
+        self,
+        node: Node,
+        options: BridgeOptions,
+        rviz_file: Path | None = None,
+        bags: BagFolder | None = None,
+    ) -> None:
+        """``options.foxglove_port`` is the port of the page and of its data; the 3D view opens ``rviz_file``.
+
+        ``bags`` are those that may be opened, of the working folder unless given.
+        """
+        master_uri = node._node.environment.master_uri
         self._board = BoardDoor()
         self.rviz = RvizDoor(rviz_file)
         self._tools = ToolsDoor()
-        doors = (self._board, self._tools, DriveDoor(lambda: self.bridge.graph), self.rviz)
+        self._bags = BagDoor(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
+        driving = DriveDoor(lambda: self.bridge.graph)
+        doors = (self._board, self._tools, driving, self.rviz, self._bags)
         self.bridge = Bridge(node, options, addition=Addition(doors, handlers(read_folder())))
 
     @property
@@ -39,6 +53,8 @@ class Dashboard:
 
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""
+        # Players publish until their sessions end, and the graph is the bridge's.
+        await self._bags.close()
         await self.bridge.close()
         await self._board.close()
         await self._tools.close()

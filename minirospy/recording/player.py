@@ -6,26 +6,17 @@ Source: http://wiki.ros.org/rosbag/Commandline#play.
 from __future__ import annotations
 
 import contextlib
-import gc
-import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
-from minirospy import client
 from minirospy.bag.base import StoredMessage
-from minirospy.bag.records import Connection
-from minirospy.escape import SafeTerminal
-from minirospy.recording.frames import ReceivedFrame, frame_class
-from minirospy.recording.keys import read_keys
 from minirospy.recording.precise import PreciseWait
 from minirospy.recording.schedule import PlayOptions, Schedule, State
 from minirospy.recording.sources import Bags, ReadAhead, Selection
-
-if TYPE_CHECKING:
-    from std_srvs.srv import SetBoolRequest, SetBoolResponse
+from minirospy.recording.stage import NodeStage, Stage
 
 __all__ = ["Player", "PlayerState"]
 
@@ -33,51 +24,8 @@ _SECOND = 10**9
 _TICK = _SECOND // 10
 """The status line is printed so often, and a shutdown noticed."""
 
-_SWITCH_SECONDS = 0.00005
-"""How long the thread that reads ahead may keep the GIL when a message is due."""
-
 _LEAD = _SECOND // 500
 """The first message is due so much later: the threads that start meanwhile do not delay it."""
-
-_STAMP = struct.Struct("<4xII")
-"""A message that starts with a Header: its sequence number, then the stamp."""
-
-_CLOCK = struct.Struct("<II")
-
-
-class _Outlet:
-    """The messages of one publisher of the bag on a topic: the publisher of that topic sends them."""
-
-    def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
-        self.publisher = publisher
-        self.message = publisher.data_class()
-        self.is_latched = is_latched
-        self.last: bytes | None = None
-        """The last message, if latched."""
-
-    def publish(self, body: bytes) -> None:
-        self.message._buff = body
-        if self.is_latched:
-            self.last = body
-        self.publisher.publish(self.message)
-
-
-class _LateSubscribers(client.SubscribeListener):
-    """Gives a late subscriber the last message of each latched publisher of the bag: a topic itself keeps one only."""
-
-    def __init__(self) -> None:
-        self.outlets: list[_Outlet] = []
-
-    def peer_subscribe(
-        self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
-    ) -> None:
-        latched = [outlet for outlet in self.outlets if outlet.last is not None]
-        if len(latched) < 2:
-            return
-        for outlet in latched:
-            message = outlet.publisher.data_class()
-            message._buff = outlet.last
-            peer_publish(message)
 
 
 class PlayerState(NamedTuple):
@@ -90,15 +38,20 @@ class PlayerState(NamedTuple):
 
 
 class Player:
-    """Plays bags, as this process's node, which init_node has made."""
+    """Plays bags: as this process's node, which init_node has made, unless there is another ``stage``."""
 
     def __init__(
-        self, bags: Bags, options: PlayOptions, on_ready: Callable[[int, int], object] | None = None
+        self,
+        bags: Bags,
+        options: PlayOptions,
+        on_ready: Callable[[int, int], object] | None = None,
+        stage: Stage | None = None,
     ) -> None:
         """``on_ready(first, last)`` gets the times of what is to be played, before that starts.
 
         Its caller controls the player from then on by :meth:`control`: so the player stays at the end of the bags.
         """
+        self._stage = stage or NodeStage(options)
         self._bags = bags
         self._options = options
         self._on_ready = on_ready
@@ -107,19 +60,16 @@ class Player:
         self._starts_paused = False
         self._is_started = False
         self._is_at_end = False
-        self._publishers: dict[str, tuple[client.Publisher[client.AnyMsg], _LateSubscribers]] = {}
-        self._outlets: dict[tuple[int, int], _Outlet | None] = {}
+        self._is_fresh = True
         self._wait = PreciseWait()
         self._lock = threading.Lock()
         self._schedule: Schedule | None = None
-        self._clock: client.Publisher[client.AnyMsg] | None = None
-        self._is_header_first: bool | None = None
         self._next_line = 0
         self._ended = False
 
     def run(self) -> int:
         """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError."""
-        client.on_shutdown(self._end)
+        self._stage.open(self)
         options = self._options
         times = self._bags.times()
         start = times[0] + options.start if times else 0
@@ -130,12 +80,10 @@ class Player:
             print("No messages to play on specified topics.  Exiting.", file=sys.stderr)
             return 0
 
-        self._clock = client.Publisher("clock", frame_class(*_clock_type()), queue_size=1)
-        for number, connection in self._bags.connections(selection):
-            self._advertise(number, connection)
+        self._stage.advertise(self._bags.connections(selection))
         if not options.quiet:
             self._say("")
-        self._offer_services()
+        self._stage.offer(self)
         last = self._bags.last_time(selection) if options.topics or end else times[1]
         latched = self._bags.last_latched(selection) if options.start else []
         self._span = first[1].time, last
@@ -162,17 +110,32 @@ class Player:
             return PlayerState(schedule.status(now).time, schedule.rate, is_paused, self._is_at_end)
 
     def control(
-        self, *, is_paused: bool | None = None, rate: float | None = None, seek: int | None = None
+        self,
+        *,
+        is_paused: bool | None = None,
+        rate: float | None = None,
+        seek: int | None = None,
+        is_looping: bool | None = None,
+        has_clock: bool | None = None,
     ) -> None:
-        """Pause or go on, change the rate, go on at another time of the bag. From any thread."""
+        """Pause or go on, change the rate, go on at another time of the bag, start again at its end, show the clock.
+
+        From any thread.
+        """
         now = time.perf_counter_ns()
         with self._lock:
             if (schedule := self._schedule) is None:
                 return
+            if is_looping is not None:
+                self._options = self._options._replace(loop=is_looping)
+            if has_clock is not None and has_clock != self._options.clock:
+                self._options = self._options._replace(clock=has_clock)
+                schedule.set_clock(self._options.clock_hz if has_clock else 0.0, now)
             if rate is not None and rate != schedule.rate:
                 schedule.set_rate(rate, now)
             if seek is not None:
                 self._seek_to = min(max(seek, self._span[0]), self._span[1])
+                self._is_fresh = True
                 # What is shown until the files have been read from there.
                 schedule.seek(self._seek_to, now)
             if is_paused is not None and not self._is_started:
@@ -183,6 +146,43 @@ class Player:
                 self._seek_to = self._span[0]
             if self._seek_to is not None:
                 self._is_at_end = False
+        self._wait.wake()
+
+    def step(self, count: int = 1) -> None:
+        """Publish the next messages, if paused. From any thread."""
+        with self._lock:
+            for _ in range(count if self._schedule else 0):
+                assert self._schedule
+                self._schedule.step()
+        self._wait.wake()
+
+    @property
+    def is_fresh(self) -> bool:
+        """Return whether no message has been published since the start or the last seek."""
+        return self._is_fresh
+
+    @property
+    def is_looping(self) -> bool:
+        """Return whether it starts again at the end."""
+        return self._options.loop
+
+    def set_paused(self, paused: bool) -> bool:
+        """Pause, or go on; return whether that changed anything. From any thread."""
+        with self._lock:
+            changed = bool(self._schedule and self._schedule.set_paused(paused, time.perf_counter_ns()))
+        self._wait.wake()
+        return changed
+
+    def control_rate(self, stamp: int) -> None:
+        """Store the stamp of the last message of the topic that controls the rate. From any thread."""
+        with self._lock:
+            if self._schedule:
+                self._schedule.control_rate(stamp)
+        self._wait.wake()
+
+    def end(self) -> None:
+        """Have :meth:`run` return. From any thread, and from the handler of a signal."""
+        self._ended = True
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
@@ -199,20 +199,13 @@ class Player:
             self._wait_for_subscribers()
 
     def _play_precisely(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
-        """Play with what makes this process's threads switch soon, for as long as that lasts."""
-        interval = sys.getswitchinterval()
-        sys.setswitchinterval(_SWITCH_SECONDS)
-        # A collection that visits all that was imported takes milliseconds.
-        gc.freeze()
-        try:
-            messages.wait()
-            # Before the keys are read: the first ones count.
-            with self._lock:
-                self._start(span)
-            with read_keys(self._on_key):
-                self._play_all(messages, selection, span)
-        finally:
-            sys.setswitchinterval(interval)
+        """Play in the stage's context."""
+        messages.wait()
+        # Before the keys are read: the first ones count.
+        with self._lock:
+            self._start(span)
+        with self._stage.running(self._on_key):
+            self._play_all(messages, selection, span)
 
     def _start(self, span: tuple[int, int]) -> None:
         """Start the clock, with what was requested since the schedule was made."""
@@ -223,69 +216,14 @@ class Player:
         elif not self._starts_paused:
             schedule.set_paused(False, now)
 
-    # --- what it offers
-
-    def _advertise(self, number: int, connection: Connection) -> None:
-        topic = self._options.prefix + connection.topic
-        known = self._publishers.get(topic)
-        if known is None:
-            late = _LateSubscribers()
-            publisher = client.Publisher(
-                topic,
-                frame_class(connection.type, connection.md5sum, connection.definition),
-                subscriber_listener=late,
-                latch=connection.latching,
-                queue_size=self._options.queue_size,
-            )
-            known = self._publishers[topic] = publisher, late
-
-        publisher, late = known
-        if publisher.md5sum != connection.md5sum:
-            client.logerr(
-                "Tried to advertise on topic [%s] with md5sum [%s] and datatype [%s], but the topic is already "
-                "advertised as md5sum [%s] and datatype [%s]. These messages are left out",
-                topic,
-                connection.md5sum,
-                connection.type,
-                publisher.md5sum,
-                publisher.type,
-            )
-            self._outlets[number, connection.id] = None
-            return
-        if connection.latching and publisher.impl:
-            publisher.impl.enable_latch()
-        outlet = self._outlets[number, connection.id] = _Outlet(publisher, connection.latching)
-        late.outlets.append(outlet)
-
-    def _offer_services(self) -> None:
-        from std_srvs.srv import SetBool, SetBoolResponse
-
-        def pause(request: SetBoolRequest) -> SetBoolResponse:
-            with self._lock:
-                changed = bool(
-                    self._schedule and self._schedule.set_paused(request.data, time.perf_counter_ns())
-                )
-            self._wait.wake()
-            if changed:
-                return SetBoolResponse(True, "Playback is now " + ("paused" if request.data else "resumed"))
-            return SetBoolResponse(False, "Bag is already " + ("paused." if request.data else "running."))
-
-        client.Service("~pause_playback", SetBool, pause)
-        if self._options.rate_control_topic:
-            self._say("Creating rate control topic subscriber...", end="")
-            client.Subscriber(self._options.rate_control_topic, ReceivedFrame, self._on_rate_control)
-            self._say(" done.")
+    # --- playing
 
     def _wait_for_subscribers(self) -> None:
         self._say("Waiting for subscribers.")
-        while not self._ended and any(
-            not publisher.get_num_connections() for publisher, _ in self._publishers.values()
-        ):
+        while not self._ended and not self._stage.has_all_subscribers():
             self._sleep(_TICK // 10)
         if not self._ended:
             self._say("Finished waiting for subscribers.")
-
-    # --- playing
 
     def _play_all(self, messages: ReadAhead, selection: Selection, span: tuple[int, int]) -> None:
         while True:
@@ -293,6 +231,7 @@ class Player:
                 for number, message in messages:
                     if not self._play(message):
                         break
+                    self._is_fresh = False
                     self._publish(number, message)
             if self._schedule and not self._ended and not self._options.quiet:
                 # All of it has been played, however long ago the last line was.
@@ -325,7 +264,7 @@ class Player:
         schedule = self._schedule
         assert schedule
         self._is_at_end = self._seek_to is None
-        while not self._ended and self._seek_to is None:
+        while not self._ended and self._seek_to is None and not self._options.loop:
             now = time.perf_counter_ns()
             self._tick(schedule, now)
             self._wait.until(now + _TICK)
@@ -346,7 +285,8 @@ class Player:
         found.wait()
         with self._lock:
             if self._schedule and self._seek_to is None:
-                self._schedule.seek(start, time.perf_counter_ns())
+                # Steps that were requested meanwhile count.
+                self._schedule.seek(start, time.perf_counter_ns(), keeps_steps=True)
         return found
 
     def _play(self, message: StoredMessage) -> bool:
@@ -382,19 +322,15 @@ class Player:
             self._wait.until(min(wait, now + _TICK))
 
     def _publish(self, number: int, message: StoredMessage) -> None:
-        outlet = self._outlets[number, message.connection.id]
-        if outlet:
-            outlet.publish(message.body)
+        self._stage.publish(number, message)
 
     def _tick(self, schedule: Schedule, now: int) -> None:
         """Publish the clock and print the status line, where it is time for that."""
         if self._options.clock:
             with self._lock:
                 shown = schedule.tick(now)
-            if shown is not None and self._clock:
-                message = self._clock.data_class()
-                message._buff = _CLOCK.pack(*divmod(shown, _SECOND))
-                self._clock.publish(message)
+            if shown is not None:
+                self._stage.publish_clock(shown)
         if now >= self._next_line and not self._options.quiet:
             self._next_line = now + _TICK
             self._show_status(schedule, now)
@@ -424,45 +360,10 @@ class Player:
                 schedule.toggle_pause_topics()
         self._wait.wake()
 
-    def _on_rate_control(self, message: ReceivedFrame) -> None:
-        if self._is_header_first is None:
-            definition = message._connection_header.get("message_definition", "")
-            self._is_header_first = _starts_with_header(definition)
-        frame = message.frame
-        if not self._is_header_first or len(frame) < _STAMP.size:
-            print("\nWARNING: Rate control topic is bad, header is not first. MSG may be malformed.")
-            return
-        secs, nsecs = _STAMP.unpack_from(frame)
-        with self._lock:
-            if self._schedule:
-                self._schedule.control_rate(secs * _SECOND + nsecs)
-        self._wait.wake()
-
-    def _end(self) -> None:
-        self._ended = True
-        self._wait.wake()
-
     def _sleep(self, nanoseconds: int) -> None:
         end = time.perf_counter_ns() + nanoseconds
         while not self._ended and (now := time.perf_counter_ns()) < end:
             self._wait.until(min(end, now + _TICK))
 
     def _say(self, text: str, end: str = "\n") -> None:
-        with contextlib.suppress(OSError, ValueError):
-            if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
-                # The status line, written again and again in its place.
-                sys.stdout.write_own(text)
-                text = ""
-            print(text, end=end, flush=True)
-
-
-def _clock_type() -> tuple[str, str, str]:
-    from rosgraph_msgs.msg import Clock
-
-    return Clock._type, Clock._md5sum, Clock._full_text
-
-
-def _starts_with_header(definition: str) -> bool:
-    lines: Iterable[str] = (line.strip() for line in definition.splitlines())
-    first = next((line for line in lines if line and not line.startswith("#")), "")
-    return first.startswith(("Header ", "std_msgs/Header "))
+        self._stage.say(text, end)

@@ -101,12 +101,17 @@ class Schedule:
         self._rate = rate
         self._start_from(self._clock, wall)
 
-    def seek(self, time: int, wall: int) -> None:
-        """Go on at another time of the bag; the next message is to be offered."""
+    def set_clock(self, hz: float, wall: int) -> None:
+        """Have the clock tick so often from now on; 0: never."""
+        self._period = max(1, int(_SECOND / hz)) if hz else 0
+        self._next_tick = wall
+
+    def seek(self, time: int, wall: int, *, keeps_steps: bool = False) -> None:
+        """Go on at another time of the bag; the next message is to be offered. Steps are forgotten, unless kept."""
         self._clock = self._message = time
         self._is_due = False
         self._delayed = False
-        self._steps = 0
+        self._steps = self._steps if keeps_steps else 0
         self._next_tick = wall
         self._start_from(time, wall)
 

@@ -142,7 +142,6 @@ _QT_REPOSITORIES = (
 )
 _QT_PLUGINS = (
     "rqt_action",
-    "rqt_bag",
     "rqt_dep",
     "rqt_joint_trajectory_controller",
     "rqt_launch",

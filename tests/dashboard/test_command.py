@@ -146,6 +146,7 @@ def test_screen_is_known_by_the_environment() -> None:
             "/#/plot?path=/turtle1/pose/x&path=/turtle1/pose/y&paused=1",
         ),
         (["rqt_graph"], "/#/graph"),
+        (["rqt_bag"], "/#/bag"),
         (["rqt_image_view", "/camera/image_raw"], "/#/image?topic=/camera/image_raw"),
         (["rqt_reconfigure", "lamp"], "/#/reconfigure?node=/lamp"),
         (["rviz", "-f", "odom"], "/#/3d?frame=odom"),

@@ -5,6 +5,7 @@ import { listenForKeys, openHelp } from "./help.js";
 import { LANGUAGES, chooseLanguage, language, t } from "./texts.js";
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
+import { Bag } from "./views/bag.js";
 import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
 import { Diagnostics } from "./views/diagnostics.js";
@@ -31,6 +32,7 @@ const VIEWS = {
   image: ["Image", Image],
   "3d": ["3D", Scene],
   board: ["Board", Board],
+  bag: ["Bags", Bag],
   turtlesim: ["Turtlesim", Turtlesim],
   teleop: ["Teleop", Teleop],
   diagnostics: ["Diagnostics", Diagnostics],

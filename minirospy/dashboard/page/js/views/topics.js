@@ -183,7 +183,7 @@ function oneLine(message) {
 }
 
 // The fields of a message; elements are kept from one message to the next, so a person can select and click them.
-class Tree {
+export class Tree {
   constructor(path) {
     this.path = path;
     this.element = h("ul", {});

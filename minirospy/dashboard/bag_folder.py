@@ -1,0 +1,152 @@
+"""The bags that the page may open: those of one folder and below it, and those that the command line names.
+
+A name that comes from the page is never a path: it is looked up among what was found here.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.errors import BagError, UsageError
+
+__all__ = ["BagFolder", "FoundBag"]
+
+_SUFFIXES = (".bag", ".mcap")
+_MOST_BAGS = 1000
+_MOST_ENTRIES = 50_000
+"""Files and folders that are looked at: the command may have been started in a home folder."""
+
+_DEEPEST = 8
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
+_RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+"""Devices of Windows."""
+
+
+class FoundBag(NamedTuple):
+    """A bag: its name for the page, with slashes; its size in bytes and the time of its last change in seconds."""
+
+    name: str
+    size: int
+    modified: float
+
+
+class BagFolder:
+    """A folder with bags; ``given`` are the files of the command line, which may be anywhere."""
+
+    def __init__(self, root: Path, given: Sequence[Path] = ()) -> None:
+        self.root = root.absolute()
+        self._given = {str(path): path.absolute() for path in given}
+
+    @property
+    def given(self) -> list[str]:
+        """Return the names of the files of the command line."""
+        return list(self._given)
+
+    def bags(self) -> list[FoundBag]:
+        """Return the bags, the newest first. Links are not followed, and folders that start with a dot are left out."""
+        found: dict[str, FoundBag] = {}
+        for name, path in self._given.items():
+            try:
+                status = path.stat()
+            except OSError:
+                continue
+            found[name] = FoundBag(name, status.st_size, status.st_mtime)
+        for entry in self._entries():
+            name = Path(entry.path).relative_to(self.root).as_posix()
+            try:
+                status = entry.stat(follow_symlinks=False)
+            except OSError:
+                continue
+            found.setdefault(name, FoundBag(name, status.st_size, status.st_mtime))
+            if len(found) >= _MOST_BAGS:
+                break
+        return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
+
+    def path_of(self, name: str) -> Path:
+        """Return the file of a name that :meth:`bags` has, or would have. Raise BagError."""
+        if name in self._given:
+            return self._given[name]
+        parts = name.split("/")
+        is_plain = all(part and not part.startswith(".") for part in parts)
+        if not is_plain or "\\" in name or ":" in name or "\0" in name or not name.endswith(_SUFFIXES):
+            raise BagError(f"'{name[:200]}' is not the name of a bag in {self.root}")
+        path = self.root
+        try:
+            for part in parts:
+                path = path / part
+                if _is_link(path):
+                    raise BagError(
+                        f"'{name[:200]}' is a link, or in one: only what is in {self.root} is opened"
+                    )
+            if not path.is_file():
+                raise BagError(f"there is no bag '{name[:200]}' in {self.root}")
+        except (OSError, ValueError) as error:
+            raise BagError(f"'{name[:200]}' cannot be opened: {error}") from error
+        return path
+
+    def new_file(self, name: str, suffix: str) -> Path:
+        """Return the file for a recording. Raise UsageError where the name is none, or is in use."""
+        stem = name.removesuffix(suffix)
+        if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
+            raise UsageError(
+                f"'{name[:120]}' cannot be the name of a recording: it has letters, digits, spaces and _ . + -, "
+                "and is in the folder of this command"
+            )
+        path = self.root / f"{stem}{suffix}"
+        for each in (path, path.with_name(f"{path.name}.active")):
+            if os.path.lexists(each):
+                raise UsageError(f"{each.name} exists already in {self.root}: choose another name")
+        return path
+
+    def _entries(self) -> Iterator[os.DirEntry[str]]:
+        """Yield the bags of the folder and below, level by level."""
+        left = _MOST_ENTRIES
+        level = [self.root]
+        for _ in range(_DEEPEST):
+            below: list[Path] = []
+            for folder in level:
+                for entry in _listed(folder):
+                    left -= 1
+                    if left < 0:
+                        return
+                    if entry.name.startswith("."):
+                        continue
+                    if _is_folder(entry):
+                        below.append(Path(entry.path))
+                    elif entry.name.endswith(_SUFFIXES) and _is_file(entry):
+                        yield entry
+            level = below
+
+
+def _listed(folder: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entries, key=lambda entry: entry.name)
+    except OSError:
+        return []
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir(follow_symlinks=False) and not _is_link(Path(entry.path))
+    except OSError:
+        return False
+
+
+def _is_file(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_file(follow_symlinks=False)
+    except OSError:
+        return False
+
+
+def _is_link(path: Path) -> bool:
+    """Return whether a path is a symbolic link, or on Windows a junction."""
+    status = path.lstat()
+    reparse = getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0x400)
+    return stat.S_ISLNK(status.st_mode) or bool(getattr(status, "st_file_attributes", 0) & reparse)

@@ -1,0 +1,302 @@
+"""Bags over WebSocket: opened, moved through, published, recorded."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import struct
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from std_msgs.msg import String
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from minirospy.bridge.access import Access
+from minirospy.dashboard.bag_door import SUBPROTOCOL
+from minirospy.recording.sources import Bags
+from tests.dashboard.bags import make_bag, text_body
+
+if TYPE_CHECKING:
+    from tests.dashboard.conftest import Served
+
+
+class Client:
+    """A page's connection."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+
+    def send(self, op: str, **fields: object) -> None:
+        self.socket.send(json.dumps({"op": op, **fields}))
+
+    def next(self, name: str, accepts: Callable[[Any], bool] = lambda _: True) -> Any:
+        """Return the next value of this name that is accepted."""
+        while True:
+            data = self.socket.recv(timeout=60)
+            if isinstance(data, bytes):
+                continue
+            found = json.loads(data)
+            if name in found and accepts(found[name]):
+                return found[name]
+            assert "error" not in found, found
+
+    def binary(self, kind: int, body: bytes) -> float:
+        """Wait for a binary message of this kind with these bytes; return its time."""
+        while True:
+            data = self.socket.recv(timeout=60)
+            if isinstance(data, bytes) and data[0] == kind and data[11:] == body:
+                (found,) = struct.unpack_from("<d", data, 3)
+                return float(found)
+            assert isinstance(data, bytes) or "error" not in json.loads(data), data
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def client(serve: Callable[..., Served], folder: Path) -> Iterator[Callable[..., Client]]:
+    with contextlib.ExitStack() as opened:
+
+        def start(served: Served | None = None, token: str = "") -> Client:
+            names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
+            address = f"ws://127.0.0.1:{(served or serve()).port}/"
+            socket = connect(address, subprotocols=names, compression=None, max_size=None)
+            return Client(opened.enter_context(socket))
+
+        yield start
+
+
+def test_bag_is_listed_and_opened(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag")
+    page = client()
+    page.send("list")
+    ((name, size, _),) = page.next("files")
+    assert (name, size) == ("a.bag", (folder / "a.bag").stat().st_size)
+    page.send("open", name="a.bag")
+    bag = page.next("bag")
+    assert bag["length"] == pytest.approx(19.9)
+    assert [(each[0], each[2], each[4]) for each in bag["topics"]] == [
+        ("/camera", 40, False),
+        ("/chatter", 200, False),
+        ("/map", 1, True),
+    ]
+    page.send("density", start=0, end=9.9999, bins=10)
+    rows = page.next("density")["rows"]
+    assert rows["/chatter"] == [10] * 10
+    assert rows["/camera"] == [2] * 10
+    assert rows["/map"] == [1, *[0] * 9]
+
+
+def test_moment_follows_seek_step_and_back(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag")
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("show", topics=["/chatter"])
+    page.binary(1, text_body("message 0"))
+    page.send("play", seek=5.05)
+    assert page.binary(1, text_body("message 50")) == pytest.approx(5.0)
+    page.send("step")
+    assert page.binary(1, text_body("message 51")) == pytest.approx(5.1)
+    page.send("step")
+    page.binary(1, text_body("message 52"))
+    page.send("back")
+    page.binary(1, text_body("message 51"))
+
+
+def test_playing_runs_to_the_end_and_loops(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag", 2)
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("play", paused=False, rate=10)
+    page.next("state", lambda state: state["ended"] and state["rate"] == 10)
+    page.send("play", paused=False, looping=True)
+    page.next("state", lambda state: state["looping"] and not state["ended"] and state["time"] > 0.5)
+    page.next("state", lambda state: state["time"] < 0.5)
+    page.next("state", lambda state: state["time"] > 0.5)
+    page.send("play", paused=True)
+    page.next("state", lambda state: state["paused"])
+
+
+def test_thumbnails_are_the_messages_at_their_times(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag")
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("thumbnails", topic="/chatter", times=[0, 3.33, 100])
+    for text in ("message 0", "message 33", "message 199"):
+        page.binary(2, text_body(text))
+
+
+@pytest.mark.parametrize("kind", [".bag", ".mcap"])
+def test_mcap_is_shown_like_a_bag(client: Callable[..., Client], folder: Path, kind: str) -> None:
+    path = make_bag(folder / "a.bag", 3)
+    if kind == ".mcap":
+        pytest.importorskip("mcap")
+        from minirospy.cli.ros.rosbag import main
+
+        assert main(["convert", str(path), str(folder / "b.mcap")]) == 0
+    page = client()
+    page.send("open", name="b.mcap" if kind == ".mcap" else "a.bag")
+    page.send("show", topics=["/chatter"])
+    page.send("play", seek=1.25)
+    page.binary(1, text_body("message 12"))
+
+
+subscriptions: list[object] = []
+"""They end where nobody refers to them."""
+
+
+def listened(served: Served, topic: str) -> list[str]:
+    found: list[str] = []
+    node = served.node("listener" + topic.replace("/", "_"))
+
+    async def listen() -> None:
+        subscriptions.append(
+            node.subscribe_raw(topic, lambda frame, _: found.append(bytes(frame)[4:].decode()))
+        )
+
+    served.run(listen())
+    return found
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_nothing_is_published_until_that_is_switched_on(
+    serve: Callable[..., Served], client: Callable[..., Client], folder: Path
+) -> None:
+    make_bag(folder / "a.bag", 4)
+    served = serve()
+    chatter, map_ = listened(served, "/chatter"), listened(served, "/map")
+    page = client(served)
+    page.send("open", name="a.bag")
+    page.send("play", paused=False, rate=4)
+    page.next("state", lambda state: state["ended"])
+    assert (chatter, map_) == ([], [])
+    page.send("publish", topics=["/chatter", "/map"], clock=True)
+    page.next("state", lambda state: state["published"] == ["/chatter", "/map"] and state["clock"])
+    # The latched one is long past, and late subscribers need it.
+    wait_until(lambda: map_ == ["the map"])
+    page.send("play", seek=0, paused=False, rate=4)
+    wait_until(lambda: chatter[-1:] == ["message 39"])
+    page.send("publish", topics=[], clock=False)
+    page.next("state", lambda state: not state["published"] and not state["clock"])
+
+
+@pytest.mark.parametrize(
+    ("op", "fields", "why"),
+    [
+        ("open", {"name": "../a.bag"}, "is not the name of a bag"),
+        ("open", {"name": "broken.bag"}, "broken.bag"),
+        ("open", {"name": 5}, "not an operation on bags"),
+        ("open", {}, "not an operation on bags"),
+        ("step", {}, "no bag is open"),
+        ("play", {"seek": "x"}, "no bag is open"),
+        ("fly", {}, "not an operation on bags"),
+        (
+            "record",
+            {"topics": [], "name": "x", "suffix": ".bag", "compression": "none"},
+            "at least one topic",
+        ),
+        (
+            "record",
+            {"topics": ["/a"], "name": "../x", "suffix": ".bag", "compression": "none"},
+            "cannot be the name",
+        ),
+        (
+            "record",
+            {"topics": ["-a"], "name": "x", "suffix": ".bag", "compression": "none"},
+            "not the name of a topic",
+        ),
+        ("record", {"topics": ["/a"], "name": "x", "suffix": ".sh", "compression": "none"}, ".bag or .mcap"),
+        ("record", {"topics": ["/a"], "name": "x", "suffix": ".bag", "compression": "zip"}, "no compression"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(
+    client: Callable[..., Client], folder: Path, op: str, fields: dict[str, object], why: str
+) -> None:
+    (folder / "broken.bag").write_bytes(b"#ROSBAG V2.0\n" + b"x" * 100)
+    page = client()
+    page.send(op, **fields)
+    while "error" not in (found := json.loads(page.socket.recv(timeout=60))):
+        pass
+    assert why in found["error"]
+    assert "\n" not in found["error"]
+
+
+def test_chosen_topics_are_recorded(
+    serve: Callable[..., Served], client: Callable[..., Client], folder: Path
+) -> None:
+    served = serve()
+    node = served.node("talker")
+
+    async def talk() -> None:
+        for topic in ("/a", "/b"):
+            publisher = await node.advertise(topic, String, latch=True)
+            await publisher.publish(f"on {topic}")
+
+    served.run(talk())
+    page = client(served)
+    page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
+    page.next("recording", lambda found: found and found["name"] == "run.bag" and not found["is_ended"])
+    wait_until((folder / "run.bag.active").exists)
+    active = folder / "run.bag.active"
+    wait_until(lambda: not active.exists() or "/a" in served.run(_subscribed(node)))
+    other = client(served)
+    other.next("recording", lambda found: found and found["name"] == "run.bag")
+    other.send("record", topics=["/a"], name="run2", suffix=".bag", compression="none")
+    assert "there is a recording already" in json_error(other)
+    page.send("stop")
+    done = page.next("recording", lambda found: found and found["is_ended"])
+    assert done["error"] == ""
+    assert done["size"] == (folder / "run.bag").stat().st_size
+    with Bags([str(folder / "run.bag")]) as bags:
+        assert {each.topic for each in bags.readers[0].connections.values()} <= {"/a"}
+
+
+async def _subscribed(node: Any) -> list[str]:
+    from minirospy.introspect.snapshot import fetch
+
+    return [topic for topic, nodes in (await fetch(node._node.master)).subscribers.items() if nodes]
+
+
+def json_error(page: Client) -> str:
+    while "error" not in (found := json.loads(page.socket.recv(timeout=60))):
+        pass
+    return str(found["error"])
+
+
+def test_recording_is_completed_when_the_dashboard_ends(
+    serve: Callable[..., Served], client: Callable[..., Client], folder: Path
+) -> None:
+    served = serve()
+    page = client(served)
+    page.send("record", topics=["/a"], name="run", suffix=".bag", compression="lz4")
+    wait_until((folder / "run.bag.active").exists)
+    assert served.dashboard
+    served.run(served.dashboard.close())
+    assert (folder / "run.bag").is_file()
+    assert os.listdir(folder) == ["run.bag"]
+
+
+def test_read_only_client_neither_records_nor_opens(
+    serve: Callable[..., Served], client: Callable[..., Client], folder: Path
+) -> None:
+    make_bag(folder / "a.bag", 1)
+    access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    page = client(serve(access=access), "read-token-00")
+    assert page.next("writes") is False
+    for op in ("list", "open", "record"):
+        page.send(op, name="a.bag")
+        assert "read-only" in json_error(page)
