@@ -281,8 +281,12 @@ def _serve(
     read_only: bool,
     arguments: Sequence[str],
     rviz_file: Path | None = None,
+    node_name: str = "",
 ) -> int:
-    """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status."""
+    """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
+
+    ``node_name``: that of joint_state_publisher_gui, which publishes joints; else the dashboard's own.
+    """
     from minirospy.bridge.serve import require_libraries
 
     if port is not None and not 0 <= port <= 65535:
@@ -333,7 +337,9 @@ def _serve(
                     diagnostics=False,
                     name="minirospy dashboard",
                 )
-                self.dashboard = Dashboard(self._node, options, rviz_file, bags)
+                self.dashboard = Dashboard(
+                    self._node, options, rviz_file, bags, publishes_joints=bool(node_name)
+                )
                 self._opened.append(self.dashboard)
                 try:
                     await self.dashboard.start()
@@ -362,7 +368,7 @@ def _serve(
             read_only=read_only,
         )
 
-    return run(anonymous_name("minirospy_dashboard"), arguments, start, announce)
+    return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
 
 
 def _announce(
@@ -409,6 +415,7 @@ WINDOWS = {
         _window("rqt_console", "console", "Shows the log lines of all nodes"),
         _window("rqt_graph", "graph", "Shows nodes and topics"),
         _window("rqt_image_view", "image", "Shows images of a topic", _add_topic, _image),
+        _window("rqt_launch", "launch", "Starts launch files, and shows their nodes"),
         _window("rqt_logger_level", "console", "Shows log lines, and sets the levels of loggers"),
         _window("rqt_plot", "plot", "Plots numbers of messages", _add_plots, _plots),
         _window("rqt_publisher", "publish", "Publishes messages by forms"),
@@ -419,6 +426,7 @@ WINDOWS = {
         _window("rqt_service_caller", "services", "Calls services by forms"),
         _window("rqt_topic", "topics", "Shows topics with their values"),
         Command("rviz", _rviz_parser, _rviz),
+        _window("smach_viewer", "smach", "Shows state machines"),
     )
 }
 """The commands of rqt, and rviz, by name. Each has a line in the registry and pyproject.toml, and a package in ros_packages/."""

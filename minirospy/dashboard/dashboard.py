@@ -11,6 +11,8 @@ from minirospy.dashboard.bag_folder import BagFolder
 from minirospy.dashboard.board_door import BoardDoor
 from minirospy.dashboard.drive_door import DriveDoor
 from minirospy.dashboard.files import handlers, read_folder
+from minirospy.dashboard.joint_door import JointDoor
+from minirospy.dashboard.launch_door import LaunchDoor
 from minirospy.dashboard.rviz_door import RvizDoor
 from minirospy.dashboard.tools_door import ToolsDoor
 
@@ -28,18 +30,24 @@ class Dashboard:
         options: BridgeOptions,
         rviz_file: Path | None = None,
         bags: BagFolder | None = None,
+        *,
+        publishes_joints: bool = False,
     ) -> None:
         """``options.foxglove_port`` is the port of the page and of its data; the 3D view opens ``rviz_file``.
 
-        ``bags`` are those that may be opened, of the working folder unless given.
+        ``bags`` are those that may be opened, of the working folder unless given. ``publishes_joints``: as
+        joint_state_publisher_gui does, also while no page is open.
         """
         master_uri = node._node.environment.master_uri
         self._board = BoardDoor()
         self.rviz = RvizDoor(rviz_file)
         self._tools = ToolsDoor()
         self._bags = BagDoor(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
+        self._launches = LaunchDoor(master_uri)
+        self._joints = JointDoor(node, lambda: self.bridge.graph, always_publishes=publishes_joints)
         driving = DriveDoor(lambda: self.bridge.graph)
-        doors = (self._board, self._tools, driving, self.rviz, self._bags)
+        own = (self.rviz, self._bags, self._launches, self._joints)
+        doors = (self._board, self._tools, driving, *own)
         self.bridge = Bridge(node, options, addition=Addition(doors, handlers(read_folder())))
 
     @property
@@ -50,11 +58,15 @@ class Dashboard:
     async def start(self) -> None:
         """Listen. Raises BridgeError."""
         await self.bridge.start()
+        if self._joints.always_publishes:
+            self._joints.start_work()
 
     async def close(self) -> None:
         """Disconnect all clients. Idempotent."""
         # Players publish until their sessions end, and the graph is the bridge's.
         await self._bags.close()
+        await self._joints.close()
+        await self._launches.close()
         await self.bridge.close()
         await self._board.close()
         await self._tools.close()

@@ -14,7 +14,8 @@ from collections.abc import Callable
 from sensor_msgs.msg import JointState
 
 from minirospy import client as rospy
-from minirospy.robots.joints import Dependent, JointError, JointOptions, read_joints
+from minirospy.robots.joint_parameters import read_parameters
+from minirospy.robots.joints import JointError, read_joints
 
 __all__ = ["JointPublisher", "main", "param", "run_node"]
 
@@ -54,23 +55,15 @@ class JointPublisher:
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        description = param("robot_description")
-        if not isinstance(description, str):
-            raise JointError("The robot_description parameter is required and not set.")
+        # Both: a zero that the private ones lack may be among the others.
+        zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
+        found = read_parameters(param, zeros)
         self.lock = threading.Lock()
-        self.joints = read_joints(description, _options(), lambda line: rospy.logwarn("%s", line))
-        self._rate = _number("rate", 10.0)
-        if self._rate <= 0:
-            raise JointError(
-                f"The rate parameter is {self._rate:g}: it is a number of messages a second, above 0"
-            )
-        self._delta = _number("delta", 0.0)
+        self.joints = read_joints(found.description, found.options, lambda line: rospy.logwarn("%s", line))
+        self._rate, self._delta = found.rate, found.delta
         self._on_update = on_update
         self._publisher = rospy.Publisher("joint_states", JointState, queue_size=5)
-        sources = param("source_list", [])
-        if not isinstance(sources, list):
-            raise JointError(f"The source_list parameter is [{sources}]: it is a list of topics")
-        self._subscribers = [rospy.Subscriber(str(topic), JointState, self._follow) for topic in sources]
+        self._subscribers = [rospy.Subscriber(topic, JointState, self._follow) for topic in found.sources]
 
     def loop(self) -> None:
         """Publish until the node is shut down."""
@@ -99,54 +92,3 @@ class JointPublisher:
         with self.lock:
             self.joints.update(state.name, state.position, state.velocity, state.effort)
         self._on_update()
-
-
-def _options() -> JointOptions:
-    zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
-    return JointOptions(
-        dependent_joints=_dependent_joints(param("dependent_joints", {})),
-        use_mimic_tags=bool(param("use_mimic_tags", True)),
-        use_smallest_joint_limits=bool(param("use_smallest_joint_limits", True)),
-        zero=lambda joint: _zero(zeros, joint),
-        publish_default_positions=bool(param("publish_default_positions", True)),
-        publish_default_velocities=bool(param("publish_default_velocities", False)),
-        publish_default_efforts=bool(param("publish_default_efforts", False)),
-    )
-
-
-def _zero(zeros: list[object], joint: str) -> float | None:
-    """Return a joint's zero, the private one first. Slashes of its name are levels of the parameter."""
-    for tree in zeros:
-        value: object = tree
-        for part in joint.split("/"):
-            value = value.get(part) if isinstance(value, dict) else None
-        if value is not None:
-            return _as_number(f"zeros/{joint}", value)
-    return None
-
-
-def _dependent_joints(value: object) -> dict[str, Dependent]:
-    if not isinstance(value, dict):
-        raise JointError(
-            f"The dependent_joints parameter is [{value}]: it is as {{joint: {{parent: other}}}}"
-        )
-    found = {}
-    for name, rule in value.items():
-        if not isinstance(rule, dict) or not isinstance(rule.get("parent"), str):
-            raise JointError(f"The dependent_joints parameter has no parent for joint [{name}]")
-        factor, offset = (
-            _as_number(f"dependent_joints/{name}/{key}", rule.get(key, default))
-            for key, default in (("factor", 1.0), ("offset", 0.0))
-        )
-        found[str(name)] = Dependent(rule["parent"], factor, offset)
-    return found
-
-
-def _number(name: str, default: float) -> float:
-    return _as_number(name, param(name, default))
-
-
-def _as_number(name: str, value: object) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        raise JointError(f"The {name} parameter is [{value}]: it is a number")
-    return float(value)

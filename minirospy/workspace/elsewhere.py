@@ -144,7 +144,6 @@ _QT_PLUGINS = (
     "rqt_action",
     "rqt_dep",
     "rqt_joint_trajectory_controller",
-    "rqt_launch",
     "rqt_msg",
     "rqt_nav_view",
     "rqt_pose_view",

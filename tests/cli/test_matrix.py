@@ -121,7 +121,7 @@ ROWS = {
 }
 
 ELSEWHERE = re.compile(
-    r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt|rviz"
+    r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt|rviz|smach_viewer"
 )
 """Commands with their own matrices or tests."""
 

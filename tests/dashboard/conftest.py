@@ -33,6 +33,10 @@ class Served:
         assert self.dashboard
         return self.dashboard.port
 
+    @property
+    def node_of_dashboard(self) -> Node:
+        return self._nodes[0]
+
     def run(self, work: Coroutine[object, object, _T]) -> _T:
         return self._loop.run(work, 60.0)
 

@@ -305,9 +305,9 @@ _ros_commands() {
         roscore rosmaster rostopic rosnode rosservice rosparam rosmsg rossrv rosmsg-proto rospack rosstack rosdep \
         rosconsole rosgraph rosbag rosclean rosversion roswtf rostest rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_make catkin_make_isolated catkin \
         catkin_create_pkg catkin_init_workspace catkin_test_results catkin_find catkin_find_pkg \
-        catkin_topological_order rqt rqt_bag rqt_console rqt_graph rqt_image_view rqt_logger_level rqt_plot \
+        catkin_topological_order rqt rqt_bag rqt_console rqt_graph rqt_image_view rqt_launch rqt_logger_level rqt_plot \
         rqt_publisher rqt_reconfigure rqt_robot_monitor rqt_robot_steering rqt_runtime_monitor \
-        rqt_service_caller rqt_topic rviz minirospy
+        rqt_service_caller rqt_topic rviz smach_viewer minirospy
 }
 
 if [ -n "${ZSH_VERSION:-}" ]; then

@@ -11,6 +11,8 @@ import { Console } from "./views/console.js";
 import { Diagnostics } from "./views/diagnostics.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
+import { Joints } from "./views/joints.js";
+import { Launch } from "./views/launch.js";
 import { Layouts } from "./views/layout.js";
 import { Parameters } from "./views/parameters.js";
 import { Panels } from "./views/panels.js";
@@ -19,6 +21,7 @@ import { Publish } from "./views/publish.js";
 import { Reconfigure } from "./views/reconfigure.js";
 import { Scene } from "./views/scene.js";
 import { Services } from "./views/services.js";
+import { Smach } from "./views/smach.js";
 import { Teleop } from "./views/teleop.js";
 import { Topics } from "./views/topics.js";
 import { Turtlesim } from "./views/turtlesim.js";
@@ -33,6 +36,9 @@ const VIEWS = {
   "3d": ["3D", Scene],
   board: ["Board", Board],
   bag: ["Bags", Bag],
+  launch: ["Launch", Launch],
+  joints: ["Joints", Joints],
+  smach: ["State machines", Smach],
   turtlesim: ["Turtlesim", Turtlesim],
   teleop: ["Teleop", Teleop],
   diagnostics: ["Diagnostics", Diagnostics],

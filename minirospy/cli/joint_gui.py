@@ -1,0 +1,74 @@
+"""`rosrun joint_state_publisher_gui joint_state_publisher_gui`: sliders in the browser, or in a terminal without a screen."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from functools import partial
+
+from minirospy.cli.dashboard import _main, _parser, _serve
+from minirospy.cli.parser import Parser
+from minirospy.cli.verbs import Command
+
+__all__ = ["JOINT_STATE_PUBLISHER_GUI", "main"]
+
+_NAME = "joint_state_publisher_gui"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the node; return its exit status.
+
+    Its sliders are a page where a browser can show itself, and where there is neither a screen nor a terminal: then the link is
+    printed. ``--page`` and ``--terminal`` choose; without the libraries of the page it is the terminal.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    if "--terminal" in words or not (_uses_page(words) and _has_libraries()):
+        from minirospy.robots.joint_publisher_gui import main as in_terminal
+
+        return in_terminal()
+    return _main(JOINT_STATE_PUBLISHER_GUI, words)
+
+
+def _uses_page(words: Sequence[str]) -> bool:
+    from minirospy.dashboard.browser import has_screen
+
+    is_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+    asks_for_page = any(word in ("--page", "-h", "--help") for word in words)
+    return asks_for_page or not is_terminal or has_screen(os.environ)
+
+
+def _has_libraries() -> bool:
+    from minirospy.bridge.serve import require_libraries
+    from minirospy.errors import BridgeError
+
+    try:
+        require_libraries()
+    except BridgeError:
+        return False
+    return True
+
+
+def _joint_parser() -> Parser:
+    parser = _parser(_NAME, "Publishes joint_states, set by sliders in a browser.")
+    parser.add_argument("--page", action="store_true", help="sliders in the browser, also without a screen")
+    parser.add_argument("--terminal", action="store_true", help="sliders in this terminal")
+    return parser
+
+
+def _joint_body(
+    *,
+    port: int | None,
+    no_browser: bool,
+    listen: bool,
+    address: str,
+    read_only: bool,
+    page: bool,
+    terminal: bool,
+    arguments: Sequence[str] = (),
+) -> int:
+    serve = partial(_serve, "joints", {}, port, no_browser, listen, address, read_only, arguments)
+    return serve(node_name=_NAME)
+
+
+JOINT_STATE_PUBLISHER_GUI = Command(_NAME, _joint_parser, _joint_body)

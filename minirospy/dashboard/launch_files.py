@@ -1,0 +1,77 @@
+"""The launch files of the packages that are found; a page names one by its package and its path in there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from minirospy.errors import NotFoundError
+from minirospy.workspace.packages import Packages
+
+__all__ = ["LaunchFile", "LaunchFiles"]
+
+_SUFFIXES = (".launch", ".launch.xml")
+_DEEPEST = 5
+_MOST = 5000
+
+
+class LaunchFile(NamedTuple):
+    """A launch file: its package, and its path in there with slashes."""
+
+    package: str
+    path: str
+
+
+class LaunchFiles:
+    """The launch files of packages. Methods read folders, which blocks."""
+
+    def __init__(self, packages: Packages) -> None:
+        self._packages = packages
+        self._found: dict[LaunchFile, Path] = {}
+
+    def scan(self) -> list[LaunchFile]:
+        """Look for launch files; return them in order."""
+        found: dict[LaunchFile, Path] = {}
+        folders = self._packages.folders()
+        own = set(folders.values())
+        for package, folder in folders.items():
+            for path in _launch_files(folder, own, _DEEPEST):
+                found[LaunchFile(package, path.relative_to(folder).as_posix())] = path
+                if len(found) >= _MOST:
+                    break
+        self._found = found
+        return sorted(found)
+
+    def path_of(self, file: LaunchFile) -> Path:
+        """Return the path of a file that was found. Raise NotFoundError: no other is started."""
+        if not self._found:
+            self.scan()
+        try:
+            return self._found[file]
+        except KeyError:
+            known = [each.path for each in self._found if each.package == file.package]
+            name = f"{file.package}/{file.path}"[:200]
+            raise NotFoundError("launch file", name, known, "it is not in a package that is found") from None
+
+
+def _launch_files(folder: Path, packages: set[Path], depth: int) -> Iterator[Path]:
+    """Yield the launch files of a package, not those of packages in it."""
+    try:
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError:
+        return
+    for entry in entries:
+        path = Path(entry.path)
+        if entry.name.startswith("."):
+            continue
+        try:
+            is_folder = entry.is_dir(follow_symlinks=False)
+            is_file = entry.is_file()
+        except OSError:
+            continue
+        if is_folder and depth and path not in packages:
+            yield from _launch_files(path, packages, depth - 1)
+        elif is_file and entry.name.endswith(_SUFFIXES):
+            yield path

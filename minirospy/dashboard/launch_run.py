@@ -1,0 +1,232 @@
+"""A launch file that runs for the page: roslaunch's own launcher in a thread, with all output in log files."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import ClassVar, NamedTuple
+
+from minirospy.environment import Environment
+from minirospy.errors import MinirospyError, UsageError
+from minirospy.launch.load import LaunchSource, load_sources
+from minirospy.launch.options import RunOptions
+from minirospy.launch.output import Output
+from minirospy.launch.process import Process
+from minirospy.launch.runner import Launcher
+from minirospy.launch.spec import LaunchSpec, NodeSpec
+from minirospy.workspace.packages import Packages
+
+__all__ = ["LaunchRun", "NodeState", "RunState"]
+
+_log = logging.getLogger(__name__)
+
+_MOST_LINES = 2000
+
+
+class NodeState(NamedTuple):
+    """A node of a launch: starting, running, ending, exited (``status``), failed (it could not be started), stopped.
+
+    ``starts``: how often it was started; ``respawns``: whether it is started again when it exits.
+    """
+
+    name: str
+    program: str
+    state: str
+    status: int | None
+    pid: int | None
+    starts: int
+    respawns: bool
+
+
+class RunState(NamedTuple):
+    """A launch: starting, running, stopping or ended, and then its error, "" for none."""
+
+    id: int
+    package: str
+    file: str
+    args: Mapping[str, str]
+    state: str
+    error: str
+    nodes: list[NodeState]
+
+
+class _Lines(Output):
+    """The lines of roslaunch itself, kept instead of printed."""
+
+    def __init__(self) -> None:
+        super().__init__(title=False)
+        self.lines: deque[str] = deque(maxlen=_MOST_LINES)
+        self.count = 0
+
+    def _write(self, text: str, colour: str, level: int) -> None:
+        if text:
+            self.count += 1
+            self.lines.append(text)
+            self._to_log(text, level)
+
+
+class _PageLauncher(Launcher):
+    """A launcher that reports the nodes that have exited."""
+
+    def __init__(
+        self,
+        spec: LaunchSpec,
+        environment: Environment,
+        packages: Packages,
+        output: Output,
+        on_end: Callable[[Process], None],
+    ) -> None:
+        options = RunOptions(log=True, log_errors=True, summary=False, name="dashboard")
+        super().__init__(spec, environment, packages, options, output)
+        self._report = on_end
+
+    def _on_end(self, process: Process) -> None:
+        self._report(process)
+
+
+class LaunchRun:
+    """One launch file, started in a thread. ``on_ended`` is called there when it has ended."""
+
+    _ids: ClassVar[Iterator[int]] = itertools.count(1)
+
+    def __init__(
+        self,
+        package: str,
+        file: str,
+        path: Path,
+        args: Mapping[str, str],
+        environment: Environment,
+        packages: Packages,
+    ) -> None:
+        self.id = next(self._ids)
+        self.package, self.file, self.path, self.args = package, file, path, dict(args)
+        self.output = _Lines()
+        self._environment = environment
+        self._packages = packages
+        self._state = "starting"
+        self._error = ""
+        self._is_stopped = False
+        self._launcher: _PageLauncher | None = None
+        self._nodes: list[NodeSpec] = []
+        self._exited: dict[str, Process] = {}
+        self._known: dict[str, Process] = {}
+        self._lock = threading.Lock()
+        # Where this process ends without ending it, the guardian of its launcher ends the nodes.
+        self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_ended(self) -> bool:
+        """Return whether all of it has ended."""
+        return self._state == "ended"
+
+    @property
+    def _is_ending(self) -> bool:
+        return self._state in ("stopping", "ended")
+
+    def state(self) -> RunState:
+        """Return the state now. From any thread."""
+        launcher = self._launcher
+        for process in tuple(launcher.processes) if launcher else ():
+            if process.node:
+                self._known[process.node.name] = process
+        nodes = [self._node_state(node) for node in self._nodes]
+        return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
+
+    def log_file(self, node: str) -> Path | None:
+        """Return the file with what a node prints; None where there is none yet."""
+        process = self._known.get(node)
+        return process.stdout_file if process else None
+
+    def stop(self) -> None:
+        """End all nodes. From any thread; does not wait."""
+        with self._lock:
+            self._is_stopped = True
+            if self._state in ("starting", "running"):
+                self._state = "stopping"
+            if self._launcher:
+                self._launcher.stop("the page")
+
+    def join(self) -> None:
+        """Wait until all of it has ended."""
+        self._thread.join()
+
+    def end_node(self, name: str, *, restarts: bool) -> None:
+        """End one node, and start it again if wanted. Raise UsageError where it does not run."""
+        launcher, process = self._launcher, self._known.get(name)
+        if not launcher or not process or not process.is_running or self._state != "running":
+            raise UsageError(f"node [{name[:200]}] does not run")
+        process.is_restarting = restarts
+        threading.Thread(target=launcher.supervisor.end_process, args=(process,), daemon=True).start()
+
+    def _run(self) -> None:
+        try:
+            self._launch()
+        except KeyboardInterrupt:
+            pass  # stopped while it started
+        except MinirospyError as error:
+            self._error = str(error)
+        except Exception as error:  # noqa: BLE001 - the page shows it
+            self._error = f"the launch failed: {error!r}"
+            _log.exception("%s/%s", self.package, self.file)
+        finally:
+            self._end()
+
+    def _launch(self) -> None:
+        spec = load_sources([LaunchSource(str(self.path), None, self.args)], self._packages)
+        unknown = [name for name in self.args if name not in spec.args]
+        if unknown:
+            raise UsageError(f"the launch file declares no <arg> '{unknown[0]}'")
+        launcher = _PageLauncher(spec, self._environment, self._packages, self.output, self._node_ended)
+        self._nodes = list(spec.nodes)
+        with self._lock:
+            self._launcher = launcher
+            if self._is_stopped:
+                launcher.stop("the page")
+        launcher.start()
+        with self._lock:
+            if not self._is_stopped:
+                self._state = "running"
+        status = launcher.watch()
+        if status and not self._is_stopped:
+            self._error = "a required node has died"
+
+    def _end(self) -> None:
+        with self._lock:
+            self._state = "stopping"
+        self.state()
+        try:
+            if self._launcher:
+                self._launcher.close()
+        except (MinirospyError, OSError) as error:
+            self._error = self._error or str(error)
+        finally:
+            self._state = "ended"
+
+    def _node_ended(self, process: Process) -> None:
+        assert process.node
+        self._known[process.node.name] = process
+        self._exited[process.node.name] = process
+
+    def _node_state(self, node: NodeSpec) -> NodeState:
+        process = self._known.get(node.name)
+        program = f"{node.package}/{node.type}"
+        if process is None:
+            failed = self._launcher.failed if self._launcher else []
+            is_failed = any(each.name == node.name for each in failed)
+            state = "failed" if is_failed else "stopped" if self._state == "ended" else "starting"
+            return NodeState(node.name, program, state, None, None, 0, node.respawn)
+
+        status = process.exit_code
+        if status is None:
+            state = "ending" if process.is_ending else "running"
+        elif process.is_ending or (self._is_ending and process is not self._exited.get(node.name)):
+            state = "stopped"
+        else:
+            state = "exited"
+        pid = process.pid if status is None else None
+        return NodeState(node.name, program, state, status, pid, process.starts, node.respawn)

@@ -1,0 +1,324 @@
+// State machines of smach, as smach_viewer shows them: containers in containers, active states, userdata; and where they start the next time.
+
+import { Graph, layout } from "../../vendor/dagre/dagre.esm.js";
+import { fill, h, setText, svg, uniqueId } from "../dom.js";
+import { userdataOf } from "../pickle.js";
+import { layoutContainer, roots } from "../smach_layout.js";
+
+const STRUCTURE = "smach_msgs/SmachContainerStructure";
+const STATUS = "smach_msgs/SmachContainerStatus";
+const INIT = "smach_msgs/SmachContainerInitialStatusCmd";
+const INIT_TEXT = `# The path to the node in the server
+string path
+
+# If there's only one child, this will contain only one item
+string[] initial_states
+
+# Initial values for the local user data at the start of this container
+# (pickled, and as base64)
+string local_data
+`;
+const EMPTY_USERDATA = "gAJ9cQAu"; // pickle.dumps({}, 2) as base64
+const MOST_EVENTS = 100;
+const MOST_SENDS = 10;
+const SEND_MS = 400;
+const GAP = 40; // between outermost containers
+
+export class Smach {
+  constructor(link, words, main, place) {
+    this.link = link;
+    this.place = place;
+    this.server = words.get("server") ?? "";
+    this.structures = new Map(); // topic's server and path -> structure
+    this.statuses = new Map();
+    this.events = [];
+    this.folded = new Set();
+    this.selected = null; // {path, state or null}
+    this.ends = new Map(); // topic -> end of its subscription
+    this.arrow = uniqueId("smach");
+    this.choice = h("select", { "aria-label": "State machine", onchange: () => this.choose(this.choice.value) });
+    this.now = h("span", { class: "smach-now", role: "status" });
+    this.drawing = svg("g", {});
+    this.picture = svg("svg", { class: "graph smach", role: "group", "aria-label": "States and transitions" },
+      svg("defs", {}, svg("marker", { id: this.arrow, viewBox: "0 0 10 10", refX: 9, refY: 5, markerWidth: 7, markerHeight: 7, orient: "auto-start-reverse" },
+        svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
+    this.empty = h("p", { class: "empty" });
+    this.details = h("aside", { class: "panel details side" });
+    this.problem = h("p", { class: "error", role: "alert" });
+    main.append(h("div", { class: "bar" }, this.choice, this.now, h("span", { class: "spring" }), h("button", { type: "button", onclick: () => this.fit() }, "Fit")), this.problem,
+      h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details));
+    this.view = { x: 0, y: 0, scale: 1 };
+    this.isFitted = true;
+    this.listen();
+    this.observer = new ResizeObserver(() => { if (this.isFitted) this.fit(); });
+    this.observer.observe(this.picture);
+    this.ending = link.watch(["channels", "state"], () => this.update());
+  }
+
+  close() {
+    this.isClosed = true;
+    this.ending();
+    this.observer.disconnect();
+    for (const end of this.ends.values()) end();
+  }
+
+  // --- what there is
+
+  update() {
+    const servers = [...this.link.channels.values()].filter(({ type }) => type === STRUCTURE).map(({ topic }) => topic.slice(0, topic.lastIndexOf("/smach/")));
+    const text = servers.join(" ");
+    if (text !== this.servers) {
+      this.servers = text;
+      fill(this.choice, servers.length ? null : h("option", { value: "" }, "no state machine"), servers.map((name) => h("option", { value: name }, name || "/")));
+    }
+    if (!servers.includes(this.server) && servers.length && this.link.state === "open") this.choose(servers[0], false);
+    this.choice.value = this.server;
+    if (servers.includes(this.server)) this.subscribe();
+    setText(this.empty, this.structures.size || this.link.state !== "open" ? "" : servers.length ? "Waiting for the structure …"
+      : "No state machine publishes what it does: start smach_ros.IntrospectionServer(\"name\", machine, \"/ROOT\") in its program.");
+  }
+
+  choose(server, isRemembered = true) {
+    for (const end of this.ends.values()) end();
+    this.ends.clear();
+    this.structures.clear();
+    this.statuses.clear();
+    this.events = [];
+    this.selected = null;
+    this.server = server;
+    this.signature = null;
+    this.isFitted = true;
+    this.drawing.replaceChildren();
+    if (isRemembered) this.place.remember(server ? { server } : {});
+    this.update();
+    this.showDetails();
+  }
+
+  subscribe() {
+    for (const [name, received] of [["container_structure", (line) => this.structure(line)], ["container_status", (line) => this.status(line)]]) {
+      const topic = `${this.server}/smach/${name}`;
+      if (this.ends.has(topic)) continue;
+      this.ends.set(topic, this.link.subscribe({ topic, mode: "all" }, ({ lines = [], error }) => {
+        setText(this.problem, error ?? "");
+        for (const line of lines) received(line);
+        this.draw();
+      }));
+    }
+  }
+
+  structure({ message }) {
+    this.structures.set(message.path, message);
+  }
+
+  status({ message, seconds }) {
+    const before = this.statuses.get(message.path);
+    this.statuses.set(message.path, message);
+    const active = activeOf(message);
+    if (!before || activeOf(before).join() !== active.join()) {
+      this.events.unshift({ seconds, path: message.path, active });
+      this.events.length = Math.min(this.events.length, MOST_EVENTS);
+    }
+  }
+
+  // --- drawing
+
+  draw() {
+    setText(this.empty, this.structures.size ? "" : "Waiting for the structure …");
+    const signature = JSON.stringify([[...this.structures.values()].map(({ header, ...rest }) => rest), [...this.folded]]);
+    if (signature !== this.signature) {
+      this.signature = signature;
+      this.drawStructure();
+    }
+    this.highlight();
+    this.showDetails();
+  }
+
+  drawStructure() {
+    const measure = h("canvas").getContext("2d");
+    measure.font = "600 14px system-ui, sans-serif";
+    const tools = { Graph, layout, widthOf: (text) => measure.measureText(text).width, isFolded: (path) => this.folded.has(path) };
+    this.parts = new Map(); // path of a state or container -> element
+    this.drawing.replaceChildren();
+    let x = 10;
+    let height = 0;
+    for (const path of roots(this.structures)) {
+      const found = layoutContainer(path, this.structures, tools);
+      this.drawing.append(this.container(found, x, 10));
+      x += found.width + GAP;
+      height = Math.max(height, found.height);
+    }
+    this.size = { width: x - GAP + 10, height: height + 20 };
+    if (this.isFitted) this.fit();
+  }
+
+  container(found, x, y) {
+    const { path, width, height } = found;
+    const name = path.slice(path.lastIndexOf("/") + 1) || path;
+    const group = svg("g", { class: "smach-container", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})` },
+      svg("rect", { width, height, rx: 10 }), svg("text", { class: "smach-title", x: 14, y: 21 }, name),
+      found.edges.map((edge) => svg("g", { class: "edge" }, svg("path", { d: pathOf(edge.points), "marker-end": `url(#${this.arrow})` }), svg("text", { x: edge.x, y: edge.y + 4 }, edge.label))),
+      found.outcomes.map((each) => svg("g", { class: "smach-outcome" }, svg("rect", { x: each.x - each.width / 2, y: each.y - each.height / 2, width: each.width, height: each.height, rx: 3 }), svg("text", { x: each.x, y: each.y + 4 }, each.name))));
+    this.parts.set(path, group);
+    this.makeButton(group.firstChild, path, null);
+    for (const state of found.states) {
+      const key = `${path}/${state.name}`;
+      let part;
+      if (state.inner) {
+        part = this.container(state.inner, state.x - state.width / 2, state.y - state.height / 2);
+      } else {
+        part = svg("g", { class: `smach-state${state.isContainer ? " folded" : ""}`, transform: `translate(${(state.x - state.width / 2).toFixed(1)} ${(state.y - state.height / 2).toFixed(1)})` },
+          svg("rect", { width: state.width, height: state.height, rx: state.height / 2 }), svg("text", { x: state.width / 2, y: state.height / 2 + 5 }, state.isContainer ? `${state.name} ▸` : state.name));
+        this.makeButton(part, path, state.name);
+      }
+      part.dataset.state = key;
+      this.parts.set(key, part);
+      group.append(part);
+    }
+    return group;
+  }
+
+  makeButton(element, path, state) {
+    const select = (event) => {
+      event.stopPropagation();
+      this.selected = { path, state };
+      this.highlight();
+      this.shown = null;
+      this.showDetails();
+    };
+    element.addEventListener("click", select);
+    element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") select(event); });
+    element.setAttribute("tabindex", 0);
+    element.setAttribute("role", "button");
+    element.setAttribute("aria-label", state === null ? `container ${path}` : `state ${state} of ${path}`);
+  }
+
+  highlight() {
+    const active = new Set();
+    const initial = new Set();
+    for (const { path, active_states: now, initial_states: first } of this.statuses.values()) {
+      for (const name of now) active.add(`${path}/${name}`);
+      for (const name of first) initial.add(`${path}/${name}`);
+    }
+    for (const [key, part] of this.parts ?? []) {
+      part.classList.toggle("active", active.has(key));
+      part.classList.toggle("initial", initial.has(key));
+      part.classList.toggle("selected", this.selected !== null && key === (this.selected.state === null ? this.selected.path : `${this.selected.path}/${this.selected.state}`));
+    }
+    const paths = [...active].filter((key) => ![...active].some((other) => other.startsWith(`${key}/`)));
+    setText(this.now, paths.length ? `now: ${paths.join(", ")}` : this.statuses.size ? "no state is active" : "");
+  }
+
+  // --- details
+
+  showDetails() {
+    const path = this.selected?.path ?? roots(this.structures)[0];
+    const structure = this.structures.get(path);
+    const status = this.statuses.get(path);
+    const content = JSON.stringify([path, this.selected?.state ?? null, status && { ...status, header: null, info: null }, this.events.length, this.events[0]?.seconds ?? 0, structure?.children, [...this.folded], this.link.mayWrite]);
+    if (content === this.shown) return;
+    this.shown = content;
+    if (!structure) {
+      fill(this.details, h("p", { class: "muted" }, "A click on a state or a container shows its outcomes and its userdata."));
+      return;
+    }
+    const state = this.selected?.state ?? null;
+    fill(this.details, h("h2", {}, state === null ? path : `${path}/${state}`), this.facts(structure, status, state),
+      h("h3", {}, `Userdata of ${path}`), this.userdata(status),
+      h("h3", {}, "Last changes"), this.events.length ? h("ul", { class: "smach-events" }, this.events.slice(0, 30).map((event) => h("li", {}, h("span", { class: "muted num" }, new Date(event.seconds * 1000).toLocaleTimeString()), " ",
+        h("span", { class: "muted" }, event.path), " → ", event.active.join(", ") || "ended"))) : h("p", { class: "muted" }, "none yet"));
+  }
+
+  facts(structure, status, state) {
+    const { path } = structure;
+    const key = state === null ? path : `${path}/${state}`;
+    const isContainer = this.structures.has(key);
+    const transitions = structure.outcomes_from.map((from, index) => [from, structure.internal_outcomes[index], structure.outcomes_to[index]]).filter(([from]) => state === null || from === state);
+    const fold = isContainer && key !== roots(this.structures)[0] ? h("button", { type: "button", class: "small", onclick: () => {
+      if (!this.folded.delete(key)) this.folded.add(key);
+      this.shown = null;
+      this.draw();
+    } }, this.folded.has(key) ? "unfold" : "fold") : null;
+    const begin = state === null ? null : h("button", { type: "button", class: "small", disabled: !this.link.mayWrite, title: "The container starts with this state the next time that it is run", onclick: () => this.setInitial(path, state) }, "start here next time");
+    return [
+      h("div", { class: "bar" }, begin, fold),
+      state === null ? h("p", { class: "muted" }, `outcomes: ${structure.container_outcomes.join(", ") || "none"}`) : null,
+      status ? h("p", {}, `active: ${activeOf(status).join(", ") || "none"}`, h("br"), h("span", { class: "muted" }, `starts with: ${status.initial_states.join(", ") || "–"}`)) : null,
+      h("table", { class: "values" }, h("tbody", {}, transitions.map(([from, label, to]) => h("tr", {}, state === null ? h("td", {}, from) : null, h("th", { scope: "row" }, label), h("td", {}, `→ ${to}`))))),
+    ];
+  }
+
+  userdata(status) {
+    if (!status) return h("p", { class: "muted" }, "not known yet");
+    try {
+      const rows = userdataOf(status.local_data);
+      if (!rows.length) return h("p", { class: "muted" }, "empty");
+      return h("table", { class: "values" }, h("tbody", {}, rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, text)))));
+    } catch (error) {
+      return h("p", { class: "muted" }, `it cannot be read: ${error.message}`);
+    }
+  }
+
+  async setInitial(path, state) {
+    // Again until the machine has answered: a message that comes before its connection is lost.
+    const { server } = this;
+    const isDone = () => this.statuses.get(path)?.initial_states.join() === state;
+    for (let number = 0; number < MOST_SENDS && (number === 0 || !isDone()) && server === this.server && !this.isClosed; number++) {
+      try {
+        await this.link.publish(`${server}/smach/container_init`, INIT, INIT_TEXT, { path, initial_states: [state], local_data: EMPTY_USERDATA });
+        setText(this.problem, "");
+      } catch (error) {
+        setText(this.problem, error.message);
+        return;
+      }
+      await new Promise((resolve) => { setTimeout(resolve, SEND_MS); });
+    }
+  }
+
+  // --- pan and zoom
+
+  fit() {
+    this.isFitted = true;
+    const { clientWidth, clientHeight } = this.picture;
+    if (!this.size || !clientWidth) return;
+    const scale = Math.min(1.25, clientWidth / this.size.width, clientHeight / this.size.height);
+    this.view = { scale, x: (clientWidth - this.size.width * scale) / 2, y: Math.max(0, (clientHeight - this.size.height * scale) / 2) };
+    this.move();
+  }
+
+  move() {
+    const { x, y, scale } = this.view;
+    this.drawing.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)}) scale(${scale.toFixed(4)})`);
+  }
+
+  listen() {
+    let drag = null;
+    this.picture.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const box = this.picture.getBoundingClientRect();
+      const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+      const scale = Math.min(4, Math.max(0.05, this.view.scale * Math.exp(-event.deltaY * 0.0015)));
+      const real = scale / this.view.scale;
+      this.view = { scale, x: x - (x - this.view.x) * real, y: y - (y - this.view.y) * real };
+      this.isFitted = false;
+      this.move();
+    }, { passive: false });
+    this.picture.addEventListener("pointerdown", (event) => { drag = { x: event.clientX, y: event.clientY }; });
+    this.picture.addEventListener("pointermove", (event) => {
+      if (!drag || !event.buttons) return;
+      this.view.x += event.clientX - drag.x;
+      this.view.y += event.clientY - drag.y;
+      drag = { x: event.clientX, y: event.clientY };
+      this.isFitted = false;
+      this.move();
+    });
+    for (const name of ["pointerup", "pointerleave"]) this.picture.addEventListener(name, () => { drag = null; });
+  }
+}
+
+function activeOf({ active_states: names }) {
+  return names.filter((name) => name !== "None" && name !== "");
+}
+
+function pathOf(points) {
+  return points.map((point, index) => `${index ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
+}

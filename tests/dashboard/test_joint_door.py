@@ -1,0 +1,207 @@
+"""Joints over WebSocket: read from robot_description, set, published."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sensor_msgs.msg import JointState
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from minirospy.bridge.access import Access
+from minirospy.dashboard.joint_door import SUBPROTOCOL
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.workspace.packages import Packages
+from tests.dashboard.robot import ROBOT
+
+if TYPE_CHECKING:
+    from tests.dashboard.conftest import Served
+
+
+class Client:
+    """A page's connection."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+
+    def send(self, op: str, **fields: object) -> None:
+        self.socket.send(json.dumps({"op": op, **fields}))
+
+    def next(self, name: str, accepts: Callable[[Any], object] = lambda _: True) -> Any:
+        """Return the next value of this name that is accepted."""
+        while True:
+            found: dict[str, Any] = json.loads(self.socket.recv(timeout=60))
+            if name in found and accepts(found[name]):
+                return found[name]
+
+
+@pytest.fixture
+def client(serve: Callable[..., Served]) -> Iterator[Callable[..., Client]]:
+    with contextlib.ExitStack() as opened:
+
+        def start(served: Served, token: str = "") -> Client:
+            names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
+            address = f"ws://127.0.0.1:{served.port}/"
+            return Client(opened.enter_context(connect(address, subprotocols=names, compression=None)))
+
+        yield start
+
+
+def set_params(served: Served, **values: object) -> None:
+    async def work() -> None:
+        for name, value in values.items():
+            await served.node_of_dashboard.set_param(name, value)
+
+    served.run(work())
+
+
+def listening(served: Served) -> Callable[[Callable[[dict[str, float]], bool]], dict[str, float]]:
+    node = served.node("listener")
+
+    async def listen() -> Any:
+        return await node.subscribe("/joint_states", JointState)
+
+    subscription = served.run(listen())
+
+    def until(accepts: Callable[[dict[str, float]], bool]) -> dict[str, float]:
+        while True:
+            state = served.run(subscription.next(50))
+            found = dict(zip(state.name, state.position, strict=True))
+            if accepts(found):
+                return found
+
+    return until
+
+
+def test_joints_are_those_of_the_description(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, zeros={"shoulder": 0.5}, rate=50)
+    page = client(served)
+    joints = page.next("joints")
+    assert joints["robot"] == "crane"
+    assert joints["rate"] == 50
+    rows = {name: (kind, limits) for name, kind, limits in joints["rows"]}
+    assert rows["shoulder"] == ("revolute", [-1, 2, 0.5])
+    assert rows["wheel"][0] == "continuous"
+    assert rows["lift"] == ("prismatic", [0.1, 0.3, pytest.approx(0.2)])
+    assert rows["finger"] == ("revolute", None)
+    assert "bolt" not in rows
+
+
+def test_positions_are_published_only_where_wanted(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, rate=50)
+    until = listening(served)
+    page = client(served)
+    page.next("joints")
+    page.send("set", positions={"shoulder": 1.5, "lift": 99})
+    page.next("state", lambda state: state["positions"]["shoulder"] == 1.5 and not state["publishing"])
+    page.send("publish", on=True)
+    found = until(lambda _: True)
+    assert found["shoulder"] == 1.5
+    assert found["lift"] == 0.3
+    assert found["finger"] == pytest.approx(-2.9)
+    page.send("center")
+    until(lambda each: each["shoulder"] == 0)
+    page.send("randomize")
+    until(lambda each: each["shoulder"] != 0 and -1 <= each["shoulder"] <= 2)
+    page.send("publish", on=False)
+    page.next("state", lambda state: not state["publishing"])
+
+
+def test_sources_move_the_joints(serve: Callable[..., Served], client: Callable[..., Client]) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT, source_list=["/from_robot"])
+    page = client(served)
+    page.next("joints")
+    node = served.node("arm")
+
+    async def publish() -> None:
+        publisher = await node.advertise("/from_robot", JointState, latch=True)
+        await publisher.publish(JointState(name=["wheel"], position=[0.75]))
+
+    served.run(publish())
+    page.next("state", lambda state: state["positions"].get("wheel") == 0.75)
+
+
+def test_description_that_comes_later_or_is_broken_is_followed(
+    serve: Callable[..., Served], client: Callable[..., Client]
+) -> None:
+    served = serve()
+    page = client(served)
+    while "why" not in (found := json.loads(page.socket.recv(timeout=60))):
+        pass
+    assert "robot_description parameter is required" in found["why"]
+    set_params(served, robot_description="<robot>")
+    while "robot_description" not in found.get("why", "") or "required" in found["why"]:
+        found = json.loads(page.socket.recv(timeout=60))
+    set_params(served, robot_description=ROBOT)
+    assert page.next("joints", bool)["robot"] == "crane"
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"op": "set"},
+        {"op": "set", "positions": {"none": 1}},
+        {"op": "set", "positions": {"wheel": "x"}},
+        {"op": "set", "positions": {"wheel": float("nan")}},
+        {"op": "set", "positions": [1]},
+        {"op": "fly"},
+        {},
+    ],
+)
+def test_what_is_not_an_operation_is_refused_with_one_line(
+    serve: Callable[..., Served], client: Callable[..., Client], fields: dict[str, object]
+) -> None:
+    served = serve()
+    set_params(served, robot_description=ROBOT)
+    page = client(served)
+    page.next("joints")
+    page.socket.send(json.dumps(fields))
+    assert "\n" not in page.next("error")
+
+
+def test_read_only_client_sets_nothing(serve: Callable[..., Served], client: Callable[..., Client]) -> None:
+    access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    page = client(serve(access=access), "read-token-00")
+    assert page.next("writes") is False
+    page.send("publish", on=True)
+    assert "read-only" in page.next("error")
+
+
+def test_node_of_launch_files_publishes_without_a_page(master: str) -> None:
+    proxy = MasterProxy(master, "/test")
+    proxy.set_param("/robot_description", ROBOT)
+    proxy.set_param("/joint_state_publisher_gui/zeros", {"wheel": 0.25})
+    proxy.close()
+    program = Packages().find_executable("joint_state_publisher_gui", "joint_state_publisher_gui")
+    command = [*program, "--page", "--no-browser", "--port", "0"]
+    node = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    try:
+        assert node.stdout
+        assert re.match(r"Open in a browser: http://localhost:\d+/#/joints$", node.stdout.readline())
+        reading = (
+            "import rospy; from sensor_msgs.msg import JointState; rospy.init_node('reader', disable_rosout=True);"
+            "state = rospy.wait_for_message('joint_states', JointState);"
+            "print(dict(zip(state.name, state.position))['wheel'], state._connection_header['callerid'])"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", reading], capture_output=True, text=True, timeout=90, check=True
+        )
+        assert done.stdout == "0.25 /joint_state_publisher_gui\n"
+    finally:
+        node.terminate()
+        node.communicate(timeout=60)
+    assert node.returncode == 0 or sys.platform == "win32"
