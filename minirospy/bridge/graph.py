@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import deque
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 
@@ -125,6 +126,7 @@ class Publication:
         self.topic = topic
         self._graph = graph
         self._shared: _SharedPublisher | None = shared
+        self._waiting: deque[bytes] | None = None
 
     @property
     def has_joined(self) -> bool:
@@ -141,8 +143,24 @@ class Publication:
         if self._shared:
             self._shared.publisher.publish_raw(body)
 
+    def publish_when_joined(self, body: bytes) -> None:
+        """Publish once the subscribers of that moment are connected, in order. Does not wait; the newest messages are kept."""
+        if self._waiting is not None:
+            self._waiting.append(body)
+        elif self.has_joined or not (self._shared and self._shared.joining):
+            self.publish(body)
+        else:
+            self._waiting = deque([body], _QUEUE)
+            self._shared.joining.add_done_callback(lambda _: self._publish_waiting())
+
+    def _publish_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, None
+        for body in waiting or ():
+            self.publish(body)
+
     def close(self) -> None:
         """End it; the topic is advertised until its last client has left. Idempotent."""
+        self._publish_waiting()
         shared, self._shared = self._shared, None
         if shared:
             self._graph.left_publisher(self.topic, shared)

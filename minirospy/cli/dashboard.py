@@ -424,6 +424,7 @@ WINDOWS = {
         _window("rqt_robot_steering", "teleop", "Drives a robot"),
         _window("rqt_runtime_monitor", "diagnostics", "Shows diagnostics"),
         _window("rqt_service_caller", "services", "Calls services by forms"),
+        _window("rqt_tf_tree", "tf", "Shows the tree of frames"),
         _window("rqt_topic", "topics", "Shows topics with their values"),
         Command("rviz", _rviz_parser, _rviz),
         _window("smach_viewer", "smach", "Shows state machines"),

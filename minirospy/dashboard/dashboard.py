@@ -41,7 +41,7 @@ class Dashboard:
         master_uri = node._node.environment.master_uri
         self._board = BoardDoor()
         self.rviz = RvizDoor(rviz_file)
-        self._tools = ToolsDoor()
+        self._tools = ToolsDoor(master_uri)
         self._bags = BagDoor(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
         self._launches = LaunchDoor(master_uri)
         self._joints = JointDoor(node, lambda: self.bridge.graph, always_publishes=publishes_joints)

@@ -1,19 +1,27 @@
-"""What the views need besides the Foxglove protocol, by JSON over WebSocket: requests about nodes and files.
+"""What the views need besides the Foxglove protocol, by JSON over WebSocket: requests about nodes, types and files.
 
 A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error": "..."}``.
-The requests are in ``ToolsSession._METHODS``.
+The requests are in ``ToolsSession._METHODS``. After ``watch`` it sends ``{"report": ...}`` every few seconds until ``unwatch``:
+the graph and all nodes, as minirospy/introspect/survey.py describes them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
+import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
-from minirospy.errors import MinirospyError
+from minirospy.bridge.types import installed_type
+from minirospy.errors import MinirospyError, NotFoundError
 from minirospy.introspect.configurations import parameter_values
+from minirospy.introspect.graph import Graph
+from minirospy.introspect.nodes import find_node, forget_node, kill_node, ping_node, unreachable_nodes
+from minirospy.introspect.survey import Survey, describe, survey
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     from minirospy.bridge.web.client import WebClient
@@ -22,15 +30,23 @@ __all__ = ["SUBPROTOCOL", "ToolsDoor", "ToolsSession"]
 
 SUBPROTOCOL = "minirospy.tools.v1"
 
+_log = logging.getLogger(__name__)
+
 _MOST_WAITING = 20
+_REPORT_SECONDS = 2.0
 _LARGEST_TEXT = 1_000_000
 
 
 class ToolsDoor:
-    """Serves the requests of pages."""
+    """Serves the requests of pages. ``tool`` is the name by which nodes are called."""
 
-    def __init__(self) -> None:
+    def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         self.tasks: set[asyncio.Task[None]] = set()
+        self._master_uri = master_uri
+        self._tool = tool
+        self._watching: set[ToolsSession] = set()
+        self._reporting: asyncio.Task[None] | None = None
+        self._last: Survey | None = None
 
     def select(self, offered: Sequence[str]) -> str:
         """Return the sub-protocol to use. Raise LookupError."""
@@ -44,9 +60,52 @@ class ToolsDoor:
 
     async def close(self) -> None:
         """Cancel what still runs."""
-        for task in self.tasks:
+        self._watching.clear()
+        running = [*self.tasks, *([self._reporting] if self._reporting else [])]
+        for task in running:
             task.cancel()
-        await asyncio.gather(*self.tasks, return_exceptions=True)
+        await asyncio.gather(*running, return_exceptions=True)
+
+    def graph(self) -> Graph:
+        """Return the graph, with a connection of its own to the master: calls run in threads."""
+        return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
+
+    def watch(self, session: ToolsSession) -> None:
+        """Send a session a report of the graph now and every few seconds."""
+        self._watching.add(session)
+        if self._reporting is None or self._reporting.done():
+            self._last = None
+            self._reporting = asyncio.ensure_future(self._report())
+            self._reporting.add_done_callback(_log_error)
+        elif self._last:
+            session.report(describe(self._last))
+
+    def unwatch(self, session: ToolsSession) -> None:
+        """End it; nobody queries the nodes while nobody watches."""
+        self._watching.discard(session)
+        if not self._watching and self._reporting:
+            self._reporting.cancel()
+            self._reporting = None
+
+    async def _report(self) -> None:
+        while True:
+            started = time.monotonic()
+            try:
+                now = await asyncio.to_thread(self._survey)
+            except MinirospyError as error:
+                for session in tuple(self._watching):
+                    session.report({"trouble": str(error)})
+            else:
+                fields = describe(now, self._last)
+                self._last = now
+                for session in tuple(self._watching):
+                    session.report(fields)
+            # Nodes that answer slowly are not queried without a pause.
+            await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
+
+    def _survey(self) -> Survey:
+        with self.graph() as graph:
+            return survey(graph)
 
 
 class ToolsSession:
@@ -80,6 +139,7 @@ class ToolsSession:
 
     def ended(self) -> None:
         """End what runs for this client."""
+        self._door.unwatch(self)
         for task in self._running:
             task.cancel()
 
@@ -96,8 +156,68 @@ class ToolsSession:
         else:
             self._send({"id": number, "result": result})
 
+    def report(self, fields: Mapping[str, object]) -> None:
+        """Send a report; an older one that waits is dropped."""
+        self._client.send_text_message("report", json.dumps({"report": fields}).encode(), newest_only=True)
+
     def _send(self, fields: Mapping[str, object]) -> None:
         self._client.send_text(json.dumps(fields))
+
+    async def _watch(self, _: Mapping[str, object]) -> object:
+        self._door.watch(self)
+        return {}
+
+    async def _unwatch(self, _: Mapping[str, object]) -> object:
+        self._door.unwatch(self)
+        return {}
+
+    async def _ping(self, fields: Mapping[str, object]) -> object:
+        """Return the seconds that a call to ``node`` takes."""
+
+        def ping() -> float:
+            with self._door.graph() as graph:
+                return ping_node(graph, find_node(graph, str(fields["node"])))
+
+        return {"seconds": await asyncio.to_thread(ping)}
+
+    async def _kill(self, fields: Mapping[str, object]) -> object:
+        """Request ``node`` to shut down."""
+        self._require_writing("shuts down no node")
+
+        def kill() -> None:
+            with self._door.graph() as graph:
+                kill_node(graph, find_node(graph, str(fields["node"])), "requested in the dashboard")
+
+        await asyncio.to_thread(kill)
+        return {}
+
+    async def _cleanup(self, fields: Mapping[str, object]) -> object:
+        """Unregister those of ``nodes`` that still do not answer, as `rosnode cleanup` does; return their names."""
+        self._require_writing("unregisters no node")
+        wanted = fields["nodes"]
+        if not isinstance(wanted, list):
+            raise TypeError("nodes: not a list of names")
+
+        def clean() -> list[str]:
+            with self._door.graph() as graph:
+                silent = [node for node in unreachable_nodes(graph) if node.name in wanted]
+                for node in silent:
+                    forget_node(graph, node)
+                return [node.name for node in silent]
+
+        return await asyncio.to_thread(clean)
+
+    async def _type(self, fields: Mapping[str, object]) -> object:
+        """Return the full definition of the message type ``name``, of the packages that are installed here."""
+        name = str(fields["name"])
+        found = await asyncio.to_thread(installed_type, name)
+        if found is None:
+            raise NotFoundError("message type", name, ())
+        return {"definition": found.definition}
+
+    def _require_writing(self, what: str) -> None:
+        if not self._client.may_write:
+            raise ValueError(f"this token is read-only: it {what}")
 
     async def _yaml(self, fields: Mapping[str, object]) -> object:
         """Return the values of a file of rqt_reconfigure or dynparam by name."""
@@ -112,5 +232,16 @@ class ToolsSession:
         }
 
     _METHODS: ClassVar[Mapping[str, Callable[[ToolsSession, Mapping[str, object]], Awaitable[object]]]] = {
+        "watch": _watch,
+        "unwatch": _unwatch,
+        "ping": _ping,
+        "kill": _kill,
+        "cleanup": _cleanup,
+        "type": _type,
         "yaml": _yaml,
     }
+
+
+def _log_error(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and (error := task.exception()):
+        _log.error("the nodes cannot be reported: %s", error, exc_info=error)

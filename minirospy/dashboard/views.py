@@ -33,6 +33,9 @@ VIEWS = (
     "services",
     "parameters",
     "reconfigure",
+    "nodes",
+    "actions",
+    "tf",
 )
 """The names of the views, as in links; the page has one module for each."""
 
@@ -54,6 +57,7 @@ _PLUGINS = {
     "rqt_publisher": "publish",
     "rqt_service_caller": "services",
     "rqt_reconfigure": "reconfigure",
+    "rqt_tf_tree": "tf",
 }
 """rqt's plug-ins -> the view that shows the same."""
 

@@ -99,6 +99,21 @@ def test_client_publishes_to_ros(bridge: Running) -> None:
     assert bridge.run(messages.next()).data == "hi"  # type: ignore[attr-defined]
 
 
+def test_first_message_of_a_client_reaches_those_that_subscribe_already(bridge: Running) -> None:
+    listener = bridge.node("listener")
+
+    async def subscribe() -> object:
+        return await listener.subscribe("/from_client", String)
+
+    messages = bridge.run(subscribe())
+    client = bridge.client()
+    channel = {"id": 5, "topic": "/from_client", "encoding": "ros1", "schemaName": "std_msgs/String"}
+    client.send(op="advertise", channels=[channel])
+    for number in range(3):
+        client.send_binary(struct.pack("<BII", 1, 5, 1) + b"%d" % number)
+    assert [bridge.run(messages.next()).data for _ in range(3)] == ["0", "1", "2"]  # type: ignore[attr-defined]
+
+
 def test_client_calls_a_service(bridge: Running) -> None:
     server = bridge.node("server")
 

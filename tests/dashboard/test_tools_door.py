@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
+import os
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+from xmlrpc.client import ServerProxy
 
 import pytest
+from std_msgs.msg import String
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from minirospy.bridge.access import Access
 from minirospy.dashboard.tools_door import SUBPROTOCOL
 
 if TYPE_CHECKING:
@@ -88,3 +94,92 @@ def test_what_is_not_a_request_is_refused(serve: Callable[..., Served], text: st
         tools.socket.send(b"\0")
         assert "binary" in tools.receive()["error"]
         assert tools.request(do="yaml", text="a: 1")["result"] == {"a": 1}
+
+
+def report(tools: Tools, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the first report that is accepted."""
+    while True:
+        found = tools.receive()
+        if "report" in found and accepts(found["report"]):
+            return dict(found["report"])
+
+
+def node_in(found: dict[str, Any], name: str) -> dict[str, Any]:
+    return next((each for each in found.get("nodes", ()) if each["name"] == name), {})
+
+
+def test_nodes_are_reported_until_nobody_watches(serve: Callable[..., Served]) -> None:
+    served = serve()
+    talker = served.node("talker")
+
+    async def advertise() -> None:
+        talker.advertise("/words", String)
+
+    served.run(advertise())
+    with Tools(served) as tools:
+        assert tools.request(do="watch")["result"] == {}
+        found = report(tools, lambda each: node_in(each, "/talker"))
+        node = node_in(found, "/talker")
+        assert node["pid"] == os.getpid()
+        assert ["/words", "std_msgs/String"] in node["publishes"]
+        assert node["trouble"] == ""
+        with Tools(served) as other:
+            other.request(do="watch")
+            report(other, lambda each: node_in(each, "/talker"))
+        assert tools.request(do="unwatch")["result"] == {}
+        assert tools.request(do="watch")["result"] == {}
+        report(tools, lambda each: node_in(each, "/talker"))
+
+
+def test_node_is_pinged_and_killed(serve: Callable[..., Served]) -> None:
+    served = serve()
+    stopped = threading.Event()
+    victim = served.node("victim")
+
+    async def watch() -> None:
+        task = asyncio.ensure_future(victim.spin())
+        task.add_done_callback(lambda _: stopped.set())
+
+    served.run(watch())
+    with Tools(served) as tools:
+        assert 0 < tools.request(do="ping", node="/victim")["result"]["seconds"] < 60
+        assert "victi" in tools.request(do="ping", node="/victi")["error"]
+        assert tools.request(do="kill", node="/victim")["result"] == {}
+    assert stopped.wait(60)
+
+
+def test_cleanup_unregisters_nodes_that_do_not_answer_and_no_others(serve: Callable[..., Served]) -> None:
+    served = serve()
+    served.node("alive")
+    with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        for name in ("/dead", "/dead_too"):
+            answer = master.registerPublisher(name, "/nothing", "std_msgs/String", "http://127.0.0.1:1/")
+            assert answer[0] == 1, answer  # type: ignore[index]
+        with Tools(served) as tools:
+            tools.request(do="watch")
+            found = report(tools, lambda each: node_in(each, "/dead"))
+            assert "nothing listens at their port on '127.0.0.1'" in node_in(found, "/dead")["trouble"]
+            assert "rosnode cleanup" in node_in(found, "/dead")["advice"]
+            assert tools.request(do="cleanup", nodes=["/dead", "/alive"])["result"] == ["/dead"]
+            assert "not a list" in tools.request(do="cleanup", nodes="/alive")["error"]
+        state: Any = master.getSystemState("/test")
+    publishers = dict(map(tuple, state[2][0]))
+    assert publishers["/nothing"] == ["/dead_too"]
+
+
+def test_reader_kills_and_removes_nothing(serve: Callable[..., Served]) -> None:
+    served = serve(
+        access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
+    )
+    served.node("victim")
+    with Tools(served, "read-token-00") as tools:
+        assert "read-only" in tools.request(do="kill", node="/victim")["error"]
+        assert "read-only" in tools.request(do="cleanup", nodes=["/victim"])["error"]
+        assert tools.request(do="ping", node="/victim")["result"]
+
+
+def test_definition_of_a_type_is_that_of_the_packages(serve: Callable[..., Served]) -> None:
+    with Tools(serve()) as tools:
+        found = tools.request(do="type", name="actionlib_tutorials/FibonacciActionGoal")["result"]
+        assert "MSG: actionlib_tutorials/FibonacciGoal" in found["definition"]
+        assert "no_such/Type" in tools.request(do="type", name="no_such/Type")["error"]

@@ -248,7 +248,7 @@ class FoxgloveSession:
         publication = self._publications.get(event.channel_id)
         if publication is None:
             raise BridgeError(f"Channel {event.channel_id} is not advertised: its message is dropped")
-        publication.publish(bytes(event.payload))
+        publication.publish_when_joined(bytes(event.payload))
 
     def _get_parameters(self, event: protocol.GetParameters) -> None:
         self._require("parameters", "reading parameters")

@@ -36,6 +36,7 @@ __all__ = [
     "check_nodes",
     "check_services",
     "check_topics",
+    "differing_types",
     "node_trouble",
 ]
 
@@ -47,13 +48,19 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class NodeAnswer:
-    """The answers of a node to queries; ``trouble`` if it did not answer."""
+    """The answers of a node to queries; ``trouble`` if it did not answer.
+
+    ``seconds`` is how long the first call took; ``stats`` (getBusStats) only where the caller wants them.
+    """
 
     node: NodeAddress
     trouble: Trouble | None = None
     publications: Mapping[str, str] = field(default_factory=dict)
     subscriptions: Mapping[str, str] = field(default_factory=dict)
     links: tuple[BusConnection, ...] = ()
+    pid: int = 0
+    seconds: float = 0.0
+    stats: tuple[object, ...] = ()
 
 
 Answers = dict[str, NodeAnswer]
@@ -67,7 +74,7 @@ class _Pair(NamedTuple):
     subscriber: str
 
 
-def ask_nodes(graph: Graph, state: SystemState, besides: str = "") -> Answers:
+def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
     """Return what all registered nodes report of themselves, queried side by side, without the node ``besides``."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
@@ -79,7 +86,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "") -> Answers:
         found = known.get(host_port(node.uri or "")[0])
         if isinstance(found, Exception):
             raise found
-        return _ask(graph.tool, node)
+        return _ask(graph.tool, node, with_stats=with_stats)
 
     found = in_parallel(ask, nodes, _ALL_SECONDS)
     return {
@@ -141,18 +148,14 @@ def node_trouble(host: str, trouble: Trouble, place: MasterPlace) -> tuple[str, 
 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
     """Topics whose nodes name different types, and those that nobody publishes."""
-    differing = 0
-
-    for topic in sorted({*state.publishers, *state.subscribers}):
-        types = _types(topic, answers)
-        if len(types) > 1:
-            differing += 1
-            found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
-            yield problem(
-                "topics",
-                f"{topic} has nodes of different types, which never connect: {found}",
-                "use one type, or two names",
-            )
+    differing = differing_types(state, answers)
+    for topic, types in differing.items():
+        found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
+        yield problem(
+            "topics",
+            f"{topic} has nodes of different types, which never connect: {found}",
+            "use one type, or two names",
+        )
 
     published = {topic for topic, nodes in state.publishers.items() if nodes} - {"/rosout", "/rosout_agg"}
     alone = [
@@ -169,6 +172,12 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
         yield ok(
             "topics", f"{len({*state.publishers, *state.subscribers})}, every type the same at both ends"
         )
+
+
+def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
+    """Return the topics of which nodes name different types, and who names which."""
+    found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
+    return {topic: types for topic, types in found.items() if len(types) > 1}
 
 
 def _near(topic: str, published: set[str]) -> str:
@@ -249,12 +258,14 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
         yield ok("services", f"{len(names)}, all answer")
 
 
-def _ask(tool: str, node: NodeAddress) -> NodeAnswer:
+def _ask(tool: str, node: NodeAddress, *, with_stats: bool = False) -> NodeAnswer:
     if node.uri is None:
         return NodeAnswer(node, Trouble(Fault.OTHER, "the master does not know its address"))
     slave = SlaveProxy(node.uri, "/" + tool, CONNECT_SECONDS, same_host=False)
     with contextlib.closing(slave):
-        slave.get_pid()
+        start = time.perf_counter()
+        pid = slave.get_pid()
+        seconds = time.perf_counter() - start
         # Not all clients send their name.
         with contextlib.suppress(RpcFault, RpcRefused, RpcProtocolError):
             name = slave.call("getName")
@@ -266,7 +277,18 @@ def _ask(tool: str, node: NodeAddress) -> NodeAnswer:
             dict(slave.get_publications()),
             dict(slave.get_subscriptions()),
             tuple(slave.get_bus_info()),
+            pid,
+            seconds,
+            _stats(slave) if with_stats else (),
         )
+
+
+def _stats(slave: SlaveProxy) -> tuple[object, ...]:
+    """Return what a node counts of its connections; nothing of one that does not count."""
+    try:
+        return tuple(slave.get_bus_stats())
+    except (RpcFault, RpcRefused, RpcProtocolError):
+        return ()
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:

@@ -5,6 +5,7 @@ import { listenForKeys, openHelp } from "./help.js";
 import { LANGUAGES, chooseLanguage, language, t } from "./texts.js";
 import { Link } from "./link.js";
 import { fill, h, setText } from "./dom.js";
+import { Actions } from "./views/actions.js";
 import { Bag } from "./views/bag.js";
 import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
@@ -14,6 +15,7 @@ import { Image } from "./views/image.js";
 import { Joints } from "./views/joints.js";
 import { Launch } from "./views/launch.js";
 import { Layouts } from "./views/layout.js";
+import { Nodes } from "./views/nodes.js";
 import { Parameters } from "./views/parameters.js";
 import { Panels } from "./views/panels.js";
 import { Plot } from "./views/plot.js";
@@ -23,6 +25,7 @@ import { Scene } from "./views/scene.js";
 import { Services } from "./views/services.js";
 import { Smach } from "./views/smach.js";
 import { Teleop } from "./views/teleop.js";
+import { Tf } from "./views/tf.js";
 import { Topics } from "./views/topics.js";
 import { Turtlesim } from "./views/turtlesim.js";
 
@@ -47,6 +50,9 @@ const VIEWS = {
   services: ["Services", Services],
   parameters: ["Parameters", Parameters],
   reconfigure: ["Reconfigure", Reconfigure],
+  nodes: ["Nodes", Nodes],
+  actions: ["Actions", Actions],
+  tf: ["Frames", Tf],
 };
 const STATES = {
   connecting: "connecting …",

@@ -1,0 +1,175 @@
+// Nodes: where each runs, what it publishes, subscribes to, serves and is connected to; ping, kill, and clean up after the dead.
+
+import { fill, h, setText } from "../dom.js";
+
+export class Nodes {
+  constructor(link, words, main, place) {
+    this.link = link;
+    this.place = place;
+    this.chosen = words.get("node");
+    this.nodes = new Map();
+    this.rows = new Map();
+    this.pings = new Map(); // name -> text of the last ping
+    this.filter = h("input", { type: "search", placeholder: "Filter nodes and hosts", "aria-label": "Filter", oninput: () => this.showList() });
+    this.count = h("span", { class: "muted" });
+    this.cleanButton = h("button", { type: "button", hidden: true, onclick: () => this.askCleanup() }, "Clean up …");
+    this.question = h("div", { class: "panel details question", hidden: true, role: "alertdialog", "aria-label": "Confirm" });
+    this.result = h("p", { class: "note", role: "status" });
+    this.body = h("tbody", {});
+    this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, ["Node", "Host", "Process", "Answers in", "Topics", "Services"].map((each) => h("th", { scope: "col" }, each)))), this.body);
+    this.side = h("aside", { class: "panel details side wide", hidden: true });
+    this.empty = h("p", { class: "empty" });
+    main.append(h("div", { class: "bar" }, this.filter, this.count, this.cleanButton), this.result, this.question,
+      h("div", { class: "split" }, h("div", { class: "panel scroll" }, this.table, this.empty), this.side));
+    this.endings = [link.tools.watch((report) => this.received(report)), link.watch(["state"], () => this.showList())];
+  }
+
+  close() {
+    for (const end of this.endings) end();
+  }
+
+  received({ nodes }) {
+    this.nodes = new Map(nodes.map((node) => [node.name, node]));
+    this.showList();
+    this.showSide();
+  }
+
+  showList() {
+    const words = this.filter.value.toLowerCase();
+    for (const [name, row] of this.rows) {
+      if (this.nodes.has(name)) continue;
+      row.remove();
+      this.rows.delete(name);
+    }
+    let before = null;
+    for (const [name, node] of this.nodes) {
+      const row = this.rows.get(name) ?? this.makeRow(name);
+      this.showRow(row, node);
+      row.hidden = !`${name} ${node.host}`.toLowerCase().includes(words);
+      const next = before ? before.nextSibling : this.body.firstChild;
+      if (row !== next) this.body.insertBefore(row, next);
+      before = row;
+    }
+    const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).length;
+    setText(this.count, this.nodes.size ? `${this.nodes.size} node${this.nodes.size === 1 ? "" : "s"}${dead ? `, ${dead} without an answer` : ""}` : "");
+    this.cleanButton.hidden = !dead;
+    this.cleanButton.disabled = !this.mayChange;
+    this.table.hidden = !this.nodes.size;
+    setText(this.empty, this.nodes.size || this.link.state !== "open" ? "" : "looking …");
+  }
+
+  get mayChange() {
+    return this.link.state === "open" && this.link.mayWrite;
+  }
+
+  makeRow(name) {
+    const row = h("tr", {}, h("td", {}, h("button", { type: "button", class: "link", onclick: () => this.choose(name) }, name)), [1, 2, 3, 4, 5].map(() => h("td", {})));
+    row.dataset.node = name;
+    this.rows.set(name, row);
+    return row;
+  }
+
+  showRow(row, node) {
+    const [, host, pid, answer, topics, services] = row.children;
+    setText(host, node.host);
+    setText(pid, node.pid ? String(node.pid) : "");
+    setText(answer, node.trouble ? "no answer" : `${node.milliseconds.toFixed(1)} ms`);
+    setText(topics, `${node.publishes.length} out, ${node.subscribes.length} in`);
+    setText(services, String(node.services.length));
+    row.classList.toggle("dead", Boolean(node.trouble));
+    row.classList.toggle("selected", node.name === this.chosen);
+  }
+
+  choose(name) {
+    this.chosen = this.chosen === name ? null : name;
+    this.shown = null;
+    this.place.remember({ node: this.chosen });
+    this.showList();
+    this.showSide();
+  }
+
+  showSide() {
+    const node = this.nodes.get(this.chosen);
+    this.side.hidden = !node;
+    if (!node) return;
+    // A button that is replaced between press and release loses its click.
+    const content = JSON.stringify([{ ...node, milliseconds: 0 }, this.mayChange]);
+    if (content === this.shown) return;
+    this.shown = content;
+    const topics = (title, list) => part(title, list.map(([topic, type]) => h("li", {}, h("a", { href: `#/topics?open=${encodeURIComponent(topic)}` }, topic), " ", h("span", { class: "muted" }, type))));
+    const killButton = h("button", { type: "button", class: "danger", disabled: !this.mayChange || node.name === this.link.node, onclick: () => this.askKill(node.name) }, "Kill …");
+    this.pingText = h("span", { class: "muted", role: "status" }, this.pings.get(node.name) ?? "");
+    fill(this.side, h("h2", {}, node.name), node.trouble ? h("p", { class: "error" }, `It does not answer: ${node.trouble}. `, h("br"), sentence(node.advice)) : null,
+      h("table", { class: "values facts" }, h("tbody", {}, [["host", node.host], ["process", node.pid || ""], ["address", node.uri]].map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value))))),
+      h("div", { class: "bar" }, h("button", { type: "button", onclick: () => this.ping(node.name) }, "Ping"), killButton, this.pingText,
+        node.name === this.link.node ? h("span", { class: "muted" }, "this page") : this.mayChange ? null : h("span", { class: "muted" }, "read-only")),
+      topics("Publishes", node.publishes), topics("Subscribes to", node.subscribes),
+      part("Services", node.services.map((name) => h("li", {}, h("a", { href: `#/services?service=${encodeURIComponent(name)}` }, name)))),
+      part("Connections", node.links.map(([topic, direction, other, transport, isConnected]) => h("li", { class: isConnected ? "" : "error" },
+        `${direction === "o" ? "→" : direction === "i" ? "←" : "↔"} ${other} `, h("span", { class: "muted" }, `${topic} by ${transport}${isConnected ? "" : ", not connected"}`)))));
+  }
+
+  async ping(name) {
+    this.showPing(name, "…");
+    try {
+      const { seconds } = await this.link.tools.request({ do: "ping", node: name });
+      this.showPing(name, `answered in ${(seconds * 1000).toFixed(2)} ms`);
+    } catch (error) {
+      this.showPing(name, error.message);
+    }
+  }
+
+  showPing(name, text) {
+    this.pings.set(name, text);
+    if (name === this.chosen) setText(this.pingText, text);
+  }
+
+  /** Show a question; do what it asks for if a person agrees. */
+  ask(text, button, act) {
+    const shut = () => { this.question.hidden = true; };
+    const yes = h("button", { type: "button", class: "danger", onclick: () => {
+      shut();
+      act();
+    } }, button);
+    fill(this.question, h("p", {}, text), h("div", { class: "bar" }, yes, h("button", { type: "button", onclick: shut }, "Keep")));
+    this.question.hidden = false;
+    yes.focus();
+  }
+
+  askKill(name) {
+    this.ask(`Shut down ${name}? What it controls stops or goes on without it.`, "Kill", async () => {
+      this.note(`${name} is requested to shut down …`);
+      try {
+        await this.link.tools.request({ do: "kill", node: name });
+        this.note(`${name} was requested to shut down.`);
+      } catch (error) {
+        this.note(error.message, true);
+      }
+    });
+  }
+
+  askCleanup() {
+    const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).map(({ name }) => name);
+    this.ask(`Remove ${dead.join(", ")} from the master? A node that still runs and was only unreachable for a moment would have to be started again.`, "Clean up", async () => {
+      try {
+        const removed = await this.link.tools.request({ do: "cleanup", nodes: dead });
+        this.note(removed.length ? `Removed: ${removed.join(", ")}.` : "They answer again: nothing was removed.");
+      } catch (error) {
+        this.note(error.message, true);
+      }
+    });
+  }
+
+  note(text, isError = false) {
+    setText(this.result, text);
+    this.result.classList.toggle("error", isError);
+  }
+}
+
+function part(title, items) {
+  return items.length ? [h("h3", {}, `${title} (${items.length})`), h("ul", {}, items)] : [];
+}
+
+function sentence(text) {
+  return text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "";
+}

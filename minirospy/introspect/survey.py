@@ -1,0 +1,145 @@
+"""The whole graph as its nodes report it: processes, types, connections, and the traffic between two moments.
+
+What nodes count themselves (getBusStats), so that nobody has to subscribe to measure a topic.
+Source: http://wiki.ros.org/ROS/Slave_API (getBusStats, getBusInfo).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from minirospy.introspect.doctor.graph import Answers, NodeAnswer, ask_nodes, differing_types, node_trouble
+from minirospy.introspect.doctor.reach import MasterPlace, host_port, look_up
+from minirospy.introspect.graph import Graph
+from minirospy.runtime.rpc.master_proxy import SystemState
+
+__all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
+
+
+class Edge(NamedTuple):
+    """A connection by which a topic travels: the node that sends, and the node that receives."""
+
+    sender: str
+    topic: str
+    receiver: str
+
+
+class Counts(NamedTuple):
+    """Messages and bytes that a connection has carried since it was opened."""
+
+    messages: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The graph at a moment (seconds of a monotonic clock). ``counts``: by process, connection and edge."""
+
+    seconds: float
+    state: SystemState
+    answers: Answers
+    place: MasterPlace
+    counts: Mapping[tuple[int, object, Edge], Counts] = field(default_factory=dict)
+
+
+def survey(graph: Graph) -> Survey:
+    """Query the master and all nodes, side by side. Raise MasterUnreachableError."""
+    state = graph.state()
+    answers = ask_nodes(graph, state, with_stats=True)
+    host, port = host_port(graph.master.uri)
+    try:
+        place = MasterPlace(host, port, look_up(host))
+    except OSError:
+        place = MasterPlace(host, port, [])
+    counts: dict[tuple[int, object, Edge], Counts] = {}
+    for answer in answers.values():
+        counts.update(_counts(answer))
+    return Survey(time.monotonic(), state, answers, place, counts)
+
+
+def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
+    """Return messages and bytes a second of each edge that was there at both moments."""
+    if before is None or after.seconds <= before.seconds:
+        return {}
+    span = after.seconds - before.seconds
+    found: dict[Edge, tuple[float, float]] = {}
+    for key, now in after.counts.items():
+        then = before.counts.get(key)
+        # roscpp counts with 32 bits: what wraps around is left out.
+        if then is None or now.messages < then.messages or now.bytes < then.bytes:
+            continue
+        hz, size = found.get(key[2], (0.0, 0.0))
+        found[key[2]] = (hz + (now.messages - then.messages) / span, size + (now.bytes - then.bytes) / span)
+    return found
+
+
+def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
+    """Return a survey as JSON has it: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
+    held: dict[str, list[str]] = {}
+    for service, nodes in now.state.services.items():
+        for node in nodes:
+            held.setdefault(node, []).append(service)
+    return {
+        "nodes": [
+            {
+                **_described(answer, now.place),
+                "publishes": _topics(now.state.publishers, answer, answer.publications),
+                "subscribes": _topics(now.state.subscribers, answer, answer.subscriptions),
+                "services": sorted(held.get(name, ())),
+            }
+            for name, answer in now.answers.items()
+        ],
+        "traffic": [
+            [*edge, round(hz, 2), round(size, 1)] for edge, (hz, size) in traffic(before, now).items()
+        ],
+        "mismatches": differing_types(now.state, now.answers),
+    }
+
+
+def _described(answer: NodeAnswer, place: MasterPlace) -> dict[str, object]:
+    host = host_port(answer.node.uri or "")[0]
+    text, advice = node_trouble(host, answer.trouble, place) if answer.trouble else ("", "")
+    return {
+        "name": answer.node.name,
+        "uri": answer.node.uri or "",
+        "host": host,
+        "pid": answer.pid,
+        "milliseconds": round(answer.seconds * 1000, 2),
+        "trouble": text,
+        "advice": advice,
+        "links": [
+            [link.topic, link.direction, link.destination, link.transport, bool(link.connected)]
+            for link in answer.links
+        ],
+    }
+
+
+def _topics(
+    table: Mapping[str, Iterable[str]], answer: NodeAnswer, types: Mapping[str, str]
+) -> list[list[str]]:
+    return [[topic, types.get(topic, "")] for topic in sorted(table) if answer.node.name in table[topic]]
+
+
+def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
+    """Return what a node counted for each connection by which it sends; nothing where its rows are not as documented."""
+    receivers = {
+        (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
+    }
+    found: dict[tuple[int, object, Edge], Counts] = {}
+    publications = answer.stats[0] if answer.stats else []
+    for row in publications if isinstance(publications, list) else []:
+        try:
+            topic, *_, connections = row
+            for number, size, *more in connections:
+                # rospy: messages, connected; roscpp: bytes of messages, messages, connected.
+                messages = more[1] if len(more) > 2 else more[0]
+                receiver = receivers.get((topic, str(number)))
+                if receiver is not None:
+                    edge = Edge(answer.node.name, topic, receiver)
+                    found[answer.pid, str(number), edge] = Counts(int(messages), int(size))
+        except (TypeError, ValueError, LookupError):
+            continue
+    return found

@@ -1,0 +1,108 @@
+"""The view Frames in Debian's chromium: the tree of /tf and /tf_static with rates, ages and faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from tests.dashboard.conftest import Served
+from tests.interop.browser import Page
+from tests.interop.test_interop_dashboard import (
+    HOSTILE,
+    address,
+    browse,
+    needs_chromium,
+    needs_node,
+    publisher,
+    repeated,
+    serve,
+)
+from tests.interop.test_interop_reconfigure_page import page_functions
+
+__all__ = ["browse", "serve"]
+
+BOX = "[data-frame='{}'] "
+
+
+@needs_node
+def test_angles_are_those_of_tf() -> None:
+    from tf.transformations import euler_from_quaternion, quaternion_from_euler
+
+    angles = [(0.1, -0.2, 3.0), (-3, 1.5, 0.5), (0, math.pi / 4, 0)]
+    names = ("x", "y", "z", "w")
+    quaternions = [tuple(map(float, quaternion_from_euler(*each))) for each in angles]
+    found = page_functions(
+        *(("frames", "eulerOf", [dict(zip(names, each, strict=True))]) for each in quaternions)
+    )
+    for quaternion, euler in zip(quaternions, found, strict=True):
+        assert euler == pytest.approx(euler_from_quaternion(quaternion))
+
+
+def transforms(*pairs: tuple[str, str]) -> Any:
+    message = TFMessage()
+    for parent, child in pairs:
+        each = TransformStamped(child_frame_id=child)
+        each.header.frame_id = parent
+        each.transform.translation.x = 1.25
+        each.transform.rotation.z = each.transform.rotation.w = math.sqrt(0.5)
+        message.transforms.append(each)
+    return message
+
+
+def again(served: Served) -> Any:
+    """Return another node's publisher of /tf."""
+    node = served.node("another")
+
+    async def advertise() -> Any:
+        return node.advertise("/tf", TFMessage)
+
+    return served.run(advertise())
+
+
+@needs_chromium
+def test_frames_are_a_tree_with_rates_and_faults(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    page = browse(address(served, "tf"))
+    page.wait_text(".empty", "Nothing has come on /tf or /tf_static.")
+    static = publisher(served, "/tf_static", TFMessage, latch=True)
+    served.run(static.publish(transforms(("base_link", "laser"), ("base_link", HOSTILE))))
+    moving = publisher(served, "/tf", TFMessage)
+    with repeated(served, moving, transforms(("odom", "base_link"))):
+        page.wait_text(BOX.format("laser"), "static")
+        page.wait_text(BOX.format("base_link"), "Hz")
+        page.wait_text("[role=status]", "4 frames, root odom")
+        page.click(BOX.format("base_link") + "text")
+        page.wait_text(".side", "1.25, 0, 0")
+        page.wait_text(".side", "0, 0, 90 °")
+        page.wait_text(".side", "/talker_tf")
+        assert "frame=base_link" in page.evaluate("location.hash")
+        page.type("input[type=search]", "LASER")
+        page.wait("return document.querySelectorAll('.frame-box.near').length === 1")
+        # A second node says that it knows better.
+        with repeated(served, again(served), transforms(("map", "base_link"))):
+            page.wait_text(".side .error", "It has 2 parents, map and odom")
+        page.wait("return !document.querySelector('.side .error')")
+    page.wait_text(".side .error", "No transform for")
+    page.wait("return document.querySelector('.frame-box.bad')")
+    page.wait_text("[role=status]", "1 with a problem")
+    assert page.evaluate("document.querySelectorAll('main img').length") == 0
+    page.click("button", "Forget")
+    page.wait_text("[role=status]", "3 frames, root base_link")
+
+
+@needs_chromium
+def test_frames_that_are_their_own_ancestors_are_named(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    static = publisher(served, "/tf_static", TFMessage, latch=True)
+    served.run(static.publish(transforms(("a", "b"), ("b", "a"))))
+    page = browse(address(served, "tf?frame=a"))
+    page.wait_text(".side .error", "It is its own ancestor")
