@@ -4,16 +4,17 @@ import { createInterface } from "node:readline";
 const plain = (name, value) => {
   if (typeof value === "bigint" || (typeof value === "number" && !Number.isFinite(value))) return `${value}`;
   if (value instanceof Map) return Object.fromEntries(value);
+  if (value instanceof Set) return [...value];
   if (ArrayBuffer.isView(value)) return Array.from(value);
   return value;
 };
 for await (const line of createInterface({ input: process.stdin })) {
-  const [module, name, given] = JSON.parse(line);
+  // A Map is written as {"map": [[key, value], ...]}.
+  const [module, name, given] = JSON.parse(line, (_, value) => (Array.isArray(value?.map) && !Array.isArray(value) ? new Map(value.map) : value));
   let answer;
   try {
     const functions = await import(`../../../minirospy/dashboard/page/js/${module}.js`);
-    // A Map is written as {"map": [[key, value], ...]}.
-    answer = functions[name](...given.map((each) => (each?.map && !Array.isArray(each) ? new Map(each.map) : each))) ?? null;
+    answer = functions[name](...given) ?? null;
   } catch (error) {
     answer = { error: error.message };
   }

@@ -1,13 +1,16 @@
 // Who sends to whom: nodes and topics, laid out by dagre and drawn as SVG. A click shows the details.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
-import { bandwidth, fill, h, svg, uniqueId } from "../dom.js";
+import { bandwidth, fill, h, setText, svg, uniqueId } from "../dom.js";
+import { elementsOf, groupsOf, trafficOf } from "../graph_elements.js";
+import { PanZoom } from "../panzoom.js";
 import { Rate } from "../rates.js";
 
 const MODES = [["active", "Nodes and topics (active)"], ["all", "Nodes and topics (all)"], ["nodes", "Nodes only"]];
-const DEBUG_TOPICS = new Set(["/rosout", "/rosout_agg", "/statistics"]);
-const DEBUG_NODES = /^\/(rosout|rqt_|minirospy_dashboard_|minirospy_bridge|foxglove_bridge|rosbridge_|rosapi|record_|rosbag_|play_)/;
+const SHAPES = { n: "node", t: "topic", a: "action" };
 const HEIGHT = 36;
+const MOST_TRIED = 150; // nodes and topics that are laid out in two ways
+const RATE_TEXT = "000.0 kB/s"; // for which an edge has room
 
 export class Graph {
   constructor(link, words, main, place) {
@@ -27,60 +30,33 @@ export class Graph {
         svg("path", { d: "M0 0 10 5 0 10z", class: "head" }))), this.drawing);
     this.details = h("aside", { class: "panel details side", hidden: true });
     this.empty = h("p", { class: "empty" });
-    main.append(h("div", { class: "bar" }, this.mode, h("label", {}, this.hidesDebug, "hide debug"), this.filter,
-      h("button", { type: "button", onclick: () => this.fit() }, "Fit")),
+    this.hasRates = h("input", { type: "checkbox", checked: words.get("rates") !== "0", onchange: () => this.change() });
+    this.hasGroups = h("input", { type: "checkbox", checked: words.get("groups") === "1", onchange: () => this.change() });
+    this.folds = h("input", { type: "checkbox", checked: words.get("fold") !== "0", onchange: () => this.change() });
+    this.faults = h("span", { class: "error", role: "status" });
+    main.append(h("div", { class: "bar" }, this.mode, h("label", {}, this.hidesDebug, "hide debug"), h("label", {}, this.hasRates, "rates"),
+      h("label", {}, this.folds, "fold actions"), h("label", {}, this.hasGroups, "namespaces"), this.filter,
+      h("button", { type: "button", onclick: () => this.panzoom.fit() }, "Fit"), this.faults),
     h("div", { class: "split" }, h("div", { class: "panel canvas" }, this.picture, this.empty), this.details));
-    this.view = { x: 0, y: 0, scale: 1 };
-    this.isFitted = true;
-    this.pointers = new Map();
-    this.listen();
-    this.observer = new ResizeObserver(() => { if (this.isFitted) this.fit(); });
-    this.observer.observe(this.picture);
-    this.ending = link.watch(["graph", "channels", "state"], () => this.update());
+    this.panzoom = new PanZoom(this.picture, this.drawing);
+    this.report = { nodes: [], traffic: [], mismatches: {} };
+    this.drawn = [];
+    this.endings = [link.watch(["graph", "channels", "state"], () => this.update()), link.tools.watch((report) => this.reported(report))];
   }
 
   close() {
-    this.ending();
-    this.observer.disconnect();
+    for (const end of this.endings) end();
+    this.panzoom.close();
     this.endRate();
   }
 
-  /** Return what is shown: {nodes: Set, topics: Set, edges: [from, to, label]}; keys are n/NAME and t/NAME. */
   elements() {
-    const { published, subscribed, services } = this.link.graph;
-    const isHidden = this.hidesDebug.checked;
-    const words = this.filter.value.toLowerCase();
-    const isNode = (name) => !(isHidden && (DEBUG_NODES.test(name) || name === this.link.node));
-    const nodes = new Set();
-    const topics = new Set();
-    const edges = [];
-    for (const names of [...published.values(), ...subscribed.values(), ...services.values()]) for (const name of names) if (isNode(name)) nodes.add(name);
-    for (const topic of new Set([...published.keys(), ...subscribed.keys()])) {
-      if (isHidden && DEBUG_TOPICS.has(topic)) continue;
-      const from = (published.get(topic) ?? []).filter(isNode);
-      const to = (subscribed.get(topic) ?? []).filter(isNode);
-      const isActive = from.length && to.length;
-      if (this.mode.value === "nodes") {
-        for (const a of from) for (const b of to) edges.push([`n${a}`, `n${b}`, topic]);
-      } else if (isActive || (this.mode.value === "all" && from.length + to.length)) {
-        topics.add(topic);
-        for (const a of from) edges.push([`n${a}`, `t${topic}`, ""]);
-        for (const b of to) edges.push([`t${topic}`, `n${b}`, ""]);
-      }
-    }
-    if (words) {
-      const fits = (key) => key.slice(1).toLowerCase().includes(words);
-      const kept = new Set();
-      for (const [from, to, label] of edges) if (fits(from) || fits(to) || label.includes(words)) kept.add(from).add(to);
-      for (const name of nodes) if (!kept.has(`n${name}`) && !fits(`n${name}`)) nodes.delete(name);
-      for (const name of topics) if (!kept.has(`t${name}`)) topics.delete(name);
-    }
-    const isThere = (key) => (key[0] === "n" ? nodes : topics).has(key.slice(1));
-    return { nodes, topics, edges: edges.filter(([from, to]) => isThere(from) && isThere(to)) };
+    return elementsOf(this.link.graph, { mode: this.mode.value, hidesDebug: this.hidesDebug.checked, filter: this.filter.value, ownNode: this.link.node, folds: this.folds.checked });
   }
 
   change() {
-    this.place.remember({ mode: this.mode.value === MODES[0][0] ? "" : this.mode.value, debug: !this.hidesDebug.checked, filter: this.filter.value });
+    this.place.remember({ mode: this.mode.value === MODES[0][0] ? "" : this.mode.value, debug: !this.hidesDebug.checked, filter: this.filter.value,
+      rates: this.hasRates.checked ? "" : "0", groups: this.hasGroups.checked, fold: this.folds.checked ? "" : "0" });
     this.update();
   }
 
@@ -88,7 +64,7 @@ export class Graph {
     // While the connection is lost, the last graph stays.
     if (this.link.state !== "open" && this.signature !== null) return;
     const found = this.elements();
-    const signature = JSON.stringify([[...found.nodes].sort(), [...found.topics].sort(), found.edges]);
+    const signature = JSON.stringify([[...found.nodes].sort(), [...found.topics].sort(), [...found.actions].sort(), found.edges, this.hasRates.checked, this.hasGroups.checked]);
     if (signature !== this.signature) {
       this.signature = signature;
       this.draw(found);
@@ -97,43 +73,106 @@ export class Graph {
     if (this.selected) this.showDetails();
   }
 
-  draw({ nodes, topics, edges }) {
-    const graph = new Layered({ multigraph: true });
-    graph.setGraph({ rankdir: "LR", nodesep: 22, ranksep: 70, marginx: 12, marginy: 12 });
+  /** Take over what the nodes report of themselves: their traffic, those that are dead, types that differ. */
+  reported(report) {
+    if (!report.nodes) return;
+    this.report = report;
+    this.showReport();
+    if (this.selected) this.showDetails();
+  }
+
+  showReport() {
+    const dead = new Map(this.report.nodes.filter(({ trouble }) => trouble).map((node) => [`n${node.name}`, node]));
+    const { mismatches } = this.report;
+    for (const part of this.drawing.querySelectorAll("[data-key]")) {
+      const { key } = part.dataset;
+      part.classList.toggle("bad", dead.has(key) || (key[0] === "t" && Object.hasOwn(mismatches, key.slice(1))));
+    }
+    const texts = [dead.size ? `${dead.size} dead node${dead.size === 1 ? "" : "s"}` : "", ...Object.keys(mismatches).slice(0, 2).map((topic) => `${topic} has two types`)];
+    setText(this.faults, texts.filter(Boolean).join(", "));
+    for (const { above, below, edge } of this.drawn) {
+      const found = this.hasRates.checked ? trafficOf(edge, this.report.traffic) : null;
+      setText(above, found ? `${found.hz.toFixed(1)} Hz` : "");
+      setText(below, found ? bandwidth(found.bytes) : "");
+    }
+  }
+
+  draw(found) {
+    const layouts = [this.lay(found, "LR")];
+    // A chain of nodes is easier to read from top to bottom where the view is not as wide as it.
+    if (found.nodes.size + found.topics.size < MOST_TRIED) layouts.push(this.lay(found, "TB"));
+    const [{ graph, groups }] = layouts.sort((one, other) => this.fitOf(other.graph) - this.fitOf(one.graph));
+    const boxes = [...groups.keys()].map((name) => this.makeGroup(name, graph.node(`g${name}`)));
+    this.drawn = [];
+    const lines = graph.edges().map((id) => this.makeEdge(graph.edge(id), id, found.edges));
+    const parts = graph.nodes().filter((key) => SHAPES[key[0]]).map((key) => this.makePart(key, graph.node(key)));
+    this.drawing.replaceChildren(...boxes, ...lines, ...parts);
+    this.panzoom.resized(graph.graph().width, graph.graph().height);
+    this.showReport();
+    this.highlight();
+  }
+
+  /** Return by how much a drawing can be enlarged in the view. */
+  fitOf(graph) {
+    const { width, height } = graph.graph();
+    return Math.min(1, (this.picture.clientWidth || 1000) / width, (this.picture.clientHeight || 600) / height);
+  }
+
+  lay({ nodes, topics, actions, edges }, rankdir) {
+    const graph = new Layered({ multigraph: true, compound: true });
+    graph.setGraph({ rankdir, nodesep: 22, ranksep: this.hasRates.checked ? 30 : 60, marginx: 12, marginy: this.hasGroups.checked ? 26 : 12 });
     const measure = h("canvas").getContext("2d");
     measure.font = "600 14px system-ui, sans-serif";
-    for (const [kind, names] of [["n", nodes], ["t", topics]]) {
+    for (const [kind, names] of [["n", nodes], ["t", topics], ["a", actions]]) {
       for (const name of [...names].sort()) {
-        graph.setNode(kind + name, { width: measure.measureText(name).width + (kind === "n" ? 44 : 26), height: HEIGHT });
+        graph.setNode(kind + name, { width: measure.measureText(name).width + (kind === "t" ? 26 : 44), height: HEIGHT });
       }
     }
+    const groups = this.hasGroups.checked ? groupsOf(graph.nodes()) : new Map();
+    for (const [name, keys] of groups) {
+      graph.setNode(`g${name}`, {});
+      for (const key of keys) graph.setParent(key, `g${name}`);
+    }
     measure.font = "12px system-ui, sans-serif";
-    edges.forEach(([from, to, label], index) => graph.setEdge(from, to, label ? { label, width: measure.measureText(label).width, height: 16, labelpos: "c" } : {}, String(index)));
+    const room = this.hasRates.checked ? measure.measureText(RATE_TEXT).width : 0;
+    edges.forEach(({ from, to, label }, index) => {
+      const width = Math.max(label ? measure.measureText(label).width : 0, room);
+      graph.setEdge(from, to, width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index }, String(index));
+    });
     layout(graph);
-    const parts = [];
-    for (const id of graph.edges()) {
-      const { points, label, x, y } = graph.edge(id);
-      const path = points.map((point, index) => `${index ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
-      const edge = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), label ? svg("text", { x, y: y + 4 }, label) : null);
-      edge.dataset.from = id.v;
-      edge.dataset.to = id.w;
-      parts.push(edge);
+    return { graph, groups };
+  }
+
+  makeGroup(name, { x, y, width, height }) {
+    return svg("g", { class: "namespace near" }, svg("rect", { x: x - width / 2, y: y - height / 2, width, height, rx: 8 }),
+      svg("text", { x: x - width / 2 + 8, y: y - height / 2 - 4 }, `/${name}`));
+  }
+
+  makeEdge({ points, x, y, index }, id, edges) {
+    const edge = edges[index];
+    const path = points.map((point, number) => `${number ? "L" : "M"}${point.x.toFixed(1)} ${point.y.toFixed(1)}`).join("");
+    const hasText = x !== undefined;
+    const part = svg("g", { class: "edge" }, svg("path", { d: path, "marker-end": `url(#${this.arrow})` }), hasText && edge.label ? svg("text", { x, y: y - 4 }, edge.label) : null);
+    if (hasText) {
+      const above = svg("text", { class: "traffic", x, y: edge.label ? y + 12 : y - 4 });
+      const below = svg("text", { class: "traffic", x, y: edge.label ? y + 26 : y + 13 });
+      this.drawn.push({ above, below, edge });
+      part.append(above, below);
     }
-    for (const key of graph.nodes()) {
-      const { x, y, width, height } = graph.node(key);
-      const shape = { x: x - width / 2, y: y - height / 2, width, height, rx: key[0] === "n" ? height / 2 : 4 };
-      const select = () => this.select(key);
-      const part = svg("g", { class: key[0] === "n" ? "node" : "topic", tabindex: 0, role: "button", "aria-label": `${key[0] === "n" ? "node" : "topic"} ${key.slice(1)}`,
-        onclick: select, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") select(); } },
-      svg("rect", shape), svg("text", { x, y: y + 5 }, key.slice(1)));
-      part.dataset.key = key;
-      parts.push(part);
-    }
-    this.drawing.replaceChildren(...parts);
-    const { width, height } = graph.graph();
-    this.size = { width: Number.isFinite(width) ? width : 1, height: Number.isFinite(height) ? height : 1 };
-    if (this.isFitted) this.fit();
-    this.highlight();
+    part.dataset.from = id.v;
+    part.dataset.to = id.w;
+    return part;
+  }
+
+  makePart(key, { x, y, width, height }) {
+    const kind = SHAPES[key[0]];
+    const shape = { x: x - width / 2, y: y - height / 2, width, height, rx: key[0] === "n" ? height / 2 : key[0] === "a" ? 12 : 4 };
+    const select = () => this.select(key);
+    const part = svg("g", { class: kind, tabindex: 0, role: "button", "aria-label": `${kind} ${key.slice(1)}`,
+      onclick: select, onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") select(); } },
+    svg("rect", shape), svg("text", { x, y: y + 5 }, key.slice(1)));
+    part.dataset.key = key;
+    return part;
   }
 
   select(key) {
@@ -149,7 +188,7 @@ export class Graph {
     const near = new Set([this.selected]);
     for (const part of this.drawing.children) {
       const { from, to, key } = part.dataset;
-      if (key) continue;
+      if (key || !from) continue;
       const isNear = from === this.selected || to === this.selected;
       part.classList.toggle("near", isNear);
       if (isNear) near.add(from).add(to);
@@ -168,20 +207,27 @@ export class Graph {
     const { published, subscribed, services } = this.link.graph;
     const names = (table) => [...table].filter(([, nodes]) => nodes.includes(name)).map(([each]) => each).sort();
     // A button that is replaced between press and release loses its click.
-    const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? ""));
+    const content = JSON.stringify([published, subscribed, services].flatMap((table) => [names(table), table.get(name) ?? []]).concat(this.link.channels.get(name)?.type ?? "", this.report.mismatches[name] ?? "", this.report.nodes.find((node) => node.name === name)?.trouble ?? ""));
     if (content === this.shown) return;
     this.shown = content;
     const list = (title, items, kind) => (items.length ? [h("h3", {}, `${title} (${items.length})`), h("ul", {}, items.map((each) => h("li", {}, kind
       ? h("button", { type: "button", class: "link", onclick: () => { this.selected = null; this.select(kind + each); } }, each) : each)))] : []);
-    if (this.selected[0] === "n") {
-      fill(this.details, h("h2", {}, name), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
+    if (this.selected[0] === "a") {
+      const ends = (part, table) => table.get(`${name}/${part}`) ?? [];
+      fill(this.details, h("h2", {}, name), h("p", {}, h("a", { href: `#/actions?action=${encodeURIComponent(name)}` }, "goals, feedback and results")),
+        list("Servers", ends("status", published), "n"), list("Clients", [...new Set([...ends("goal", published), ...ends("cancel", published)])], "n"),
+        list("Topics", ["goal", "cancel", "status", "feedback", "result"].map((part) => `${name}/${part}`)));
+    } else if (this.selected[0] === "n") {
+      const node = this.report.nodes.find((each) => each.name === name);
+      fill(this.details, h("h2", {}, name), node?.trouble ? h("p", { class: "error" }, `It does not answer: ${node.trouble}. What to do: ${node.advice}.`) : null,
+        h("p", {}, h("a", { href: `#/nodes?node=${encodeURIComponent(name)}` }, "process and connections")), list("Publishes", names(published), "t"), list("Subscribes to", names(subscribed), "t"), list("Services", names(services)));
     } else {
       const type = this.link.channels.get(name)?.type;
       this.rateText ??= h("span", { class: "muted" });
       fill(this.details, h("h2", {}, name), h("p", {}, type ?? "its type is not known yet", " ", this.rateText),
         h("p", {}, h("a", { href: `#/topics?open=${encodeURIComponent(name)}` }, "live values")),
         list("Publishers", published.get(name) ?? [], "n"), list("Subscribers", subscribed.get(name) ?? [], "n"),
-        (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."));
+        (published.get(name) ?? []).length ? null : h("p", { class: "error" }, "Nobody publishes this topic."), this.mismatch(name));
     }
   }
 
@@ -204,53 +250,11 @@ export class Graph {
     this.end = null;
   }
 
-  // --- pan and zoom
-
-  fit() {
-    this.isFitted = true;
-    const { clientWidth, clientHeight } = this.picture;
-    if (!this.size || !clientWidth) return;
-    const scale = Math.min(1.4, clientWidth / this.size.width, clientHeight / this.size.height);
-    this.view = { scale, x: (clientWidth - this.size.width * scale) / 2, y: (clientHeight - this.size.height * scale) / 2 };
-    this.move();
-  }
-
-  move() {
-    const { x, y, scale } = this.view;
-    this.drawing.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)}) scale(${scale.toFixed(4)})`);
-  }
-
-  zoom(factor, x, y) {
-    const scale = Math.min(4, Math.max(0.05, this.view.scale * factor));
-    const real = scale / this.view.scale;
-    this.view = { scale, x: x - (x - this.view.x) * real, y: y - (y - this.view.y) * real };
-    this.isFitted = false;
-    this.move();
-  }
-
-  listen() {
-    this.picture.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      const box = this.picture.getBoundingClientRect();
-      this.zoom(Math.exp(-event.deltaY * 0.0015), event.clientX - box.left, event.clientY - box.top);
-    }, { passive: false });
-    this.picture.addEventListener("pointerdown", (event) => this.pointers.set(event.pointerId, event));
-    this.picture.addEventListener("pointermove", (event) => {
-      const before = this.pointers.get(event.pointerId);
-      if (!before) return;
-      if (this.pointers.size === 2) {
-        const other = [...this.pointers.values()].find((each) => each.pointerId !== event.pointerId);
-        const distance = (each) => Math.hypot(each.clientX - other.clientX, each.clientY - other.clientY);
-        const box = this.picture.getBoundingClientRect();
-        this.zoom(distance(event) / Math.max(1, distance(before)), (event.clientX + other.clientX) / 2 - box.left, (event.clientY + other.clientY) / 2 - box.top);
-      } else if (this.pointers.size === 1) {
-        this.view.x += event.clientX - before.clientX;
-        this.view.y += event.clientY - before.clientY;
-        this.isFitted = false;
-        this.move();
-      }
-      this.pointers.set(event.pointerId, event);
-    });
-    for (const name of ["pointerup", "pointercancel", "pointerleave"]) this.picture.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
+  /** Return what is wrong with the types of a topic. */
+  mismatch(topic) {
+    const types = this.report.mismatches[topic];
+    if (!types) return null;
+    return h("div", { class: "error" }, h("p", {}, "Its nodes have different types and never connect. Use one type, or two names:"),
+      h("ul", {}, Object.entries(types).map(([type, nodes]) => h("li", {}, `${type}: ${nodes.join(", ")}`))));
   }
 }
