@@ -1,12 +1,14 @@
 // Plots of numbers of messages: paths of fields, two axes, zoom and pan while they stream, CSV and PNG.
 
-import { download, h, number, setText, uniqueId } from "../dom.js";
+import { KINDS, derivedOf, pairs, rangeOf } from "../derived.js";
+import { download, fill, h, number, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 import { t } from "../texts.js";
 
 const WINDOWS = [["5", "5 s"], ["10", "10 s"], ["30", "30 s"], ["60", "1 min"], ["300", "5 min"], ["", "all"]];
 const USUAL_WINDOW = "10";
+const MOST_PAIRS = 5000; // points of one series over another
 const FRAME_MS = 33;
 const COLORS = ["#2f7ed8", "#e4572e", "#2a9d5c", "#a05cc7", "#c98a00", "#0c9fb0", "#d6458b", "#7a7f87", "#6b8e23", "#8c5a3c"];
 
@@ -23,6 +25,9 @@ export class Plot {
     this.pausedAt = null;
     this.chart = null;
     this.isDirty = true;
+    this.ranges = [[0, 1], [0, 1]]; // of the axes, where one series is over another
+    this.over = words.get("x") ?? ""; // label of the series on the x axis; time where it is empty
+    this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse())); // label -> kind, as the address has them
 
     this.known = h("datalist", { id: uniqueId("paths") });
     this.input = h("input", { class: "grow", list: this.known.id, placeholder: "/topic/field, /topic/array[0:5]", "aria-label": "What to plot", autocomplete: "off" });
@@ -30,6 +35,7 @@ export class Plot {
     this.window = h("select", { "aria-label": "Time shown", onchange: () => { this.live(); this.remember(); } }, WINDOWS.map(([value, name]) => h("option", { value }, name)));
     const wanted = words.get("window") ?? USUAL_WINDOW;
     this.window.value = wanted === "all" ? "" : WINDOWS.some(([value]) => value === wanted) ? wanted : USUAL_WINDOW;
+    this.axis = h("select", { "aria-label": "The x axis", onchange: () => this.setOver(this.axis.value) });
     this.pauseButton = h("button", { type: "button", onclick: () => this.pause(!this.isPaused) });
     this.liveButton = h("button", { type: "button", class: "primary", hidden: true, onclick: () => this.live() }, "Follow");
     this.form = h("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); this.addTyped(); } },
@@ -38,7 +44,7 @@ export class Plot {
     this.hint = h("p", { class: "empty" }, "Type a path above, or choose “plot” next to a field in Topics.");
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
     main.append(this.form,
-      h("div", { class: "bar" }, this.pauseButton, this.window, this.liveButton,
+      h("div", { class: "bar" }, this.pauseButton, this.window, h("label", {}, "x axis", this.axis), this.liveButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
@@ -46,6 +52,7 @@ export class Plot {
       this.area, this.legend);
     this.area.append(this.hint);
     this.pause(this.isPaused);
+    this.showAxis();
 
     this.ending = [link.watch(["channels"], () => this.suggest())];
     const theme = () => this.rebuild();
@@ -101,6 +108,8 @@ export class Plot {
       (this.removed ??= new Set()).add(series.label);
     }
     series.row.remove();
+    if (this.over === series.label) this.over = "";
+    this.showAxis();
     this.remember();
     this.rebuild();
     this.showProblems();
@@ -108,7 +117,36 @@ export class Plot {
 
   remember() {
     const span = this.window.value;
-    this.place.remember([...[...this.ends.keys()].map((path) => ["path", path]), ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]])]);
+    this.place.remember([...[...this.ends.keys()].map((path) => ["path", path]), ...(span === USUAL_WINDOW ? [] : [["window", span || "all"]]),
+      ...(this.over ? [["x", this.over]] : []), ...[...this.series.values()].filter(({ kind }) => kind).map(({ label, kind }) => ["show", `${kind} ${label}`])]);
+  }
+
+  /** Offer time and each series for the x axis. */
+  showAxis() {
+    const labels = [...this.series.keys(), ...(this.over && !this.series.has(this.over) ? [this.over] : [])];
+    fill(this.axis, h("option", { value: "" }, "time"), labels.map((label) => h("option", { value: label }, label)));
+    this.axis.value = this.over;
+  }
+
+  setOver(label) {
+    this.over = label;
+    this.zoom = null;
+    this.remember();
+    this.rebuild();
+  }
+
+  /** Show a series as a kind of KINDS: all points that are kept are computed again. */
+  setKind(series, kind) {
+    series.kind = kind;
+    series.derived = derivedOf(kind);
+    series.samples = series.raw;
+    if (series.derived) {
+      const { times, values, count, total } = series.raw;
+      series.samples = new Samples();
+      series.samples.append(times.subarray(0, count), series.derived.append(times.subarray(0, count), values.subarray(0, count)));
+      series.samples.total = total;
+    }
+    this.isDirty = true;
   }
 
   /** Plot what another view links to, too. */
@@ -136,8 +174,12 @@ export class Plot {
       if (this.problems.delete(path)) this.showProblems();
       this.origin ??= times[0];
       // Time that goes back: a simulation or a bag was started again.
-      if (times[0] < series.samples.lastTime - 1) series.samples.drop(Infinity);
-      series.samples.append(times, values);
+      if (times[0] < series.raw.lastTime - 1) {
+        series.raw.drop(Infinity);
+        this.setKind(series, series.kind);
+      }
+      series.raw.append(times, values);
+      if (series.derived) series.samples.append(times, series.derived.append(times, values));
       this.isDirty = true;
     }
   }
@@ -145,7 +187,15 @@ export class Plot {
   makeSeries(label, path) {
     const used = new Set([...this.series.values()].map((each) => each.color));
     const color = COLORS.find((each) => !used.has(each)) ?? COLORS[this.series.size % COLORS.length];
-    const series = { label, path, samples: new Samples(), color, axis: "y", isHidden: false };
+    const raw = new Samples();
+    const series = { label, path, raw, samples: raw, kind: "", derived: null, color, axis: "y", isHidden: false };
+    const known = this.kinds.get(label) ?? "";
+    if (KINDS.some(([kind]) => kind === known)) this.setKind(series, known);
+    const kinds = h("select", { class: "small", "aria-label": `How ${label} is shown`, onchange: () => {
+      this.setKind(series, kinds.value);
+      this.remember();
+    } }, KINDS.map(([kind, name]) => h("option", { value: kind }, name)));
+    kinds.value = series.kind;
     series.value = h("span", { class: "num" });
     series.count = h("span", { class: "muted count" });
     const swatch = h("button", { type: "button", class: "swatch", title: "Show or hide", "aria-pressed": "true", onclick: () => {
@@ -159,11 +209,12 @@ export class Plot {
       setText(axis, series.axis === "y" ? t("left axis") : t("right axis"));
       this.rebuild();
     } }, "left axis");
-    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, axis,
+    series.row = h("div", { class: "series", role: "listitem" }, swatch, h("span", { class: "label" }, label), series.value, series.count, kinds, axis,
       h("button", { type: "button", class: "small", title: `Remove ${label}`, onclick: () => this.remove(series) }, "×"));
     series.row.dataset.label = label;
     this.series.set(label, series);
     this.legend.append(series.row);
+    this.showAxis();
     return series;
   }
 
@@ -195,7 +246,7 @@ export class Plot {
   }
 
   visible() {
-    return [...this.series.values()].filter((each) => !each.isHidden);
+    return [...this.series.values()].filter((each) => !each.isHidden && each.label !== this.over);
   }
 
   rebuild() {
@@ -209,6 +260,10 @@ export class Plot {
     const text = style.getPropertyValue("--muted").trim();
     const line = style.getPropertyValue("--line").trim();
     const axis = (more) => ({ stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui", ...more });
+    if (this.over) {
+      this.chart = this.makeOver(shown, axis);
+      return;
+    }
     const hasRight = shown.some((each) => each.axis === "y2");
     this.chart = new globalThis.uPlot({
       width: this.area.clientWidth,
@@ -233,13 +288,47 @@ export class Plot {
     }, [[], ...shown.map(() => [])], this.area);
   }
 
+  /** Return a chart of series over another one. */
+  makeOver(shown, axis) {
+    const line = (chart, number) => {
+      const [xs, ys] = chart.data[number];
+      const path = new Path2D();
+      xs.forEach((x, index) => path[index ? "lineTo" : "moveTo"](chart.valToPos(x, "x", true), chart.valToPos(ys[index], "y", true)));
+      chart.ctx.save();
+      chart.ctx.strokeStyle = shown[number - 1].color;
+      chart.ctx.lineWidth = 1.5 * devicePixelRatio;
+      chart.ctx.stroke(path);
+      if (xs.length) {
+        // Where it is now.
+        const last = xs.length - 1;
+        chart.ctx.fillStyle = shown[number - 1].color;
+        chart.ctx.beginPath();
+        chart.ctx.arc(chart.valToPos(xs[last], "x", true), chart.valToPos(ys[last], "y", true), 4 * devicePixelRatio, 0, 2 * Math.PI);
+        chart.ctx.fill();
+      }
+      chart.ctx.restore();
+      return null;
+    };
+    return new globalThis.uPlot({
+      mode: 2,
+      width: this.area.clientWidth,
+      height: this.area.clientHeight,
+      padding: [12, 14, 0, 0],
+      legend: { show: false },
+      cursor: { show: false },
+      scales: { x: { time: false, range: () => this.ranges[0] }, y: { range: () => this.ranges[1] } },
+      series: [null, ...shown.map(({ label }) => ({ label, paths: line, facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }] }))],
+      axes: [axis({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), axis({ size: 64 })],
+    }, [null, ...shown.map(() => [[], []])], this.area);
+  }
+
   resize() {
     if (!this.chart) this.rebuild();
     else if (this.area.clientWidth) this.chart.setSize({ width: this.area.clientWidth, height: this.area.clientHeight });
   }
 
   wheel(event) {
-    if (!this.chart || this.origin === null) return;
+    if (!this.chart || this.over || this.origin === null) return;
     event.preventDefault();
     const [from, to] = this.range();
     const span = to - from;
@@ -261,6 +350,14 @@ export class Plot {
     this.liveButton.hidden = !this.zoom && !this.isPaused;
     if (this.chart) {
       const [from, to] = this.range();
+      if (this.over) {
+        const over = this.series.get(this.over)?.samples ?? new Samples();
+        const data = this.visible().map(({ samples }) => pairs(over, samples, from, to, MOST_PAIRS));
+        this.ranges = [0, 1].map((which) => rangeOf(data.map((each) => each[which])));
+        this.chart.setData([null, ...data]);
+        this.showValues();
+        return;
+      }
       const data = drawn(this.visible().map((each) => each.samples), from, to, this.chart.bbox.width / devicePixelRatio, this.origin ?? 0);
       this.chart.setData(data);
     }
@@ -268,7 +365,7 @@ export class Plot {
   }
 
   showValues() {
-    const at = this.chart?.cursor.idx;
+    const at = this.over ? null : this.chart?.cursor.idx;
     let shown = 0;
     for (const series of this.series.values()) {
       let value = series.samples.last;
@@ -281,23 +378,24 @@ export class Plot {
           value = ys[index] ?? null;
         }
       }
-      setText(series.value, value === null ? "–" : number(value));
+      setText(series.value, value === null || Number.isNaN(value) ? "–" : number(value));
       setText(series.count, `${series.samples.total} points`);
     }
   }
 
   clear() {
-    for (const { samples } of this.series.values()) {
-      samples.drop(Infinity);
-      samples.total = 0;
+    for (const series of this.series.values()) {
+      series.raw.drop(Infinity);
+      series.raw.total = 0;
+      this.setKind(series, series.kind);
     }
     this.origin = null;
     this.live();
   }
 
   saveCsv() {
-    const all = this.visible();
-    download("plot.csv", new Blob([csv(all.map((each) => each.label), all.map((each) => each.samples))], { type: "text/csv" }));
+    const all = [...this.series.values()].filter((each) => !each.isHidden);
+    download("plot.csv", new Blob([csv(all.map((each) => `${each.label}${each.kind ? ` ${each.kind}` : ""}`), all.map((each) => each.samples))], { type: "text/csv" }));
   }
 
   savePng() {

@@ -1,0 +1,143 @@
+"""Plot in Debian's chromium: derivatives, averages, one series over another; the computing under node."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Vector3
+
+from minirospy.dashboard.files import FOLDER
+from tests.dashboard.conftest import Served
+from tests.interop.browser import Page
+from tests.interop.test_interop_dashboard import (
+    address,
+    browse,
+    needs_chromium,
+    needs_node,
+    publisher,
+    serve,
+)
+
+__all__ = ["browse", "serve"]
+
+JS = (FOLDER / "js").as_uri()
+
+
+def evaluated(expression: str) -> Any:
+    """Return what an expression of derived.js and samples.js gives, under node; NaN is null."""
+    script = (
+        f"import {{ Samples }} from '{JS}/samples.js'; import {{ derivedOf, pairs, rangeOf }} from '{JS}/derived.js';"
+        "const of = (times, values) => { const made = new Samples(); made.append(times, values); return made; };"
+        f"console.log(JSON.stringify({expression}));"
+    )
+    done = subprocess.run(
+        ["node", "--input-type=module", "-e", script], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@needs_node
+def test_derivative_is_the_slope_from_point_to_point_in_any_parts() -> None:
+    times, values = [0, 1, 1.5, 1.5, 3.5], [1, 3, 2, 7, 6]
+    whole = evaluated(f"[...derivedOf('derivative').append({times}, {values})]")
+    assert whole == [None, 2, -2, None, 2]
+    parts = evaluated(
+        "(d => [...d.append([0, 1], [1, 3]), ...d.append([1.5], [2]), ...d.append([1.5, 3.5], [7, 6])])(derivedOf('derivative'))"
+    )
+    assert parts == whole
+
+
+@needs_node
+def test_average_is_that_of_the_last_seconds() -> None:
+    found = evaluated("[...derivedOf('average1').append([0, 0.5, 1, 1.5, 9], [2, 4, NaN, 8, 1])]")
+    assert found == [2, 3, 3, 6, 1]
+    # Many points: what rounding leaves does not add up.
+    long = evaluated(
+        "(d => { const n = 50000; const t = Float64Array.from({length: n}, (_, i) => i / 100);"
+        "const v = t.map((x) => 1e9 + Math.sin(x)); return d.append(t, v)[n - 1]; })(derivedOf('average1'))"
+    )
+    last = [1e9 + math.sin(i / 100) for i in range(49_899, 50_000)]
+    assert long == pytest.approx(sum(last) / len(last), abs=1e-4)
+    assert evaluated("derivedOf('') ?? derivedOf('other') ?? 'none'") == "none"
+
+
+@needs_node
+def test_series_over_another_takes_its_newest_value_of_the_moment() -> None:
+    assert evaluated("pairs(of([0, 1, 2], [10, 11, 12]), of([0, 0.5, 2, 3], [1, 2, 3, 4]), 0, 3, 100)") == [
+        [10, 10, 12, 12],
+        [1, 2, 3, 4],
+    ]
+    assert evaluated("pairs(of([1], [5]), of([0, 1], [1, 2]), 0, 3, 100)") == [[5], [2]]
+    xs, ys = evaluated(
+        "(n => { const t = Array.from({length: n}, (_, i) => i); return pairs(of(t, t), of(t, t), 0, n, 100); })(1000)"
+    )
+    assert len(xs) == 100
+    assert (xs[-1], ys[-1]) == (999, 999)
+    assert evaluated("[rangeOf([[0, 10], [5]]), rangeOf([[]]), rangeOf([[2]])]") == [
+        [-0.5, 10.5],
+        [0, 1],
+        [1.8, 2.2],
+    ]
+
+
+@needs_chromium
+def test_series_is_shown_as_its_derivative_and_average(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    moving = publisher(served, "/path", Vector3, latch=True, queue_size=None)
+    served.run(moving.publish(8.0, 5.0, 0.0))
+    page = browse(address(served, "plot?path=/path/x&path=/path/y&show=average10+/path/y"))
+    page.wait_text(".series[data-label='/path/x']", "1 points")
+    page.wait(
+        "return document.querySelector(\"select[aria-label='How /path/y is shown']\").value === 'average10'"
+    )
+
+    served.run(moving.publish(4.0, 7.0, 0.0))
+    page.wait_text(".series[data-label='/path/y']", "2 points")
+    page.wait_text(".series[data-label='/path/y'] .num", "6")
+    page.choose("select[aria-label='How /path/x is shown']", "derivative")
+    page.wait("return Number(document.querySelector(\".series[data-label='/path/x'] .num\").textContent) < 0")
+    assert "show=derivative" in page.evaluate("location.hash")
+    page.choose("select[aria-label='How /path/x is shown']", "")
+    page.wait_text(".series[data-label='/path/x'] .num", "4")
+    page.click("button", "Clear")
+    page.wait_text(".series[data-label='/path/x']", "0 points")
+
+
+@needs_chromium
+def test_series_is_drawn_over_another(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
+    served = serve()
+    moving = publisher(served, "/path", Vector3, latch=True, queue_size=None)
+    served.run(moving.publish(0.0, 0.0, 0.0))
+    page = browse(address(served, "plot?path=/path/x&path=/path/y&window=all"))
+    page.wait_text(".series[data-label='/path/y']", "1 points")
+
+    async def circle() -> None:
+        for number in range(1, 200):
+            angle = number / 100 * math.pi
+            await moving.publish(math.cos(angle), math.sin(angle), 0.0)
+
+    served.run(circle())
+    page.wait_text(".series[data-label='/path/y']", "200 points")
+    page.choose("select[aria-label='The x axis']", "/path/x")
+    assert "x=%2Fpath%2Fx" in page.evaluate("location.hash")
+    # The circle is to the left and to the right of its middle, above and below it.
+    drawn = (
+        "(c => { const g = c.getContext('2d'), w = c.width, h = c.height; const has = (x, y, a, b) => "
+        "[...g.getImageData(x * w, y * h, a * w, b * h).data].some((v, i, d) => i % 4 === 0 && d[i + 3] && "
+        "Math.abs(d[i] - 0xe4) + Math.abs(d[i + 1] - 0x57) + Math.abs(d[i + 2] - 0x2e) < 60);"
+        "return has(0.05, 0.3, 0.2, 0.3) && has(0.8, 0.3, 0.2, 0.3) && has(0.4, 0, 0.3, 0.25) && has(0.4, 0.7, 0.3, 0.2)"
+        " && !has(0.45, 0.25, 0.02, 0.02); })(document.querySelector('.chart canvas'))"
+    )
+    page.wait(f"return {drawn}")
+    page.choose("select[aria-label='The x axis']", "")
+    page.wait(f"return !({drawn})")
+    page.call("Page.reload")
+    page.wait("return document.querySelector('.series')")
