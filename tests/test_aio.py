@@ -21,6 +21,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 
 import minirospy
 from minirospy import Node
+from minirospy.aio.raw import RawService, raw_class
 from minirospy.errors import (
     MasterUnreachableError,
     ROSException,
@@ -33,6 +34,7 @@ from minirospy.errors import (
 )
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from minirospy.times import Duration, Time
+from minirospy.wire.tcpros import InterfaceType
 
 SECONDS = 40.0
 
@@ -844,5 +846,55 @@ def test_unreachable_master_is_an_error(master: str) -> None:
             node._node._registrations._environment = node._environment
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
+
+    run(main)
+
+
+def test_raw_parts_report_their_peers_and_answer(master: str) -> None:
+    async def main() -> None:
+        async with Node("relay", rosout=False) as relay, Node("user", rosout=False) as user:
+            changed: list[str] = []
+            bodies: list[bytes] = []
+            type_ = InterfaceType(String._type, String._md5sum, String._full_text)
+            publisher = await relay.advertise(
+                "/out", raw_class(type_), latch=True, on_change=lambda: changed.append("subscriber")
+            )
+            subscription = await relay.subscribe_raw(
+                "/in",
+                lambda frame, _: bodies.append(bytes(frame)),
+                type_=type_,
+                on_change=lambda: changed.append("publisher"),
+            )
+            received = await user.subscribe("/out", String)
+            sent = await user.advertise("/in", String)
+            await sent.wait_for_subscribers(1, SECONDS)
+            await sent.publish("x")
+            await until(lambda: bodies == [b"\1\0\0\0x"])
+            await publisher.wait_for_subscribers(1, SECONDS)
+            publisher.publish_raw(b"\1\0\0\0y")
+            assert (await received.next(SECONDS)).data == "y"
+            assert set(changed) == {"subscriber", "publisher"}
+            assert publisher.subscribers == ["/user"]
+
+            publisher.forget_latched()
+            await received.close()
+            again = await user.subscribe("/out", String)
+            await again.wait_for_publishers(1, SECONDS)
+            publisher.publish_raw(b"\1\0\0\0z")
+            assert (await again.next(SECONDS)).data == "z"
+
+            async def answer(request: bytes, _: object) -> bytes:
+                if request == b"\0":
+                    raise ServiceException("not now")
+                return b"\1\4\0\0\0done"
+
+            service = await RawService(relay, "/flag", InterfaceType(SetBool._type, SetBool._md5sum), answer)
+            assert (await user.call("/flag", SetBool, True)).message == "done"
+            with pytest.raises(ServiceException, match="not now"):
+                await user.call("/flag", SetBool, False)
+            await service.close()
+            await subscription.close()
+            with pytest.raises(ServiceException, match="unavailable"):
+                await user.call("/flag", SetBool, True)
 
     run(main)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from minirospy import names
 from minirospy.aio.log import RosoutHandler, TerminalHandler
 from minirospy.aio.parameters import ParameterWatch
-from minirospy.aio.raw import ANY_CLASS, RawSubscription
+from minirospy.aio.raw import ANY_CLASS, RawSubscription, raw_class
 from minirospy.aio.services import Service, ServiceClass, ServiceProxy
 from minirospy.aio.time import Rate, SimulatedTime
 from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription
@@ -242,16 +242,25 @@ class Node:
             state = self._subscribed[resolved] = SubscribedTopic(self, resolved, message_class)
         return Subscription(self, state, message_class, queue_size)
 
-    def subscribe_raw(self, topic: str, deliver: Callable[[Frame, Header], object]) -> RawSubscription:
-        """Subscribe to ``topic`` of any type: ``deliver(bytes, publisher's connection header)`` on the loop, quickly.
+    def subscribe_raw(
+        self,
+        topic: str,
+        deliver: Callable[[Frame, Header], object],
+        *,
+        type_: InterfaceType | None = None,
+        on_change: Callable[[], object] | None = None,
+    ) -> RawSubscription:
+        """Subscribe to ``topic``, of any type without ``type_``: ``deliver(bytes, publisher's connection header)``.
 
-        The bytes may be kept. ``await node.subscribe_raw(...)`` waits until the master knows.
+        It is called on the loop, and has to be quick; so is ``on_change``, when a publisher has connected. The bytes may be
+        kept. ``await node.subscribe_raw(...)`` waits until the master knows.
         """
         resolved = self.resolve(topic)
         state = self._subscribed.get(resolved)
         if state is None:
-            state = self._subscribed[resolved] = SubscribedTopic(self, resolved, ANY_CLASS)
-        return RawSubscription(state, deliver)
+            message_class = ANY_CLASS if type_ is None else raw_class(type_)
+            state = self._subscribed[resolved] = SubscribedTopic(self, resolved, message_class)
+        return RawSubscription(state, deliver, on_change)
 
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
         """Return the next message of ``topic``.
@@ -270,13 +279,14 @@ class Node:
         latch: bool = False,
         headers: Mapping[str, str] | None = None,
         tcp_nodelay: bool = False,
+        on_change: Callable[[], object] | None = None,
     ) -> Publisher[_M]:
         """Return a publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
 
         ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: any
         number; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later gets the
-        last message. ``headers``: fields for the connection header. Raises ValueError where this node
-        publishes the topic with another type.
+        last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
+        has connected or disconnected. Raises ValueError where this node publishes the topic with another type.
         """
         resolved = self.resolve(topic)
         state = self._published.get(resolved)
@@ -294,6 +304,8 @@ class Node:
         elif state.publication.type.md5sum != message_class._md5sum:
             raise ValueError(f"{self.name} publishes {resolved} as {state.publication.type.name} already")
         state.publication.latch = state.publication.latch or latch
+        if on_change is not None:
+            state.on_change.append(on_change)
         return Publisher(self, state, message_class, waits=queue_size is None)
 
     async def publish(self, topic: str, message: Message) -> None:

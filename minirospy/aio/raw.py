@@ -35,10 +35,18 @@ PROBE_SECONDS = 5.0
 class RawSubscription(Handle):
     """The messages of a topic as they come; made by :meth:`Node.subscribe_raw`, ended by :meth:`close`."""
 
-    def __init__(self, state: SubscribedTopic, deliver: Callable[[Frame, Header], object]) -> None:
+    def __init__(
+        self,
+        state: SubscribedTopic,
+        deliver: Callable[[Frame, Header], object],
+        on_change: Callable[[], object] | None = None,
+    ) -> None:
         self.topic = state.topic
         self._deliver = deliver
         self._state = state
+        self._on_change = on_change
+        if on_change is not None:
+            state.subscription.on_connected.append(on_change)
         self._registration = state.join(self)
 
     @property
@@ -48,6 +56,9 @@ class RawSubscription(Handle):
 
     async def close(self) -> None:
         """Stop listening. Idempotent."""
+        callback, self._on_change = self._on_change, None
+        if callback is not None:
+            self._state.subscription.on_connected.remove(callback)
         await self._state.leave(self)
 
     def _put(self, frame: bytes | memoryview, header: Header) -> None:

@@ -7,7 +7,7 @@ import contextlib
 import itertools
 import weakref
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from minirospy.aio.handle import Handle, pieces_of, registered
@@ -190,6 +190,21 @@ class Publisher(Handle, Generic[_M_co]):
         """Return the number of connected subscribers."""
         return len(self._state.publication.links) if self._state else 0
 
+    @property
+    def on_change(self) -> list[Callable[[], object]]:
+        """Return what is called on the loop when a subscriber has connected or disconnected."""
+        return self._state.on_change if self._state else []
+
+    @property
+    def subscribers(self) -> list[str]:
+        """Return the names of the nodes of the connected subscribers."""
+        return [link.peer for link in self._state.publication.links] if self._state else []
+
+    def forget_latched(self) -> None:
+        """Send the last message to no subscriber that comes later."""
+        if self._state:
+            self._state.publication.forget_latched()
+
     async def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> None:
         """Wait until so many subscribers are connected.
 
@@ -281,6 +296,8 @@ class PublishedTopic:
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(message_class, "_has_header", False))
         self._changed = asyncio.Event()
+        self.on_change: list[Callable[[], object]] = []
+        """Called on the loop when a subscriber has connected or disconnected."""
         self._registration = node._spawn(
             registered(node._node.advertise, publication, f"publication [{publication.topic}]", node.log)
         )
@@ -322,6 +339,8 @@ class PublishedTopic:
     def links_changed(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()
+        for callback in self.on_change:
+            callback()
 
     async def next_change(self) -> None:
         """Return when a subscriber has connected or disconnected."""

@@ -165,6 +165,11 @@ class Publication:
             self._on_link(link, True)
         return None
 
+    def forget_latched(self) -> None:
+        """Send the last frame to no subscriber that comes later."""
+        with self._latch_lock:
+            self._latched = None
+
     def close(self) -> None:
         """End all links (on the loop)."""
         for link in self.links:
