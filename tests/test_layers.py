@@ -77,6 +77,10 @@ PURE_FILES = (
         PACKAGE / "bridge" / "ros2" / name
         for name in ("layouts.py", "links.py", "rules.py", "service_links.py", "statics.py")
     }
+    | {
+        PACKAGE / "bridge" / "fleet" / name
+        for name in ("clocks.py", "contents.py", "frames.py", "keys.py", "lanes.py", "report.py", "rules.py")
+    }
     | {PACKAGE / "dashboard" / "views.py"}
     | {PACKAGE / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 )

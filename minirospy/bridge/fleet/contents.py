@@ -1,0 +1,126 @@
+"""What the fleet has, by the tokens that are there: robots, their gateways, topics and services. Pure.
+
+Tokens come and go one by one and in any order, those of a robot before its claim too. What is too much, or not of the form of
+:mod:`minirospy.bridge.fleet.keys`, is left out and counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from minirospy.bridge.fleet.keys import (
+    Claim,
+    ServiceToken,
+    TopicToken,
+    parse_claim,
+    parse_service,
+    parse_topic,
+)
+from minirospy.bridge.fleet.rules import holder
+
+_Token = TypeVar("_Token", TopicToken, ServiceToken)
+
+__all__ = ["MOST_GATEWAYS", "MOST_NAMES", "FleetContents", "Robot"]
+
+MOST_GATEWAYS = 5_000
+MOST_NAMES = 2_000
+"""Topics, and as many services, that one gateway may announce."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot that others see. ``duplicates``: claims to its name that do not count."""
+
+    claim: Claim
+    topics: dict[str, TopicToken]
+    services: dict[str, ServiceToken]
+    duplicates: tuple[Claim, ...] = ()
+
+
+@dataclass(eq=False)
+class _Gateway:
+    claim: Claim | None = None
+    topics: dict[str, TopicToken] = field(default_factory=dict)
+    services: dict[str, ServiceToken] = field(default_factory=dict)
+
+
+class FleetContents:
+    """The tokens that are there."""
+
+    def __init__(self, allows: Callable[[str], bool]) -> None:
+        """``allows(robot)``: which robots are of interest."""
+        self.refused = 0
+        """How many tokens were left out."""
+        self._allows = allows
+        self._gateways: dict[tuple[str, str], _Gateway] = {}
+
+    def add(self, key: str) -> bool:
+        """Add a token; return whether it changes anything."""
+        token = parse_claim(key) or parse_topic(key) or parse_service(key)
+        if token is None:
+            self.refused += 1
+            return False
+        name = token.name if isinstance(token, Claim) else token.robot
+        if not self._allows(name):
+            return False
+        gateway = self._gateways.get((name, token.gateway))
+        if gateway is None:
+            if len(self._gateways) >= MOST_GATEWAYS:
+                self.refused += 1
+                return False
+            gateway = self._gateways[name, token.gateway] = _Gateway()
+        if isinstance(token, Claim):
+            gateway.claim = token
+            return True
+        if isinstance(token, TopicToken):
+            return self._put(gateway.topics, token.topic, token)
+        return self._put(gateway.services, token.service, token)
+
+    def remove(self, key: str) -> bool:
+        """Remove a token; return whether it changes anything."""
+        token = parse_claim(key) or parse_topic(key) or parse_service(key)
+        if token is None:
+            return False
+        at = (token.name if isinstance(token, Claim) else token.robot, token.gateway)
+        gateway = self._gateways.get(at)
+        if gateway is None:
+            return False
+        # A topic whose flags have changed has a new token already when the old one goes.
+        if isinstance(token, Claim):
+            gateway.claim = None
+        elif isinstance(token, TopicToken):
+            if gateway.topics.get(token.topic) != token:
+                return False
+            del gateway.topics[token.topic]
+        else:
+            if gateway.services.get(token.service) != token:
+                return False
+            del gateway.services[token.service]
+        if not (gateway.claim or gateway.topics or gateway.services):
+            del self._gateways[at]
+        return True
+
+    def robots(self) -> dict[str, Robot]:
+        """Return the robots by name, each as the gateway that counts announces it."""
+        claims: dict[str, list[Claim]] = {}
+        for gateway in self._gateways.values():
+            if gateway.claim:
+                claims.setdefault(gateway.claim.name, []).append(gateway.claim)
+        found = {}
+        for name, named in sorted(claims.items()):
+            best = holder(named)
+            assert best
+            gateway = self._gateways[name, best.gateway]
+            others = tuple(sorted(claim for claim in named if claim != best))
+            found[name] = Robot(best, dict(gateway.topics), dict(gateway.services), others)
+        return found
+
+    def _put(self, table: dict[str, _Token], name: str, token: _Token) -> bool:
+        if name not in table and len(table) >= MOST_NAMES:
+            self.refused += 1
+            return False
+        changed = table.get(name) != token
+        table[name] = token
+        return changed

@@ -1,0 +1,178 @@
+"""Frame ids with a robot's prefix, changed in the bytes of messages: ``base_link`` <-> ``robot1/base_link``. Pure.
+
+Frame ids are ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. What comes after the last of them is
+copied as it is, so an image costs one copy.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
+
+from minirospy.errors import DeserializationError
+from minirospy.idl.digest import Lookup
+from minirospy.idl.spec import PRIMITIVES, Field, MessageSpec
+
+__all__ = ["FrameRewriter", "prefixed", "stripped"]
+
+_LENGTH = struct.Struct("<I")
+_MOST_ELEMENTS = 1_000_000
+
+
+class _Skip(NamedTuple):
+    """Fixed bytes."""
+
+    size: int
+
+
+class _Text(NamedTuple):
+    """A string; ``is_frame``: it is a frame id."""
+
+    is_frame: bool
+
+
+class _Array(NamedTuple):
+    """So many times ``steps``; ``length`` None: as many as the number in front says."""
+
+    length: int | None
+    steps: tuple[_Step, ...]
+
+
+_Step = _Skip | _Text | _Array
+
+
+class FrameRewriter:
+    """Rewrites the frame ids in messages of one type."""
+
+    def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
+        """Raise what ``lookup`` raises, DefinitionError."""
+        self._steps = _trimmed(_steps(spec, lookup))
+
+    @property
+    def has_frames(self) -> bool:
+        """Return whether messages of the type have frame ids at all."""
+        return bool(self._steps)
+
+    def rewritten(self, data: bytes | memoryview, change: Callable[[bytes], bytes]) -> bytes:
+        """Return a message with ``change`` of each frame id. Raise DeserializationError where it ends too early."""
+        data = bytes(data)
+        if not self._steps:
+            return data
+        pieces: list[bytes] = []
+        try:
+            copied, _ = _run(self._steps, data, 0, 0, change, pieces)
+        except struct.error as error:
+            raise DeserializationError("the message ends too early") from error
+        pieces.append(data[copied:])
+        return b"".join(pieces)
+
+
+def prefixed(prefix: str) -> Callable[[bytes], bytes]:
+    """Return the change of ``base_link`` into ``robot1/base_link``; what has the prefix, and the empty id, stay."""
+    start = prefix.encode() + b"/"
+
+    def change(frame: bytes) -> bytes:
+        bare = frame.lstrip(b"/")
+        return bare if not bare or bare.startswith(start) else start + bare
+
+    return change
+
+
+def stripped(prefix: str) -> Callable[[bytes], bytes]:
+    """Return the change of ``robot1/base_link`` into ``base_link``; other ids stay."""
+    start = prefix.encode() + b"/"
+
+    def change(frame: bytes) -> bytes:
+        bare = frame.lstrip(b"/")
+        return bare[len(start) :] if bare.startswith(start) else frame
+
+    return change
+
+
+def _steps(spec: MessageSpec, lookup: Lookup) -> tuple[_Step, ...]:
+    found: list[_Step] = []
+    for field in spec.fields:
+        found += _field_steps(field, spec.full_name, lookup)
+    return _joined(found)
+
+
+def _field_steps(field: Field, owner: str, lookup: Lookup) -> tuple[_Step, ...]:
+    type_ = field.type
+    one: tuple[_Step, ...]
+    if not type_.is_primitive:
+        one = _steps(lookup(type_.base), lookup)
+    elif type_.base == "string":
+        is_frame = field.name == "child_frame_id" or (owner == "std_msgs/Header" and field.name == "frame_id")
+        one = (_Text(is_frame),)
+    else:
+        one = (_Skip(struct.calcsize("<" + PRIMITIVES[type_.base])),)
+    if not type_.is_array:
+        return one
+    match one:
+        case (_Skip(size),) if type_.length is not None:
+            return (_Skip(size * type_.length),)
+    return (_Array(type_.length, one),)
+
+
+def _joined(steps: list[_Step]) -> tuple[_Step, ...]:
+    joined: list[_Step] = []
+    for step in steps:
+        last = joined[-1] if joined else None
+        if isinstance(step, _Skip) and isinstance(last, _Skip):
+            joined[-1] = _Skip(last.size + step.size)
+        else:
+            joined.append(step)
+    return tuple(joined)
+
+
+def _has_frame(step: _Step) -> bool:
+    if isinstance(step, _Array):
+        return any(map(_has_frame, step.steps))
+    return isinstance(step, _Text) and step.is_frame
+
+
+def _trimmed(steps: tuple[_Step, ...]) -> tuple[_Step, ...]:
+    """Return the steps up to the last frame id."""
+    last = max((number for number, step in enumerate(steps) if _has_frame(step)), default=-1)
+    return steps[: last + 1]
+
+
+def _run(
+    steps: tuple[_Step, ...],
+    data: bytes,
+    copied: int,
+    at: int,
+    change: Callable[[bytes], bytes],
+    pieces: list[bytes],
+) -> tuple[int, int]:
+    """Walk over ``data`` from ``at``; return up to where ``pieces`` has its copy, and where the steps end."""
+    for step in steps:
+        if isinstance(step, _Skip):
+            at += step.size
+        elif isinstance(step, _Text):
+            (size,) = _LENGTH.unpack_from(data, at)
+            start, at = at, at + 4 + size
+            if step.is_frame and at <= len(data):
+                new = change(data[start + 4 : at])
+                pieces += [data[copied:start], _LENGTH.pack(len(new)), new]
+                copied = at
+        else:
+            count = step.length
+            if count is None:
+                (count,) = _LENGTH.unpack_from(data, at)
+                at += 4
+            match step.steps:
+                case (_Skip(size),):
+                    at += size * count
+                case ():
+                    pass
+                case inner:
+                    # Each has a length of four bytes at least.
+                    if count * 4 > len(data) - at or count > _MOST_ELEMENTS:
+                        raise DeserializationError(f"an array of {count} elements is longer than the message")
+                    for _ in range(count):
+                        copied, at = _run(inner, data, copied, at, change, pieces)
+        if at > len(data):
+            raise DeserializationError("the message ends too early")
+    return copied, at

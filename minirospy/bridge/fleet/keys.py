@@ -1,0 +1,348 @@
+"""The keys of a fleet in Zenoh: what is announced, passed and requested under which key. Pure.
+
+Below the root, which wildcards of other programs do not match, each key names the robot and the gateway that speaks for it::
+
+    robot/NAME/GATEWAY/START/HOST                 token: a robot is there
+    control/NAME/GATEWAY/START/HOST               token: a control room is there
+    topic/NAME/GATEWAY/TOPIC/TYPE/MD5/FLAGS       token: a topic of a robot; FLAGS of "p", "s", "l", "f"
+    service/NAME/GATEWAY/SERVICE/TYPE/MD5         token: a service of a robot
+    want/NAME/GATEWAY/TOPIC/READER                token: READER, a gateway, has subscribers of a topic
+    offer/NAME/GATEWAY/TOPIC/WRITER/TYPE/MD5/FLAGS  token: WRITER has publishers of a topic that the robot subscribes to
+    out/NAME/GATEWAY/MD5/TOPIC                    messages of a robot
+    replay/NAME/GATEWAY/MD5/TOPIC/READER          its latched messages, for a READER that came later
+    in/NAME/GATEWAY/MD5/TOPIC/WRITER              messages to a robot
+    call/NAME/GATEWAY/SERVICE/MD5                 query: a service's request -> its response
+    definition/GATEWAY/TYPE/MD5                   query: the full text of a type
+    param/NAME/GATEWAY                            query: name -> value of a parameter
+    ping/GATEWAY, status/GATEWAY                  query: the clock; what the gateway has passed
+
+Tokens are those of Zenoh's liveliness: they end with the session that declared them. In names and types a slash is written
+``%``. Whatever does not have this form is ignored: parsers return None.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from typing import NamedTuple
+
+from minirospy.names import is_legal_name
+
+__all__ = [
+    "ROOT",
+    "UNKNOWN_MD5",
+    "Claim",
+    "Offer",
+    "ServiceToken",
+    "Stamp",
+    "TopicToken",
+    "Want",
+    "call_key",
+    "claim_key",
+    "definition_key",
+    "in_key",
+    "is_md5",
+    "is_robot_name",
+    "mangled",
+    "offer_key",
+    "out_key",
+    "parse_call",
+    "parse_claim",
+    "parse_in",
+    "parse_offer",
+    "parse_service",
+    "parse_stamp",
+    "parse_topic",
+    "parse_want",
+    "replay_key",
+    "serialize_stamp",
+    "service_key",
+    "topic_key",
+    "unmangled",
+    "want_key",
+]
+
+ROOT = "@minirospy/1"
+"""The first chunk starts with ``@``: no ``**`` matches it. The second is the version of this table."""
+
+UNKNOWN_MD5 = "-"
+"""The md5sum of a topic that has subscribers only, of a type that is not installed."""
+
+_MOST_NAME = 256
+_ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
+_GATEWAY = re.compile(r"[0-9a-f]{16}")
+_TYPE = re.compile(r"[A-Za-z]\w{0,127}%[A-Za-z]\w{0,127}", re.ASCII)
+_MD5 = re.compile(r"[0-9a-f]{32}")
+_START = re.compile(r"[0-9a-f]{1,16}")
+_FLAGS = re.compile(r"[pslf]{1,4}|-")
+_STAMP = struct.Struct("<Iq")
+
+
+class Claim(NamedTuple):
+    """A gateway's word that it speaks for a robot, since ``start`` (its own clock, ns), on a machine ``host``."""
+
+    name: str
+    gateway: str
+    start: int
+    host: str
+
+
+class TopicToken(NamedTuple):
+    """A topic of a robot. ``has_frames``: its frame ids have the robot's prefix."""
+
+    robot: str
+    gateway: str
+    topic: str
+    type: str
+    md5sum: str
+    is_published: bool
+    is_subscribed: bool
+    is_latched: bool = False
+    has_frames: bool = False
+
+    def has_same_messages(self, other: TopicToken) -> bool:
+        """Return whether the topic of another token is published with the same messages: who wants one gets the other."""
+        ends = other._replace(is_subscribed=self.is_subscribed, is_latched=self.is_latched)
+        return self.is_published and ends == self
+
+
+class ServiceToken(NamedTuple):
+    """A service of a robot."""
+
+    robot: str
+    gateway: str
+    service: str
+    type: str
+    md5sum: str
+
+
+class Want(NamedTuple):
+    """A reader that has subscribers of a topic."""
+
+    topic: str
+    reader: str
+
+
+class Offer(NamedTuple):
+    """A writer that has publishers of a topic that the robot subscribes to."""
+
+    topic: str
+    writer: str
+    type: str
+    md5sum: str
+    is_latched: bool
+
+
+class Stamp(NamedTuple):
+    """What goes with each message: its number on its topic, and when it was sent, by the sender's clock in ns."""
+
+    number: int
+    nanoseconds: int
+
+
+def is_robot_name(name: str) -> bool:
+    """Return whether a robot may have this name: it becomes a namespace of ROS."""
+    return bool(_ROBOT.fullmatch(name))
+
+
+def is_md5(text: str) -> bool:
+    """Return whether a text is an md5sum."""
+    return bool(_MD5.fullmatch(text))
+
+
+def mangled(name: str) -> str:
+    """Return a name or type as one chunk of a key: ``/arm/state`` -> ``%arm%state``."""
+    return name.replace("/", "%")
+
+
+def unmangled(chunk: str) -> str | None:
+    """Return the global graph resource name of a chunk; None where it is not a legal one."""
+    name = chunk.replace("%", "/")
+    if len(name) > _MOST_NAME or not name.startswith("/") or name.endswith("/") or not is_legal_name(name):
+        return None
+    return name
+
+
+# --- tokens
+
+
+def claim_key(claim: Claim, kind: str = "robot") -> str:
+    """Return the key of a robot's token, or a control room's (``kind`` "control"), whose name may be ``-``."""
+    return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
+
+
+def parse_claim(key: str, kind: str = "robot") -> Claim | None:
+    """Return what a robot's or control room's token says."""
+    match _chunks(key, kind):
+        case [name, gateway, start, host]:
+            if not is_robot_name(name) and not (kind == "control" and name == "-"):
+                return None
+            if _GATEWAY.fullmatch(gateway) and _START.fullmatch(start) and _GATEWAY.fullmatch(host):
+                return Claim(name, gateway, int(start, 16), host)
+    return None
+
+
+def topic_key(token: TopicToken) -> str:
+    """Return the key of a topic's token."""
+    flags = "".join(
+        letter
+        for letter, is_set in (
+            ("p", token.is_published),
+            ("s", token.is_subscribed),
+            ("l", token.is_latched),
+            ("f", token.has_frames),
+        )
+        if is_set
+    )
+    return f"{ROOT}/topic/{token.robot}/{token.gateway}/{mangled(token.topic)}/{mangled(token.type)}/{token.md5sum}/{flags}"
+
+
+def parse_topic(key: str) -> TopicToken | None:
+    """Return what a topic's token says."""
+    match _chunks(key, "topic"):
+        case [robot, gateway, topic, type_, md5sum, flags]:
+            name = unmangled(topic)
+            if name is None or not _are_ends(robot, gateway) or not _is_type(type_, md5sum):
+                return None
+            if not _FLAGS.fullmatch(flags) or not {"p", "s"} & set(flags):
+                return None
+            if "p" in flags and md5sum == UNKNOWN_MD5:
+                return None
+            return TopicToken(
+                robot,
+                gateway,
+                name,
+                type_.replace("%", "/"),
+                md5sum,
+                "p" in flags,
+                "s" in flags,
+                "l" in flags,
+                "f" in flags,
+            )
+    return None
+
+
+def service_key(token: ServiceToken) -> str:
+    """Return the key of a service's token."""
+    type_ = mangled(token.type)
+    return f"{ROOT}/service/{token.robot}/{token.gateway}/{mangled(token.service)}/{type_}/{token.md5sum}"
+
+
+def parse_service(key: str) -> ServiceToken | None:
+    """Return what a service's token says."""
+    match _chunks(key, "service"):
+        case [robot, gateway, service, type_, md5sum]:
+            name = unmangled(service)
+            if name is None or not _are_ends(robot, gateway):
+                return None
+            if _is_type(type_, md5sum) and md5sum != UNKNOWN_MD5:
+                return ServiceToken(robot, gateway, name, type_.replace("%", "/"), md5sum)
+    return None
+
+
+def want_key(robot: str, gateway: str, want: Want) -> str:
+    """Return the key of a reader's token."""
+    return f"{ROOT}/want/{robot}/{gateway}/{mangled(want.topic)}/{want.reader}"
+
+
+def parse_want(key: str) -> Want | None:
+    """Return what a reader's token says."""
+    match _chunks(key, "want"):
+        case [_, _, topic, reader]:
+            name = unmangled(topic)
+            if name is not None and _GATEWAY.fullmatch(reader):
+                return Want(name, reader)
+    return None
+
+
+def offer_key(robot: str, gateway: str, offer: Offer) -> str:
+    """Return the key of a writer's token."""
+    flags = "l" if offer.is_latched else "-"
+    type_ = mangled(offer.type)
+    return (
+        f"{ROOT}/offer/{robot}/{gateway}/{mangled(offer.topic)}/{offer.writer}/{type_}/{offer.md5sum}/{flags}"
+    )
+
+
+def parse_offer(key: str) -> Offer | None:
+    """Return what a writer's token says."""
+    match _chunks(key, "offer"):
+        case [_, _, topic, writer, type_, md5sum, flags]:
+            name = unmangled(topic)
+            if name is None or not _GATEWAY.fullmatch(writer) or not _FLAGS.fullmatch(flags):
+                return None
+            if _is_type(type_, md5sum) and md5sum != UNKNOWN_MD5:
+                return Offer(name, writer, type_.replace("%", "/"), md5sum, "l" in flags)
+    return None
+
+
+# --- messages and queries
+
+
+def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
+    """Return the key of a robot's messages."""
+    return f"{ROOT}/out/{robot}/{gateway}/{md5sum}/{mangled(topic)}"
+
+
+def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -> str:
+    """Return the key of latched messages for one reader."""
+    return f"{ROOT}/replay/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{reader}"
+
+
+def in_key(robot: str, gateway: str, md5sum: str, topic: str, writer: str) -> str:
+    """Return the key of messages to a robot."""
+    return f"{ROOT}/in/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{writer}"
+
+
+def parse_in(key: str) -> tuple[str, str, str] | None:
+    """Return topic, md5sum and writer of a message to a robot."""
+    match _chunks(key, "in"):
+        case [_, _, md5sum, topic, writer]:
+            name = unmangled(topic)
+            if name is not None and _MD5.fullmatch(md5sum) and _GATEWAY.fullmatch(writer):
+                return name, md5sum, writer
+    return None
+
+
+def call_key(robot: str, gateway: str, service: str, md5sum: str) -> str:
+    """Return the key of a service's calls."""
+    return f"{ROOT}/call/{robot}/{gateway}/{mangled(service)}/{md5sum}"
+
+
+def parse_call(key: str) -> tuple[str, str] | None:
+    """Return service and md5sum of a call."""
+    match _chunks(key, "call"):
+        case [_, _, service, md5sum]:
+            name = unmangled(service)
+            if name is not None and _MD5.fullmatch(md5sum):
+                return name, md5sum
+    return None
+
+
+def definition_key(gateway: str, type_: str, md5sum: str) -> str:
+    """Return the key of a type's full text."""
+    return f"{ROOT}/definition/{gateway}/{mangled(type_)}/{md5sum}"
+
+
+def serialize_stamp(stamp: Stamp) -> bytes:
+    """Return what goes with a message."""
+    return _STAMP.pack(stamp.number & 0xFFFFFFFF, stamp.nanoseconds)
+
+
+def parse_stamp(data: bytes) -> Stamp | None:
+    """Return what came with a message; None where it is not of ours."""
+    return Stamp._make(_STAMP.unpack(data)) if len(data) == _STAMP.size else None
+
+
+def _chunks(key: str, kind: str) -> list[str]:
+    """Return the chunks of a key after its kind; none where it is of another kind."""
+    start = f"{ROOT}/{kind}/"
+    return key[len(start) :].split("/") if key.startswith(start) else []
+
+
+def _are_ends(robot: str, gateway: str) -> bool:
+    return is_robot_name(robot) and _GATEWAY.fullmatch(gateway) is not None
+
+
+def _is_type(type_: str, md5sum: str) -> bool:
+    return _TYPE.fullmatch(type_) is not None and (md5sum == UNKNOWN_MD5 or bool(_MD5.fullmatch(md5sum)))

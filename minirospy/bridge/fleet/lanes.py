@@ -1,0 +1,73 @@
+"""Queues of messages that wait to be sent or delivered: fair between flows, newest first to survive. Pure.
+
+A flow is what belongs together: a topic at the sender, a robot's topic at the receiver. Each keeps its newest messages, and flows
+take turns, so one that floods loses messages of its own only.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict, deque
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+__all__ = ["Flow", "FlowQueue"]
+
+_T = TypeVar("_T")
+
+
+@dataclass(eq=False)
+class Flow(Generic[_T]):
+    """The messages of one flow that wait: at most ``most`` messages, and ``most_bytes`` where more than one waits."""
+
+    most: int
+    most_bytes: int
+    passed: int = 0
+    passed_bytes: int = 0
+    dropped: int = 0
+    waiting_bytes: int = 0
+    waiting: deque[tuple[int, _T]] = field(default_factory=deque)
+
+
+class FlowQueue(Generic[_T]):
+    """Flows that take turns. Not safe for threads: its owner has a lock."""
+
+    def __init__(self) -> None:
+        self._ready: OrderedDict[Flow[_T], None] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._ready)
+
+    def add(self, flow: Flow[_T], item: _T, size: int) -> int:
+        """Append a message; return how many of the flow's oldest gave way."""
+        flow.waiting.append((size, item))
+        flow.waiting_bytes += size
+        dropped = 0
+        while len(flow.waiting) > flow.most or (
+            flow.waiting_bytes > flow.most_bytes and len(flow.waiting) > 1
+        ):
+            flow.waiting_bytes -= flow.waiting.popleft()[0]
+            dropped += 1
+        flow.dropped += dropped
+        self._ready.setdefault(flow, None)
+        return dropped
+
+    def take(self) -> tuple[Flow[_T], _T] | None:
+        """Return the next message, of the flow whose turn it is; None where none waits."""
+        while self._ready:
+            flow, _ = self._ready.popitem(last=False)
+            if not flow.waiting:
+                continue
+            size, item = flow.waiting.popleft()
+            flow.waiting_bytes -= size
+            flow.passed += 1
+            flow.passed_bytes += size
+            if flow.waiting:
+                self._ready[flow] = None
+            return flow, item
+        return None
+
+    def forget(self, flow: Flow[_T]) -> None:
+        """Drop what waits of a flow that has ended."""
+        flow.waiting.clear()
+        flow.waiting_bytes = 0
+        self._ready.pop(flow, None)

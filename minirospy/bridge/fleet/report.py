@@ -1,0 +1,158 @@
+"""What `minirospy fleet status` prints: lines of what gateways answer. Pure; answers are a peer's, and checked."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from minirospy.bridge.fleet.clocks import ClockOffset
+from minirospy.bridge.fleet.keys import Claim
+from minirospy.bridge.fleet.rules import holder
+from minirospy.escape import escaped
+
+__all__ = ["Answer", "as_json", "lines", "parse_answer"]
+
+Json = Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A gateway that is there: its claim, its answer ({} without one), and its clock."""
+
+    claim: Claim
+    status: Json
+    clock: ClockOffset | None = None
+
+
+def parse_answer(data: bytes) -> Json:
+    """Return a gateway's status; {} where it is not one."""
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
+    """Return the lines for a person: robots, then control rooms with what is passed to each."""
+    robots, controls = list(robots), list(controls)
+    found = [
+        f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
+    ]
+    for answer in sorted(robots, key=lambda each: (each.claim.name, each.claim.start)):
+        found += _robot_lines(answer, _is_shown(answer, robots))
+    for answer in controls:
+        found += _control_lines(answer)
+    return found
+
+
+def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
+    """Return the same for programs."""
+
+    def described(answer: Answer, shown: bool) -> dict[str, object]:
+        clock = answer.clock
+        return {
+            "name": answer.claim.name,
+            "gateway": answer.claim.gateway,
+            "shown": shown,
+            "offset": clock.offset / 1e9 if clock else None,
+            "round_trip": clock.round_trip / 1e9 if clock else None,
+            "status": answer.status,
+        }
+
+    robots = list(robots)
+    return json.dumps(
+        {
+            "robots": [described(each, _is_shown(each, robots)) for each in robots],
+            "controls": [described(each, True) for each in controls],
+        },
+        indent=1,
+    )
+
+
+def _is_shown(answer: Answer, robots: Iterable[Answer]) -> bool:
+    return holder(each.claim for each in robots if each.claim.name == answer.claim.name) == answer.claim
+
+
+def _robot_lines(answer: Answer, is_shown: bool) -> list[str]:
+    status = answer.status
+    if not status:
+        return [f"{answer.claim.name}: is there, but does not answer"]
+    parts = [
+        f"{answer.claim.name} ({_text(status, 'machine')})",
+        _count(_number(status, "topics"), "topic"),
+        _count(_number(status, "services"), "service"),
+        _clock(answer.clock),
+    ]
+    if not is_shown:
+        parts.append("NOT SHOWN: another gateway has this name")
+    if status.get("master") is False:
+        parts.append("ITS MASTER DOES NOT ANSWER")
+    found = [", ".join(part for part in parts if part)]
+    found += [
+        f"  sends {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')} "
+        f"({_size(_number(link, 'bytes'))}, {_text(link, 'lane')}), {_number(link, 'dropped')} dropped, "
+        f"{_number(link, 'throttled')} over its rate"
+        for link in _tables(status, "sent")
+    ]
+    return found + [
+        f"  receives {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}"
+        for link in _tables(status, "passed_in")
+    ]
+
+
+def _control_lines(answer: Answer) -> list[str]:
+    status = answer.status
+    if not status:
+        return ["control room: is there, but does not answer"]
+    name = "" if answer.claim.name == "-" else f" {answer.claim.name}"
+    found = [
+        f"control room{name} ({_text(status, 'machine')}), {_count(len(_tables(status, 'robots')), 'robot')}"
+    ]
+    for robot in _tables(status, "robots"):
+        found += [
+            f"  gets {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}, "
+            f"{_number(link, 'lost')} lost, {_number(link, 'dropped')} dropped, "
+            f"delay {_milliseconds(link, 'delay')}, up to {_milliseconds(link, 'longest')}"
+            for link in _tables(robot, "links")
+        ]
+        found += [
+            f"  sends {_text(link, 'topic')}: {_count(_number(link, 'messages'), 'message')}, "
+            f"{_number(link, 'dropped')} dropped"
+            for link in _tables(robot, "to_robot")
+        ]
+    return found
+
+
+def _clock(clock: ClockOffset | None) -> str:
+    if clock is None:
+        return "its clock does not answer"
+    return f"clock {clock.offset / 1e9:+.3f} s, round trip {clock.round_trip / 1e6:.1f} ms"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def _number(table: Json, key: str) -> int:
+    found = table.get(key)
+    return int(found) if isinstance(found, (int, float)) and abs(found) < 1e18 else 0
+
+
+def _milliseconds(table: Json, key: str) -> str:
+    found = table.get(key)
+    return f"{found * 1e3:.1f} ms" if isinstance(found, (int, float)) else "?"
+
+
+def _text(table: Json, key: str) -> str:
+    return escaped(str(table.get(key, "?"))[:200])
+
+
+def _tables(table: Json, key: str) -> list[Json]:
+    found = table.get(key)
+    return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.1f} MB" if count >= 100_000 else f"{count} B"

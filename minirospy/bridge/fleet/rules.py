@@ -1,0 +1,218 @@
+"""Which topics and services a gateway passes on, how often, and in which lane; who speaks for a robot. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from fnmatch import fnmatchcase
+
+from minirospy.bridge.access import NameFilter
+from minirospy.bridge.fleet.keys import Claim
+from minirospy.errors import BridgeError
+from minirospy.introspect.snapshot import Snapshot
+from minirospy.names import is_legal_name
+
+__all__ = [
+    "Export",
+    "GatewayRules",
+    "Lane",
+    "Throttle",
+    "exported_services",
+    "exported_topics",
+    "holder",
+    "lane_of_type",
+    "parse_lanes",
+    "parse_rates",
+]
+
+_MOST_HERTZ = 10_000.0
+_LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
+
+
+class Lane(IntEnum):
+    """A priority, each with a queue and a thread of its own: what is slow to send does not hold up a lane before it."""
+
+    TELEOP = 0
+    DATA = 1
+    BULK = 2
+
+
+_TELEOP_TYPES = {
+    "ackermann_msgs/AckermannDrive",
+    "ackermann_msgs/AckermannDriveStamped",
+    "actionlib_msgs/GoalID",
+    "geometry_msgs/Twist",
+    "geometry_msgs/TwistStamped",
+    "sensor_msgs/Joy",
+}
+_BULK_TYPES = {
+    "nav_msgs/OccupancyGrid",
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/Image",
+    "sensor_msgs/PointCloud",
+    "sensor_msgs/PointCloud2",
+    "stereo_msgs/DisparityImage",
+    "theora_image_transport/Packet",
+    "visualization_msgs/MarkerArray",
+}
+
+
+@dataclass(frozen=True)
+class GatewayRules:
+    """What a gateway may pass on, and how. ``rates`` (Hz) and ``lanes`` by patterns of names: the first that matches counts."""
+
+    topics: NameFilter = field(default_factory=NameFilter)
+    services: NameFilter = field(default_factory=NameFilter)
+    parameters: NameFilter = field(default_factory=NameFilter)
+    robots: NameFilter = field(default_factory=NameFilter)
+    rates: Sequence[tuple[str, float]] = ()
+    lanes: Sequence[tuple[str, Lane]] = ()
+    has_frames: bool = False
+
+    def rate(self, topic: str) -> float:
+        """Return the most messages a second of a topic; 0 where it is not limited."""
+        return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
+
+    def lane(self, topic: str, type_: str) -> Lane:
+        """Return the lane of a topic."""
+        named = (lane for pattern, lane in self.lanes if fnmatchcase(topic, pattern))
+        return next(named, lane_of_type(type_))
+
+
+@dataclass(frozen=True)
+class Export:
+    """A topic with ends other than the gateway's own."""
+
+    topic: str
+    type: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+
+
+class Throttle:
+    """Lets at most so many messages a second pass, evenly spaced; 0: all."""
+
+    def __init__(self, hertz: float) -> None:
+        self._period = 1.0 / hertz if hertz else 0.0
+        self._next = 0.0
+
+    def allows(self, now: float) -> bool:
+        """Return whether a message may pass at a time in seconds, which does not go back."""
+        if now < self._next:
+            return False
+        # From the time that was due, so that 30 Hz become 10 Hz and not 7.5; not from far back after a pause.
+        self._next = max(self._next + self._period, now)
+        if self._next <= now:
+            self._next = now + self._period
+        return True
+
+
+def lane_of_type(type_: str) -> Lane:
+    """Return the lane of a type where no rule names the topic."""
+    if type_ in _TELEOP_TYPES:
+        return Lane.TELEOP
+    return Lane.BULK if type_ in _BULK_TYPES else Lane.DATA
+
+
+def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
+    """Return patterns and rates of words such as ``/camera/*=5``. Raise BridgeError."""
+    found = []
+    for word in words:
+        pattern, text = _halves(word, "--rate", "/camera/*=5")
+        try:
+            hertz = float(text)
+        except ValueError:
+            hertz = -1.0
+        if not 0 < hertz <= _MOST_HERTZ:
+            raise BridgeError(f"--rate {word}: [{text}] is not a rate in Hz, as 5 or 0.2")
+        found.append((pattern, hertz))
+    return found
+
+
+def parse_lanes(words: Iterable[str]) -> list[tuple[str, Lane]]:
+    """Return patterns and lanes of words such as ``/arm/*=teleop``. Raise BridgeError."""
+    names = {lane.name.lower(): lane for lane in Lane}
+    found = []
+    for word in words:
+        pattern, text = _halves(word, "--priority", "/arm/*=teleop")
+        if text not in names:
+            raise BridgeError(f"--priority {word}: [{text}] is not one of {', '.join(names)}")
+        found.append((pattern, names[text]))
+    return found
+
+
+def exported_topics(
+    snapshot: Snapshot, own_name: str, allows: Callable[[str], bool], hidden: Iterable[str] = ()
+) -> dict[str, Export]:
+    """Return the topics that a robot shows to others: those with an end other than the gateway's own, of a known type.
+
+    ``hidden``: namespaces of what came from other robots, which is not shown again.
+    """
+    starts = tuple(f"/{name}/" for name in hidden)
+    found = {}
+    for topic in sorted(snapshot.topics):
+        type_ = snapshot.types.get(topic)
+        if type_ is None or not _is_shown(topic, starts) or not allows(topic):
+            continue
+        publishers = _others(snapshot.publishers.get(topic, ()), own_name)
+        subscribers = _others(snapshot.subscribers.get(topic, ()), own_name)
+        if publishers or subscribers:
+            found[topic] = Export(topic, type_, publishers, subscribers)
+    return found
+
+
+def exported_services(
+    snapshot: Snapshot, own_name: str, allows: NameFilter, hidden: Iterable[str] = ()
+) -> dict[str, tuple[str, ...]]:
+    """Return the services that a robot shows to others, with their nodes.
+
+    The two services of each node's loggers are left out, unless a pattern was given.
+    """
+    starts = tuple(f"/{name}/" for name in hidden)
+    every = allows == NameFilter()
+    found = {}
+    for service, nodes in sorted(snapshot.services.items()):
+        others = _others(nodes, own_name)
+        if not others or not _is_shown(service, starts) or not allows(service):
+            continue
+        if not (every and service.endswith(_LOGGER_SERVICES)):
+            found[service] = others
+    return found
+
+
+def holder(claims: Iterable[Claim]) -> Claim | None:
+    """Return the claim that counts where several gateways speak for a robot of one name.
+
+    Of one machine the newest: the gateway was started again, and the old one's token is not gone yet. Of several machines
+    the one that started first, by their own clocks: all that see the same claims choose the same one.
+    """
+    newest: dict[str, Claim] = {}
+    first: dict[str, int] = {}
+    for claim in claims:
+        first[claim.host] = min(claim.start, first.get(claim.host, claim.start))
+        other = newest.get(claim.host)
+        if other is None or (claim.start, claim.gateway) > (other.start, other.gateway):
+            newest[claim.host] = claim
+    return min(newest.values(), key=lambda claim: (first[claim.host], claim.host), default=None)
+
+
+def _halves(word: str, option: str, example: str) -> tuple[str, str]:
+    pattern, equals, text = word.rpartition("=")
+    if not equals or not pattern.startswith(("/", "*")):
+        raise BridgeError(f"{option} {word}: is not of the form GLOB=VALUE, as {example}")
+    return pattern, text
+
+
+def _is_shown(name: str, hidden: tuple[str, ...]) -> bool:
+    return (
+        name.startswith("/")
+        and len(name) <= 256
+        and not name.endswith("/")
+        and is_legal_name(name)
+        and not name.startswith(hidden)
+    )
+
+
+def _others(nodes: Sequence[str], own_name: str) -> tuple[str, ...]:
+    return tuple(node for node in nodes if node != own_name)
