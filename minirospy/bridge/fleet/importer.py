@@ -1,0 +1,267 @@
+"""A control room's side: the robots of the fleet in the local graph, each under its name."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING
+
+from minirospy.aio.raw import RawService
+from minirospy.bridge.fleet.clocks import ClockOffset, Ping, offset_of
+from minirospy.bridge.fleet.contents import FleetContents, Robot
+from minirospy.bridge.fleet.definitions import Definitions
+from minirospy.bridge.fleet.imported_topic import ImportedTopic, Shared
+from minirospy.bridge.fleet.keys import ROOT, ServiceToken, call_key
+from minirospy.bridge.fleet.network import FleetNetwork, Later, QueryFailed
+from minirospy.bridge.fleet.rules import GatewayRules
+from minirospy.bridge.fleet.sender import Intake, Sender
+from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
+from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.wire.tcpros import InterfaceType
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["ImportedRobot", "Importer"]
+
+_log = logging.getLogger(__name__)
+_SETTLE_SECONDS = 0.1
+_LOOK_SECONDS = 1.0
+_CLOCK_SECONDS = 30.0
+_PINGS = 5
+_PING_SECONDS = 5.0
+_CALL_SECONDS = 3600.0
+_WARN_OFFSET = 100_000_000
+_MOST_IMPORTED = 9_000
+"""Names that the importer registers: a master keeps 10,000 for a node."""
+
+
+class ImportedRobot:
+    """A robot whose topics and services are in the local graph."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.since = time.time()
+        self.topics: dict[str, ImportedTopic] = {}
+        self.services: dict[str, tuple[ServiceToken, RawService]] = {}
+        self.clock: ClockOffset | None = None
+        self.measured = 0.0
+
+
+class Importer:
+    """Shows the fleet's robots in the local graph. All on the node's loop, but for messages."""
+
+    def __init__(
+        self,
+        node: Node,
+        network: FleetNetwork,
+        definitions: Definitions,
+        sender: Sender,
+        intake: Intake,
+        gateway: str,
+        own_name: str,
+        rules: GatewayRules,
+        spawn: Callable[[Coroutine[object, object, None]], object],
+        clock: Callable[[], int],
+    ) -> None:
+        """``gateway``: the id of this gateway. ``own_name``: of the robot that it speaks for itself, "" for none."""
+        self.robots: dict[str, ImportedRobot] = {}
+        self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
+        self._node = node
+        self._network = network
+        self._shared = Shared(node, network, definitions, sender, intake, gateway, rules, spawn, clock)
+        self._rules = rules
+        self._spawn = spawn
+        self._clock = clock
+        self._reconciling: asyncio.TimerHandle | None = None
+        self._is_reconciling = False
+        self._is_full = False
+        self._is_closed = False
+        self._watching: asyncio.Task[None] | None = None
+        self._declared: list[Later] = []
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the robots that are shown."""
+        return list(self.robots)
+
+    async def start(self) -> None:
+        """Show robots until :meth:`close`."""
+        self._declared = [
+            self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
+            for kind in ("robot", "topic", "service")
+        ]
+        self._watching = asyncio.ensure_future(self._watch())
+
+    async def close(self) -> None:
+        """Remove all robots. Idempotent."""
+        self._is_closed = True
+        if self._reconciling:
+            self._reconciling.cancel()
+        watching, self._watching = self._watching, None
+        if watching:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+        for declared in self._declared:
+            declared.undeclare()
+        self._declared = []
+        robots, self.robots = self.robots, {}
+        await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
+
+    def _changed(self, key: str, is_there: bool) -> None:
+        changed = self.contents.add(key) if is_there else self.contents.remove(key)
+        if changed:
+            self._soon(_SETTLE_SECONDS)
+
+    def _soon(self, seconds: float) -> None:
+        if self._reconciling is None and not self._is_closed:
+            loop = asyncio.get_running_loop()
+            self._reconciling = loop.call_later(seconds, lambda: self._spawn(self._reconcile()))
+
+    async def _reconcile(self) -> None:
+        """Show what the fleet has now."""
+        if self._is_reconciling:
+            self._reconciling = None
+            self._soon(_SETTLE_SECONDS)
+            return
+        self._is_reconciling = True
+        self._reconciling = None
+        started = time.monotonic()
+        try:
+            await self._show(self.contents.robots())
+        finally:
+            self._is_reconciling = False
+        if time.monotonic() - started > _SETTLE_SECONDS and self._reconciling is not None:
+            # While a thousand robots come, the loop has other work, too.
+            self._reconciling.cancel()
+            self._reconciling = None
+            self._soon(2 * (time.monotonic() - started))
+
+    async def _show(self, robots: dict[str, Robot]) -> None:
+        for name, shown in list(self.robots.items()):
+            robot = robots.get(name)
+            if robot is None or robot.claim != shown.robot.claim:
+                del self.robots[name]
+                _log.info("robot [%s] has left", name)
+                await self._remove(shown)
+        for name, robot in robots.items():
+            known = self.robots.get(name)
+            if known is None:
+                known = self.robots[name] = ImportedRobot(robot)
+                _log.info("robot [%s] has joined", name)
+            if robot.duplicates and robot.duplicates != known.robot.duplicates:
+                _log.warning(
+                    "%d gateways call themselves [%s]: only the one that started first is shown",
+                    len(robot.duplicates) + 1,
+                    name,
+                )
+            known.robot = robot
+            await self._update(known)
+
+    async def _update(self, shown: ImportedRobot) -> None:
+        robot = shown.robot
+        for topic, imported in list(shown.topics.items()):
+            token = robot.topics.get(topic)
+            if token is None or not imported.update(token):
+                await shown.topics.pop(topic).close()
+        for service, (known, offered) in list(shown.services.items()):
+            if robot.services.get(service) != known:
+                del shown.services[service]
+                await offered.close()
+        for topic, token in robot.topics.items():
+            if (
+                topic not in shown.topics
+                and self._rules.topics(f"/{token.robot}{topic}")
+                and self._has_room()
+            ):
+                imported = shown.topics[topic] = ImportedTopic(self._shared, token, lambda: shown.clock)
+                imported.start()
+        for service, service_token in robot.services.items():
+            name = f"/{robot.claim.name}{service}"
+            if service not in shown.services and self._rules.services(name) and self._has_room():
+                offered_now = self._serve(name, service_token)
+                if offered_now:
+                    shown.services[service] = service_token, offered_now
+
+    def _has_room(self) -> bool:
+        count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
+        if count < _MOST_IMPORTED:
+            return True
+        if not self._is_full:
+            self._is_full = True
+            _log.error(
+                "the fleet has more than %d topics and services: the others are not shown. Give --robots or --topics",
+                _MOST_IMPORTED,
+            )
+        return False
+
+    async def _remove(self, shown: ImportedRobot) -> None:
+        await asyncio.gather(
+            *(topic.close() for topic in shown.topics.values()),
+            *(offered.close() for _, offered in shown.services.values()),
+        )
+
+    def _serve(self, name: str, token: ServiceToken) -> RawService | None:
+        key = call_key(token.robot, token.gateway, token.service, token.md5sum)
+
+        async def call(request: bytes) -> bytes:
+            try:
+                return await self._network.query(key, request, seconds=_CALL_SECONDS)
+            except QueryFailed as error:
+                raise ServiceException(f"robot [{token.robot}]: {error}") from error
+
+        try:
+            return self._node.serve_raw(name, InterfaceType(token.type, token.md5sum), call)
+        except ServiceException as error:
+            _log.warning("%s", error)
+            return None
+
+    async def _watch(self) -> None:
+        pause = _LOOK_SECONDS
+        while True:
+            await asyncio.sleep(pause)
+            started = time.monotonic()
+            try:
+                self._look(await self._snapshot())
+            except (MasterUnreachableError, RpcError) as error:
+                _log.debug("the graph cannot be read: %s", error)
+            pause = max(_LOOK_SECONDS, 20 * (time.monotonic() - started))
+            for shown in list(self.robots.values()):
+                is_used = any(topic.is_open for topic in shown.topics.values())
+                if not shown.measured or (is_used and started - shown.measured > _CLOCK_SECONDS):
+                    shown.measured = started
+                    self._spawn(self._measure(shown))
+
+    async def _snapshot(self) -> Snapshot | None:
+        """Return the local graph, where it matters: for topics that a robot both publishes and subscribes to."""
+        if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
+            return await fetch(self._node._node.master)
+        return None
+
+    def _look(self, snapshot: Snapshot | None) -> None:
+        for shown in list(self.robots.values()):
+            for topic in list(shown.topics.values()):
+                topic.look(snapshot)
+
+    async def _measure(self, shown: ImportedRobot) -> None:
+        key = f"{ROOT}/ping/{shown.robot.claim.gateway}"
+        pings = []
+        try:
+            for _ in range(_PINGS):
+                sent = self._clock()
+                answer = await self._network.query(key, seconds=_PING_SECONDS)
+                if len(answer) == 8:
+                    pings.append(Ping(sent, int.from_bytes(answer, "little", signed=True), self._clock()))
+        except QueryFailed as error:
+            _log.debug("%s does not answer: %s", shown.robot.claim.name, error)
+        before, found = shown.clock, offset_of(pings)
+        shown.clock = found or before
+        if found and abs(found.offset) > _WARN_OFFSET + found.round_trip and before is None:
+            _log.warning(
+                "the clock of robot [%s] is %.3f s %s this one: times in its messages are its own",
+                shown.robot.claim.name,
+                abs(found.offset) / 1e9,
+                "ahead of" if found.offset > 0 else "behind",
+            )

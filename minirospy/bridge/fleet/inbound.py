@@ -1,0 +1,132 @@
+"""A topic that a robot subscribes to, and that others publish: published here while they do."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING
+
+from minirospy.aio.raw import raw_class
+from minirospy.aio.topics import Publisher
+from minirospy.bridge.fleet.definitions import Definitions
+from minirospy.bridge.fleet.frames import FrameRewriter, stripped
+from minirospy.bridge.fleet.keys import UNKNOWN_MD5, Offer, TopicToken
+from minirospy.errors import DeserializationError, ROSException
+from minirospy.idl.protocols import Message
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+
+__all__ = ["InboundTopic"]
+
+_log = logging.getLogger(__name__)
+_IDLE_SECONDS = 10.0
+_QUEUE = 100
+_MOST_HELD, _MOST_HELD_BYTES = 100, 16 << 20
+_MOST_OFFERS = 100
+
+
+class InboundTopic:
+    """Publishes what writers send. Messages wait until the robot's subscribers are connected."""
+
+    def __init__(
+        self,
+        node: Node,
+        definitions: Definitions,
+        token: TopicToken,
+        spawn: Callable[[Coroutine[object, object, None]], object],
+        strips_frames: bool,
+    ) -> None:
+        self.token = token
+        self.passed = 0
+        self._node = node
+        self._definitions = definitions
+        self._spawn = spawn
+        self._strips_frames = strips_frames
+        self._change = stripped(token.robot)
+        self._offers: set[Offer] = set()
+        self._last = time.monotonic()
+        self._md5sum = ""
+        self._publisher: Publisher[Message] | None = None
+        self._rewriter: FrameRewriter | None = None
+        self._is_ready = False
+        self._held: deque[bytes] = deque(maxlen=_MOST_HELD)
+
+    @property
+    def is_idle(self) -> bool:
+        """Return whether no writer offers the topic, nor has sent anything for a while."""
+        return not self._offers and time.monotonic() - self._last > _IDLE_SECONDS
+
+    def offer_changed(self, offer: Offer, is_there: bool) -> None:
+        """Publish the topic while a writer offers it."""
+        self._last = time.monotonic()
+        if not is_there:
+            self._offers.discard(offer)
+        elif offer.type == self.token.type and len(self._offers) < _MOST_OFFERS:
+            self._offers.add(offer)
+            self._prepare(offer.md5sum, offer.writer)
+
+    def publish(self, md5sum: str, body: bytes) -> bool:
+        """Publish a message; whether the topic is ready for it. From any thread."""
+        publisher = self._publisher
+        if publisher is None or not self._is_ready or md5sum != self._md5sum:
+            return False
+        self._put(publisher, body)
+        return True
+
+    def hold(self, md5sum: str, writer: str, body: bytes) -> None:
+        """Keep a message that has come before the topic is ready. On the loop."""
+        if self.publish(md5sum, body):
+            return
+        self._prepare(md5sum, writer)
+        if md5sum == self._md5sum:
+            self._held.append(body)
+            while len(self._held) > 1 and sum(map(len, self._held)) > _MOST_HELD_BYTES:
+                self._held.popleft()
+
+    async def close(self) -> None:
+        """Stop publishing. Idempotent."""
+        publisher, self._publisher = self._publisher, None
+        self._is_ready = False
+        if publisher:
+            await publisher.close()
+
+    def _prepare(self, md5sum: str, writer: str) -> None:
+        # The first writer decides, unless the type is known here: a topic has one type.
+        if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
+            return
+        self._md5sum = md5sum
+        self._spawn(self._open(md5sum, writer))
+
+    async def _open(self, md5sum: str, writer: str) -> None:
+        interface = await self._definitions.interface(self.token.type, md5sum, writer)
+        if self._strips_frames:
+            self._rewriter = await self._definitions.rewriter(self.token.type, md5sum)
+        is_latched = any(offer.is_latched for offer in self._offers)
+        try:
+            publisher = self._node.advertise(
+                self.token.topic, raw_class(interface), queue_size=_QUEUE, latch=is_latched
+            )
+        except ValueError as error:
+            _log.warning("%s", error)
+            return
+        self._publisher = publisher
+        await publisher._wait_for_expected()
+        # What was held goes first: until then the intake's thread hands over to `hold`, which is on this loop.
+        for body in self._held:
+            self._put(publisher, body)
+        self._held.clear()
+        self._is_ready = self._publisher is publisher
+
+    def _put(self, publisher: Publisher[Message], body: bytes) -> None:
+        self._last = time.monotonic()
+        try:
+            if self._rewriter:
+                body = self._rewriter.rewritten(body, self._change)
+            publisher.publish_raw(body)
+        except (ROSException, DeserializationError) as error:
+            _log.debug("a message to %s: %s", self.token.topic, error)
+        else:
+            self.passed += 1

@@ -1,0 +1,497 @@
+"""Zenoh, behind one file: the session of a gateway, its tokens, messages and queries.
+
+Zenoh calls back in threads of its own; what this file calls back with comes on the event loop, but for messages, which go
+to a queue first. Its calls may block, so all of them are made in one thread, in order, or in a lane's (:mod:`sender`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import functools
+import importlib
+import ipaddress
+import json
+import logging
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from minirospy.bridge.fleet.rules import Lane
+from minirospy.errors import BridgeError, MinirospyError
+from minirospy.escape import escaped, has_controls
+
+__all__ = [
+    "DEFAULT_ENDPOINT",
+    "DEFAULT_PORT",
+    "Declared",
+    "FleetNetwork",
+    "NetworkOptions",
+    "Outlet",
+    "QueryFailed",
+    "is_loopback_endpoint",
+    "require_zenoh",
+    "to_endpoint",
+]
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+
+DEFAULT_PORT = 7447
+DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+MOST_TEXT = 16 << 20
+"""Bytes of a query or a reply that is read at most: a response of a service, a definition."""
+
+_SESSIONS = 10_000
+_CONNECT_MS = 3000
+_RETRY_SECONDS = 1.0
+_QUERIES = 200
+"""Queries that are answered at the same time; more are refused."""
+
+
+# --- what is used of zenoh, which has no types where it is not installed
+
+
+class _Bytes(Protocol):
+    def to_bytes(self) -> bytes: ...
+
+    def __len__(self) -> int: ...
+
+
+class _Sample(Protocol):
+    key_expr: object
+    payload: _Bytes
+    kind: object
+    attachment: _Bytes | None
+
+
+class _ReplyError(Protocol):
+    payload: _Bytes
+
+
+class _Reply(Protocol):
+    ok: _Sample | None
+    err: _ReplyError | None
+
+
+class _Query(Protocol):
+    key_expr: object
+    payload: _Bytes | None
+
+    def reply(self, key_expr: object, payload: bytes) -> None: ...
+
+    def reply_err(self, payload: bytes) -> None: ...
+
+    def drop(self) -> None: ...
+
+
+class Declared(Protocol):
+    """What has been declared, until it is undeclared."""
+
+    def undeclare(self) -> None: ...
+
+
+class Outlet(Protocol):
+    """A publisher of Zenoh. ``put`` may block."""
+
+    def put(self, payload: bytes, *, attachment: bytes) -> None: ...
+
+    def undeclare(self) -> None: ...
+
+
+class _Liveliness(Protocol):
+    def declare_token(self, key: str) -> Declared: ...
+
+    def declare_subscriber(self, key: str, handler: object, *, history: bool) -> Declared: ...
+
+    def get(self, key: str, handler: object, *, timeout: float) -> None: ...
+
+
+class _Info(Protocol):
+    def routers_zid(self) -> list[object]: ...
+
+    def peers_zid(self) -> list[object]: ...
+
+
+class _Session(Protocol):
+    info: _Info
+
+    def liveliness(self) -> _Liveliness: ...
+
+    def declare_subscriber(self, key: str, handler: object) -> Declared: ...
+
+    def declare_publisher(self, key: str, **options: object) -> Outlet: ...
+
+    def declare_queryable(self, key: str, handler: object, *, complete: bool) -> Declared: ...
+
+    def get(self, key: str, handler: object, **options: object) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class _Config(Protocol):
+    def get_json(self, key: str) -> str: ...
+
+    def insert_json5(self, key: str, value: str) -> None: ...
+
+
+# --- the network
+
+
+@dataclass(frozen=True)
+class NetworkOptions:
+    """Where a gateway connects and listens. Without any it connects to a router of this machine, and listens nowhere.
+
+    ``config``: a file in Zenoh's format, for TLS, users and all else. ``scouts``: whether it looks for others by multicast.
+    """
+
+    connect: tuple[str, ...] = ()
+    listen: tuple[str, ...] = ()
+    config: str = ""
+    scouts: bool = False
+
+
+class QueryFailed(MinirospyError):
+    """A query got no answer, or one that says why it failed."""
+
+
+def to_endpoint(text: str) -> str:
+    """Return an endpoint of Zenoh: HOST and HOST:PORT mean TCP. Raise BridgeError."""
+    if not text or has_controls(text) or " " in text:
+        raise BridgeError(f"[{escaped(text)}] is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
+    if "/" in text:
+        return text
+    has_port = re.search(r"(^[^:]*|\]):\d+$", text)
+    return f"tcp/{text}" if has_port else f"tcp/{text}:{DEFAULT_PORT}"
+
+
+def is_loopback_endpoint(endpoint: str) -> bool:
+    """Return whether an endpoint is on this machine."""
+    address = endpoint.partition("/")[2].partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
+    if address == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return False
+
+
+def require_zenoh() -> None:
+    """Raise BridgeError with what to install where Zenoh's library is missing."""
+    try:
+        importlib.import_module("zenoh")
+    except ImportError as error:
+        raise BridgeError(
+            "the fleet needs the library eclipse-zenoh: python -m pip install 'minirospy[fleet]'"
+        ) from error
+
+
+class FleetNetwork:
+    """A session of Zenoh; made by :meth:`open`. Handlers are called on the loop that opened it."""
+
+    def __init__(self, session: _Session, loop: asyncio.AbstractEventLoop) -> None:
+        self._session = session
+        self._loop = loop
+        self._zenoh = importlib.import_module("zenoh")
+        # One thread: what is declared first is known first on the other side.
+        self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
+        self._answering: set[asyncio.Task[None]] = set()
+        self._is_closed = False
+
+    @classmethod
+    async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
+        """Open a session; ``waits``: until the other end is there. Raise BridgeError where the configuration is not right."""
+        require_zenoh()
+        zenoh = importlib.import_module("zenoh")
+        loop = asyncio.get_running_loop()
+        config = _configured(options)
+        endpoints = ", ".join(json.loads(config.get_json("connect/endpoints") or "[]"))
+        is_reported = False
+        while True:
+            try:
+                return cls(await loop.run_in_executor(None, functools.partial(zenoh.open, config)), loop)
+            except zenoh.ZError as error:
+                text = _one_line(error)
+                if "Unable to connect" not in text:
+                    raise BridgeError(f"the fleet's network cannot be opened: {text}") from error
+                if not waits:
+                    raise BridgeError(
+                        f"nothing of the fleet answers at {endpoints}: give --connect, or start `minirospy fleet router`"
+                    ) from error
+            if not is_reported:
+                _log.warning("nothing of the fleet answers at %s yet. Will keep trying.", endpoints)
+                is_reported = True
+            await asyncio.sleep(_RETRY_SECONDS)
+
+    @property
+    def peers(self) -> int:
+        """The number of routers and gateways that this one is connected to."""
+        if self._is_closed:
+            return 0
+        return len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
+
+    async def close(self) -> None:
+        """End the session, and all that it has declared. Idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        for task in list(self._answering):
+            task.cancel()
+        await asyncio.gather(*self._answering, return_exceptions=True)
+        await self._loop.run_in_executor(self._caller, self._session.close)
+        self._caller.shutdown(wait=False)
+
+    # --- tokens
+
+    def declare_token(self, key: str) -> Later:
+        """Declare that something is there."""
+        return self._declare(lambda: self._session.liveliness().declare_token(key))
+
+    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Later:
+        """Call ``changed(key, is_there)`` for each token that is there, and whenever one comes or goes."""
+        put = self._zenoh.SampleKind.PUT
+
+        def arrived(sample: _Sample) -> None:
+            self._soon(changed, str(sample.key_expr), sample.kind == put)
+
+        return self._declare(
+            lambda: self._session.liveliness().declare_subscriber(
+                pattern, self._direct(arrived), history=True
+            )
+        )
+
+    async def tokens(self, pattern: str, seconds: float) -> list[str]:
+        """Return the keys of the tokens that are there."""
+        found: list[str] = []
+
+        def arrived(reply: _Reply) -> None:
+            if reply.ok is not None:
+                found.append(str(reply.ok.key_expr))
+
+        await self._collected(
+            lambda handler: self._session.liveliness().get(pattern, handler, timeout=seconds), arrived
+        )
+        return found
+
+    # --- messages
+
+    def subscribe(self, key: str, deliver: Callable[[str, bytes, bytes], object]) -> Later:
+        """Call ``deliver(key, message, attachment)`` with each message, in a thread of Zenoh's: it must not block."""
+
+        def arrived(sample: _Sample) -> None:
+            attachment = sample.attachment
+            try:
+                deliver(
+                    str(sample.key_expr),
+                    sample.payload.to_bytes(),
+                    attachment.to_bytes() if attachment else b"",
+                )
+            except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
+                _log.exception("a message of the fleet could not be taken")
+
+        return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived)))
+
+    def outlet(self, key: str, lane: Lane) -> Outlet:
+        """Return a publisher; may block, as its ``put``: for a lane's thread."""
+        zenoh = self._zenoh
+        priorities = {
+            Lane.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
+            Lane.DATA: zenoh.Priority.DATA,
+            Lane.BULK: zenoh.Priority.BACKGROUND,
+        }
+        return self._session.declare_publisher(
+            key,
+            priority=priorities[lane],
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            express=lane is Lane.TELEOP,
+        )
+
+    # --- queries
+
+    def answer(self, pattern: str, handler: Callable[[str, bytes], Awaitable[bytes]]) -> Later:
+        """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason."""
+
+        def arrived(query: _Query) -> None:
+            self._soon(self._start_answer, query, handler)
+
+        return self._declare(
+            lambda: self._session.declare_queryable(pattern, self._direct(arrived), complete=True)
+        )
+
+    async def query(self, key: str, request: bytes = b"", *, seconds: float) -> bytes:
+        """Return the first answer. Raise QueryFailed without any, or where it says why there is none."""
+        found = await self.queries(key, request, seconds=seconds)
+        if not found:
+            raise QueryFailed(f"no answer within {seconds:g} s")
+        answer = next(iter(found.values()))
+        if isinstance(answer, QueryFailed):
+            raise answer
+        return answer
+
+    async def queries(
+        self, pattern: str, request: bytes = b"", *, seconds: float
+    ) -> Mapping[str, bytes | QueryFailed]:
+        """Return all answers by their keys."""
+        found: dict[str, bytes | QueryFailed] = {}
+
+        def arrived(reply: _Reply) -> None:
+            if reply.ok is not None:
+                if len(reply.ok.payload) <= MOST_TEXT:
+                    found[str(reply.ok.key_expr)] = reply.ok.payload.to_bytes()
+            elif reply.err is not None:
+                text = reply.err.payload.to_bytes()[:2000].decode(errors="replace")
+                found.setdefault("", QueryFailed(escaped(text)))
+
+        zenoh = self._zenoh
+        await self._collected(
+            lambda handler: self._session.get(
+                pattern,
+                handler,
+                payload=request,
+                timeout=seconds,
+                target=zenoh.QueryTarget.ALL,
+                priority=zenoh.Priority.DATA_HIGH,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            ),
+            arrived,
+        )
+        return found
+
+    # --- within
+
+    async def _collected(
+        self, start: Callable[[object], object], arrived: Callable[[_Reply], object]
+    ) -> None:
+        """Start a query, and return when its last reply has arrived."""
+        if self._is_closed:
+            raise QueryFailed("the gateway is closed")
+        ended = asyncio.Event()
+        handler = self._zenoh.handlers.Callback(arrived, lambda: self._soon(ended.set), indirect=False)
+        try:
+            await self._loop.run_in_executor(self._caller, start, handler)
+        except self._zenoh.ZError as error:
+            raise QueryFailed(_one_line(error)) from error
+        await ended.wait()
+
+    def _declare(self, declare: Callable[[], Declared]) -> Later:
+        return Later(self._caller, declare, self._zenoh.ZError)
+
+    def _direct(self, function: Callable[..., object]) -> object:
+        """Return a handler that Zenoh calls in its own thread: by default each has a thread to itself."""
+        return self._zenoh.handlers.Callback(function, indirect=False)
+
+    def _start_answer(self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]]) -> None:
+        task = asyncio.ensure_future(self._answer(query, handler))
+        self._answering.add(task)
+        task.add_done_callback(self._answering.discard)
+
+    async def _answer(self, query: _Query, handler: Callable[[str, bytes], Awaitable[bytes]]) -> None:
+        key, payload = str(query.key_expr), query.payload
+        try:
+            if len(self._answering) > _QUERIES:
+                raise QueryFailed(f"the gateway is answering {_QUERIES} other queries")
+            if payload is not None and len(payload) > MOST_TEXT:
+                raise QueryFailed(f"the request has more than {MOST_TEXT} bytes")
+            body = await handler(key, payload.to_bytes() if payload is not None else b"")
+            reply = functools.partial(query.reply, query.key_expr, body)
+        except MinirospyError as error:
+            reply = functools.partial(query.reply_err, str(error).encode())
+        try:
+            with contextlib.suppress(RuntimeError, self._zenoh.ZError):
+                await self._loop.run_in_executor(self._caller, reply)
+        finally:
+            query.drop()
+
+    def _soon(self, function: Callable[..., object], *arguments: object) -> None:
+        """Call a function on the loop, from any thread."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+
+class Later:
+    """Something that is declared in the background, and undeclared after that."""
+
+    def __init__(
+        self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]
+    ) -> None:
+        self._caller = caller
+        self._fault = fault
+        self._declared: Declared | None = None
+        with contextlib.suppress(RuntimeError):
+            caller.submit(self._declare, declare)
+
+    def undeclare(self) -> None:
+        """Undeclare it, in the background. Idempotent."""
+        with contextlib.suppress(RuntimeError):
+            self._caller.submit(self._undeclare)
+
+    def _declare(self, declare: Callable[[], Declared]) -> None:
+        try:
+            self._declared = declare()
+        except self._fault as error:
+            _log.debug("not declared: %s", error)
+
+    def _undeclare(self) -> None:
+        declared, self._declared = self._declared, None
+        if declared is not None:
+            with contextlib.suppress(self._fault):
+                declared.undeclare()
+
+
+def _configured(options: NetworkOptions) -> _Config:
+    """Return Zenoh's configuration: the file's, and what the options say; nothing listens unless one of them says so."""
+    zenoh = importlib.import_module("zenoh")
+    default: _Config = zenoh.Config()
+    config: _Config = default
+    if options.config:
+        if not Path(options.config).is_file():
+            raise BridgeError(f"--config {options.config}: there is no such file")
+        try:
+            config = zenoh.Config.from_file(options.config)
+        except zenoh.ZError as error:
+            raise BridgeError(f"--config {options.config}: {_one_line(error)}") from error
+    untouched: _Config = zenoh.Config()
+
+    def is_set(key: str) -> bool:
+        return bool(options.config) and config.get_json(key) != untouched.get_json(key)
+
+    def put(key: str, value: object) -> None:
+        try:
+            config.insert_json5(key, json.dumps(value))
+        except zenoh.ZError as error:
+            raise BridgeError(f"{key} may not be {value}: {_one_line(error)}") from error
+
+    listens = bool(options.listen) or is_set("listen/endpoints")
+    connects = bool(options.connect) or is_set("connect/endpoints")
+    if options.listen:
+        put("listen/endpoints", list(options.listen))
+    elif not listens:
+        put("listen/endpoints", [])
+    if options.connect:
+        put("connect/endpoints", list(options.connect))
+    elif not (connects or listens or options.scouts):
+        put("connect/endpoints", [DEFAULT_ENDPOINT])
+    if not is_set("mode"):
+        # A router passes on between all that are connected to it; a client has one connection.
+        put("mode", "router" if listens else "peer" if options.scouts else "client")
+    mode = json.loads(config.get_json("mode"))
+    put("scouting/multicast/enabled", options.scouts)
+    # A gateway that loses its router goes on trying; a client without one does not open, and is opened again.
+    for key, value in (
+        ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
+        ("connect/exit_on_failure", mode == "client"),
+        ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
+        ("transport/unicast/max_sessions", _SESSIONS),
+        ("transport/unicast/accept_pending", 1000),
+    ):
+        if not is_set(key):
+            put(key, value)
+    return config
+
+
+def _one_line(error: Exception) -> str:
+    # The line of Zenoh's source in which it arose says nothing to a user.
+    return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

@@ -1,0 +1,168 @@
+"""Gateways on loopback, with real sessions of Zenoh, real masters and nodes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import TransformStamped, Twist
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, SetBoolResponse
+from tf2_msgs.msg import TFMessage
+
+from minirospy.bridge.fleet.rules import GatewayRules
+from minirospy.errors import ServiceException
+from tests.bridge.fleet import SECONDS, Fleet, Place
+
+pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
+
+
+@pytest.fixture
+def fleet() -> Iterator[Fleet]:
+    """Return masters, gateways and nodes on one loop."""
+    running = Fleet()
+    yield running
+    running.close()
+
+
+def collect(fleet: Fleet, place: Place, topic: str, cls: type, name: str = "reader") -> list[Any]:
+    """Subscribe; return the list to which messages are appended."""
+    found: list[Any] = []
+    node = place.node(name)
+
+    async def start() -> None:
+        subscription = await node.subscribe(topic, cls, queue_size=1000)
+
+        async def read() -> None:
+            async for message in subscription:
+                found.append(message)  # noqa: PERF401 - seen by the test meanwhile
+
+        node._spawn(read())
+
+    fleet.run(start())
+    return found
+
+
+def publisher(fleet: Fleet, place: Place, topic: str, cls: type, name: str = "writer", **options: Any) -> Any:
+    node = place.node(name)
+
+    async def start() -> Any:
+        return await node.advertise(topic, cls, **options)
+
+    return fleet.run(start())
+
+
+def test_a_topic_of_a_robot_is_shown_and_passed_on_demand(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    scans = publisher(fleet, robot, "/scan", LaserScan)
+    control.gateway(listens=True)
+    gateway = robot.gateway("robot1")
+    fleet.until_shown(control, "/robot1/scan")
+    assert gateway.exporter is not None
+    assert gateway.exporter.outbound == {}
+
+    found = collect(fleet, control, "/robot1/scan", LaserScan)
+    fleet.run(scans.wait_for_subscribers(1, SECONDS))
+    fleet.run(scans.publish(LaserScan(range_max=3.0)))
+    fleet.until(lambda: found)
+    assert found[0].range_max == 3.0
+    assert found[0]._connection_header["message_definition"]
+
+
+def test_a_command_reaches_the_robot(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    control.gateway(listens=True)
+    robot.gateway("robot1")
+    found = collect(fleet, robot, "/cmd_vel", Twist)
+    fleet.until_shown(control, "/robot1/cmd_vel")
+    commands = publisher(fleet, control, "/robot1/cmd_vel", Twist)
+    fleet.run(commands.wait_for_subscribers(1, SECONDS))
+    message = Twist()
+    message.linear.x = 0.5
+    fleet.run(commands.publish(message))
+    fleet.until(lambda: found)
+    assert found[0].linear.x == 0.5
+
+
+def test_a_service_answers_and_its_error_arrives(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    node = robot.node("lamp")
+
+    async def switch(request: Any) -> SetBoolResponse:
+        if not request.data:
+            raise ServiceException("the lamp is stuck")
+        return SetBoolResponse(True, "on")
+
+    async def serve() -> None:
+        await node.serve("/lamp", SetBool, switch)
+
+    fleet.run(serve())
+    control.gateway(listens=True)
+    robot.gateway("robot1")
+    client = control.node("client")
+    fleet.run(client.wait_for_service("/robot1/lamp", SECONDS))
+    assert fleet.run(client.call("/robot1/lamp", SetBool, True)).message == "on"
+    with pytest.raises(ServiceException, match="the lamp is stuck"):
+        fleet.run(client.call("/robot1/lamp", SetBool, False))
+
+
+def test_latched_topics_reach_those_who_come_later(fleet: Fleet) -> None:
+    robot, first, second = fleet.place(), fleet.place(), fleet.place()
+    maps = publisher(fleet, robot, "/map", OccupancyGrid, latch=True)
+    fleet.run(maps.publish(OccupancyGrid(data=[1, 2, 3])))
+    first.gateway(listens=True)
+    second.gateway()
+    robot.gateway("robot1")
+    for place in (first, second):
+        fleet.until_shown(place, "/robot1/map")
+        found = collect(fleet, place, "/robot1/map", OccupancyGrid)
+        fleet.until(lambda found=found: found)
+        assert list(found[0].data) == [1, 2, 3]
+    again = collect(fleet, first, "/robot1/map", OccupancyGrid, "late")
+    fleet.until(lambda: again)
+    assert len(again) == 1
+
+
+def test_frames_get_the_prefix_of_the_robot(fleet: Fleet) -> None:
+    control = fleet.place()
+    control.gateway(listens=True)
+    found = collect(fleet, control, "/tf_static", TFMessage)
+    for name in ("robot1", "robot2"):
+        robot = fleet.place()
+        statics = publisher(fleet, robot, "/tf_static", TFMessage, latch=True)
+        transform = TransformStamped(child_frame_id="laser")
+        transform.header.frame_id = "base_link"
+        fleet.run(statics.publish(TFMessage([transform])))
+        robot.gateway(name, rules=GatewayRules(has_frames=True))
+
+    def frames() -> set[str]:
+        return {each.child_frame_id for message in found for each in message.transforms}
+
+    fleet.until(lambda: frames() == {"robot1/laser", "robot2/laser"})
+    late = collect(fleet, control, "/tf_static", TFMessage, "late")
+    fleet.until(lambda: late)
+    assert {each.header.frame_id for each in late[0].transforms} == {"robot1/base_link", "robot2/base_link"}
+
+
+def test_strings_flow_both_ways_without_loops(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    control.gateway(listens=True)
+    robot.gateway("robot1")
+    heard = collect(fleet, robot, "/chat", String)
+    said = publisher(fleet, robot, "/chat", String)
+    fleet.until_shown(control, "/robot1/chat")
+    there = collect(fleet, control, "/robot1/chat", String)
+    back = publisher(fleet, control, "/robot1/chat", String)
+    fleet.run(said.wait_for_subscribers(2, SECONDS))
+    # The control room's gateway subscribes once it sees the publisher; the reader of the same room does immediately.
+    fleet.run(back.wait_for_subscribers(2, SECONDS))
+    fleet.run(said.publish("from the robot"))
+    fleet.run(back.publish("from the room"))
+    fleet.until(lambda: len(heard) >= 2 and len(there) >= 2)
+    fleet.run(asyncio.sleep(0.3))
+    assert sorted(each.data for each in heard) == ["from the robot", "from the room"]
+    assert sorted(each.data for each in there) == ["from the robot", "from the room"]
