@@ -81,6 +81,7 @@ COMMANDS = (
     Entry("bridge", "main", "COMMAND", "", "bridge",
           "see the graph in Foxglove, Lichtblick and browsers"),
     Entry("ros2_bridge", "main", "COMMAND", "", "ros2-bridge", "pass topics between ROS 1 and ROS 2"),
+    Entry("fleet", "main", "FAMILY", "", "fleet", "join robots with their own masters over Zenoh"),
     Entry("dashboard", "dashboard", "DASHBOARD", "", "dashboard",
           "console, plots, graph and board in a browser (as rqt)"),
     Entry("doctor", "main", "DOCTOR", "", "doctor",

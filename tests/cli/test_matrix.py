@@ -337,6 +337,7 @@ def test_the_other_name_of_each_command() -> None:
         "complete": "",
         "doctor": "",
         "bridge": "",
+        "fleet": "",
         "dashboard": "",
         "python": "",
     }

@@ -19,6 +19,7 @@ from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.bridge.fleet.sender import Intake, Sender
 from minirospy.errors import MasterUnreachableError, RpcError, ServiceException
 from minirospy.introspect.snapshot import Snapshot, fetch
+from minirospy.wire.header import Header
 from minirospy.wire.tcpros import InterfaceType
 
 if TYPE_CHECKING:
@@ -181,9 +182,7 @@ class Importer:
         for service, service_token in robot.services.items():
             name = f"/{robot.claim.name}{service}"
             if service not in shown.services and self._rules.services(name) and self._has_room():
-                offered_now = self._serve(name, service_token)
-                if offered_now:
-                    shown.services[service] = service_token, offered_now
+                shown.services[service] = service_token, self._serve(name, service_token)
 
     def _has_room(self) -> bool:
         count = sum(len(shown.topics) + len(shown.services) for shown in self.robots.values())
@@ -203,20 +202,16 @@ class Importer:
             *(offered.close() for _, offered in shown.services.values()),
         )
 
-    def _serve(self, name: str, token: ServiceToken) -> RawService | None:
+    def _serve(self, name: str, token: ServiceToken) -> RawService:
         key = call_key(token.robot, token.gateway, token.service, token.md5sum)
 
-        async def call(request: bytes) -> bytes:
+        async def call(request: bytes, _: Header) -> bytes:
             try:
                 return await self._network.query(key, request, seconds=_CALL_SECONDS)
             except QueryFailed as error:
                 raise ServiceException(f"robot [{token.robot}]: {error}") from error
 
-        try:
-            return self._node.serve_raw(name, InterfaceType(token.type, token.md5sum), call)
-        except ServiceException as error:
-            _log.warning("%s", error)
-            return None
+        return RawService(self._node, name, InterfaceType(token.type, token.md5sum), call)
 
     async def _watch(self) -> None:
         pause = _LOOK_SECONDS

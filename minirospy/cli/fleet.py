@@ -1,0 +1,280 @@
+"""`minirospy fleet`: many robots, each with its own master, in one graph. How to use it: docs/fleet.md."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from minirospy.cli.parser import Misuse, Parser
+from minirospy.cli.verbs import Family, Verb
+
+if TYPE_CHECKING:
+    from minirospy.aio.node import Node
+    from minirospy.bridge.fleet.gateway import Gateway
+    from minirospy.bridge.fleet.network import NetworkOptions
+
+__all__ = ["FAMILY", "main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return FAMILY.main(argv)
+
+
+# --- options
+
+
+def _network_options(parser: Parser, *, listens: bool = True) -> None:
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="where to connect, as tcp/HOST:7447 or HOST (tcp/127.0.0.1:7447); may be repeated",
+        completer="nothing",
+    )
+    if listens:
+        parser.add_argument(
+            "--listen",
+            action="append",
+            default=[],
+            metavar="ENDPOINT",
+            help="let others connect, as tcp/0.0.0.0:7447 (nobody can)",
+            completer="nothing",
+        )
+    parser.add_argument(
+        "--config",
+        default="",
+        metavar="FILE",
+        help="configuration of Zenoh (JSON5): TLS, users, access rights",
+        completer="files",
+    )
+    parser.add_argument(
+        "--scout",
+        action="store_true",
+        help="find each other by multicast, in one network; lets others connect",
+    )
+
+
+def _filter_option(parser: Parser, name: str, help: str, completer: str = "nothing") -> None:
+    parser.add_argument(name, action="append", default=[], metavar="GLOB", help=help, completer=completer)
+
+
+def _pass_options(parser: Parser) -> None:
+    _network_options(parser)
+    _filter_option(parser, "--topics", "topics that are passed (all)", "topics")
+    _filter_option(parser, "--services", "services that are passed (all but those of loggers)", "services")
+    _filter_option(parser, "--robots", "robots that are shown here (all)")
+    parser.add_argument(
+        "--rate",
+        action="append",
+        default=[],
+        metavar="GLOB=HZ",
+        help="pass at most so many messages a second, as '/camera/*=5'",
+        completer="nothing",
+    )
+    parser.add_argument(
+        "--priority",
+        action="append",
+        default=[],
+        metavar="GLOB=LANE",
+        help="teleop, data or bulk, as '/arm/*=teleop' (by type)",
+        completer="nothing",
+    )
+
+
+def _gateway_parser() -> Parser:
+    parser = Parser(
+        "minirospy fleet gateway",
+        "Shows this robot's topics and services to the fleet, and passes on those that somebody there uses.",
+    )
+    parser.add_argument(
+        "--name", default="", help="the robot's name; without it this is a control room", completer="nothing"
+    )
+    parser.add_argument(
+        "--import", action="store_true", dest="imports", help="show the other robots here, too"
+    )
+    _pass_options(parser)
+    _filter_option(parser, "--params", "parameters that may be read (all)")
+    parser.add_argument(
+        "--frames",
+        action="store_true",
+        help="put the robot's name before frame ids, and pass /tf and /tf_static under their own names",
+    )
+    return parser
+
+
+def _control_parser() -> Parser:
+    parser = Parser(
+        "minirospy fleet control",
+        "Shows every robot of the fleet in this graph, its topics and services below its name.",
+    )
+    _pass_options(parser)
+    return parser
+
+
+def _router_parser() -> Parser:
+    parser = Parser(
+        "minirospy fleet router",
+        "Passes on between gateways that connect to it, as Zenoh's own router `zenohd` does. Needs no master.",
+    )
+    _network_options(parser)
+    return parser
+
+
+def _status_parser() -> Parser:
+    parser = Parser("minirospy fleet status", "Prints the fleet's robots, links, delays and losses.")
+    _network_options(parser, listens=False)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=3.0,
+        help="how long to wait for answers (3)",
+        completer="nothing",
+    )
+    return parser
+
+
+def _param_parser() -> Parser:
+    parser = Parser("minirospy fleet param", "Prints a robot's parameter as YAML; nothing can be set.")
+    parser.add_argument("robot", completer="nothing")
+    parser.add_argument("parameter", nargs="?", default="/", completer="nothing")
+    _network_options(parser, listens=False)
+    return parser
+
+
+# --- verbs
+
+
+def _gateway(
+    name: str,
+    imports: bool,
+    connect: Sequence[str],
+    listen: Sequence[str],
+    config: str,
+    scout: bool,
+    topics: Sequence[str],
+    services: Sequence[str],
+    robots: Sequence[str],
+    rate: Sequence[str],
+    priority: Sequence[str],
+    params: Sequence[str] = (),
+    frames: bool = False,
+) -> int:
+    network = _network(connect, listen, config, scout)
+
+    from minirospy.bridge.access import NameFilter
+    from minirospy.bridge.fleet.gateway import Gateway, GatewayOptions
+    from minirospy.bridge.fleet.rules import GatewayRules, parse_lanes, parse_rates
+    from minirospy.bridge.serve import run
+
+    rules = GatewayRules(
+        topics=NameFilter.of(topics),
+        services=NameFilter.of(services),
+        parameters=NameFilter.of(params),
+        robots=NameFilter.of(robots),
+        rates=parse_rates(rate),
+        lanes=parse_lanes(priority),
+        has_frames=frames,
+    )
+    options = GatewayOptions(name, imports or not name, network, rules)
+
+    async def start(node: Node) -> Gateway:
+        # What the gateway logs goes where the node's lines go.
+        logging.getLogger("minirospy.bridge.fleet").parent = node.log
+        return Gateway(node, options)
+
+    def started(gateway: Gateway) -> None:
+        shown = f"robot [{name}] is in the fleet" if name else "the fleet's robots are shown here"
+        gateway.node.log.info("%s (gateway %s)", shown, gateway.id)
+
+    return run("fleet_gateway" if name else "fleet_control", (), start, started)
+
+
+def _control(
+    connect: Sequence[str],
+    listen: Sequence[str],
+    config: str,
+    scout: bool,
+    topics: Sequence[str],
+    services: Sequence[str],
+    robots: Sequence[str],
+    rate: Sequence[str],
+    priority: Sequence[str],
+) -> int:
+    return _gateway("", True, connect, listen, config, scout, topics, services, robots, rate, priority)
+
+
+def _router(connect: Sequence[str], listen: Sequence[str], config: str, scout: bool) -> int:
+    from minirospy.bridge.fleet.network import DEFAULT_ENDPOINT
+    from minirospy.bridge.fleet.router import run_router
+
+    network = _network(connect, listen or ([] if config else [DEFAULT_ENDPOINT]), config, scout)
+    return run_router(network, lambda text: print(text, flush=True))
+
+
+def _status(connect: Sequence[str], config: str, scout: bool, json: bool, seconds: float) -> int:
+    if not 0.1 <= seconds <= 60.0:
+        raise Misuse(f"--seconds {seconds:g} is not between 0.1 and 60")
+    network = _network(connect, (), config, scout)
+
+    from minirospy.bridge.fleet.inquiry import fleet_status, inquire
+    from minirospy.bridge.fleet.report import as_json, lines
+
+    robots, controls = inquire(network, lambda session: fleet_status(session, seconds))
+    if json:
+        print(as_json(robots, controls))
+        return 0
+    for line in lines(robots, controls):
+        print(line)
+    return 0
+
+
+def _param(robot: str, parameter: str, connect: Sequence[str], config: str, scout: bool) -> int:
+    network = _network(connect, (), config, scout)
+
+    import yaml
+
+    from minirospy.bridge.fleet.inquiry import inquire, robot_parameter
+
+    value = inquire(network, lambda session: robot_parameter(session, robot, parameter, 5.0))
+    print(yaml.safe_dump(value, allow_unicode=True).removesuffix("...\n"), end="")
+    return 0
+
+
+def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
+    """Return where to connect and listen. Raise BridgeError without the library, Misuse on what may not be."""
+    from minirospy.bridge.fleet.network import (
+        NetworkOptions,
+        is_loopback_endpoint,
+        require_zenoh,
+        to_endpoint,
+    )
+    from minirospy.environment import Environment
+
+    require_zenoh()
+    options = NetworkOptions(
+        tuple(map(to_endpoint, connect)), tuple(map(to_endpoint, listen)), config, scouts
+    )
+    if Environment.read().local:
+        beyond = [each for each in (*options.connect, *options.listen) if not is_loopback_endpoint(each)]
+        if beyond or scouts or config:
+            what = beyond[0] if beyond else "--scout" if scouts else "--config"
+            raise Misuse(f"MINIROSPY_LOCAL=1 keeps all on this machine: {what} does not")
+    return options
+
+
+FAMILY = Family(
+    "minirospy fleet",
+    "minirospy fleet joins robots, each with its own master, into one graph over Zenoh.",
+    (
+        Verb("gateway", "show this robot to the fleet: gateway --name robot1", _gateway_parser, _gateway),
+        Verb("control", "show the fleet's robots in this graph", _control_parser, _control),
+        Verb("router", "pass on between gateways that connect to it", _router_parser, _router),
+        Verb("status", "print robots, links, delays, losses", _status_parser, _status),
+        Verb("param", "print a robot's parameter: param robot1 /speed", _param_parser, _param),
+    ),
+    summary="join robots with their own masters over Zenoh",
+)

@@ -1,0 +1,512 @@
+"""What happens to a fleet when something breaks, lies or floods: each has the result that docs/fleet.md says."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int64, String
+
+from minirospy.bridge.fleet.gateway import Gateway
+from minirospy.bridge.fleet.inquiry import fleet_status
+from minirospy.bridge.fleet.keys import ROOT, Claim, claim_key, in_key
+from minirospy.bridge.fleet.network import FleetNetwork, NetworkOptions
+from minirospy.bridge.fleet.rules import GatewayRules, parse_rates
+from minirospy.errors import BridgeError, ServiceException
+from tests.bridge.fleet import SECONDS, Fleet, Place
+from tests.bridge.test_fleet_gateways import collect, fleet, publisher
+from tests.conftest import free_port
+
+pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
+
+__all__ = ["fleet"]
+
+
+class Proxy:
+    """A TCP proxy, which can stop passing bytes without closing anything, as a link that is cut."""
+
+    def __init__(self, fleet: Fleet, to: str) -> None:
+        self._fleet = fleet
+        self._to = int(to.rpartition(":")[2])
+        self._open = asyncio.Event()
+        self._open.set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._server = fleet.run(self._start())
+        self.endpoint = f"tcp/127.0.0.1:{self._server.sockets[0].getsockname()[1]}"
+
+    def cut(self) -> None:
+        self._fleet.call(self._open.clear)
+
+    def mend(self) -> None:
+        self._fleet.call(self._open.set)
+
+    async def close(self) -> None:
+        self._server.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _start(self) -> Any:
+        return await asyncio.start_server(self._accept, "127.0.0.1", 0)
+
+    async def _accept(self, reader: Any, writer: Any) -> None:
+        try:
+            reader2, writer2 = await asyncio.open_connection("127.0.0.1", self._to)
+        except OSError:
+            writer.close()
+            return
+        for one, other in ((reader, writer2), (reader2, writer)):
+            task = asyncio.ensure_future(self._pass(one, other))
+            self._tasks.add(task)
+
+    async def _pass(self, reader: Any, writer: Any) -> None:
+        try:
+            while data := await reader.read(1 << 16):
+                await self._open.wait()
+                writer.write(data)
+                await writer.drain()
+        except OSError:
+            pass
+        finally:
+            writer.close()
+
+
+@pytest.fixture
+def quick(tmp_path: Path) -> str:
+    """Return a configuration of Zenoh in which a link that says nothing for two seconds is lost."""
+    file = tmp_path / "quick.json5"
+    file.write_text("{ transport: { link: { tx: { lease: 2000 } } } } // of a test")
+    return str(file)
+
+
+def gateway_of(place: Place, name: str, network: NetworkOptions) -> Gateway:
+    from minirospy.bridge.fleet.gateway import GatewayOptions
+
+    gateway = Gateway(
+        place.node(f"fleet_{name or 'control'}"), GatewayOptions(name, imports=not name, network=network)
+    )
+    place.fleet.gateways.append(gateway)
+    place.fleet.run(gateway.start())
+    return gateway
+
+
+def test_a_gateway_that_ends_takes_its_robot_away_until_it_is_back(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    strings = publisher(fleet, robot, "/chat", String)
+    control.gateway(listens=True)
+    gateway = robot.gateway("robot1")
+    found = collect(fleet, control, "/robot1/chat", String)
+    fleet.run(strings.wait_for_subscribers(1, SECONDS))
+    fleet.stop(gateway)
+    fleet.until(lambda: fleet.gateways[0].importer.robots == {})  # type: ignore[union-attr]
+    assert "/robot1/chat" not in {topic for topic, _ in fleet.run(control._state())[0]}
+
+    fleet.until(lambda: not strings.num_connections)
+    robot.gateway("robot1")
+    fleet.run(strings.wait_for_subscribers(1, SECONDS))
+    fleet.run(strings.publish("again"))
+    fleet.until(lambda: [each.data for each in found] == ["again"])
+
+
+def test_a_router_that_is_lost_and_comes_back(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    strings = publisher(fleet, robot, "/chat", String)
+    options = NetworkOptions(listen=(fleet.endpoint,))
+    router = fleet.run(FleetNetwork.open(options))
+    try:
+        importer = control.gateway().importer
+        robot.gateway("robot1")
+        found = collect(fleet, control, "/robot1/chat", String)
+        fleet.run(strings.wait_for_subscribers(1, SECONDS))
+        fleet.run(router.close())
+        assert importer is not None
+        fleet.until(lambda: not importer.robots)
+        router = fleet.run(FleetNetwork.open(options))
+        fleet.until_shown(control, "/robot1/chat")
+        fleet.run(strings.wait_for_subscribers(1, SECONDS))
+
+        async def publish() -> None:
+            while not found:
+                await strings.publish("again")
+                await asyncio.sleep(0.05)
+
+        fleet.run(publish())
+    finally:
+        fleet.run(router.close())
+
+
+def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> None:
+    robot, control = fleet.place(), fleet.place()
+    strings = publisher(fleet, robot, "/map", String, latch=True)
+    fleet.run(strings.publish("the map"))
+    importer = gateway_of(control, "", NetworkOptions(listen=(fleet.endpoint,), config=quick)).importer
+    assert importer is not None
+    proxy = Proxy(fleet, fleet.endpoint)
+    try:
+        gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=quick))
+        found = collect(fleet, control, "/robot1/map", String)
+        fleet.until(lambda: len(found) == 1)
+
+        proxy.cut()
+        fleet.until(lambda: not importer.robots)
+        proxy.mend()
+        # The subscriber gets the latched message again, as from a publisher that was started again.
+        fleet.until(lambda: len(found) == 2)
+    finally:
+        fleet.run(proxy.close())
+
+
+def test_a_call_ends_when_the_robot_is_lost(fleet: Fleet, quick: str) -> None:
+    from std_srvs.srv import Trigger
+
+    robot, control = fleet.place(), fleet.place()
+    called = asyncio.Event()
+
+    async def never(_: object) -> None:
+        called.set()
+        await asyncio.sleep(3600)
+
+    node = robot.node("slow")
+
+    async def serving() -> None:
+        await node.serve("/slow", Trigger, never)
+
+    fleet.run(serving())
+    gateway_of(control, "", NetworkOptions(listen=(fleet.endpoint,), config=quick))
+    gateway = gateway_of(robot, "robot1", NetworkOptions(connect=(fleet.endpoint,), config=quick))
+    client = control.node("client")
+    fleet.run(client.wait_for_service("/robot1/slow", SECONDS))
+
+    async def call() -> str:
+        calling = asyncio.ensure_future(client.call("/robot1/slow", Trigger))
+        await called.wait()
+        fleet.gateways.remove(gateway)
+        await gateway.close()
+        try:
+            await calling
+        except ServiceException as error:
+            return str(error)
+        return ""
+
+    assert "robot1" in fleet.run(call())
+
+
+def test_a_name_belongs_to_the_machine_that_came_first(fleet: Fleet) -> None:
+    first, second, control = fleet.place(), fleet.place(), fleet.place()
+    publisher(fleet, first, "/first", String)
+    publisher(fleet, second, "/second", String)
+    importer = control.gateway(listens=True).importer
+    assert importer is not None
+    one = first.gateway("robot1", host="a" * 16)
+    fleet.until_shown(control, "/robot1/first")
+    other = second.gateway("robot1", host="b" * 16)
+    fleet.until(lambda: importer.robots["robot1"].robot.duplicates == (other.claim,))
+    assert other.exporter is not None
+    fleet.until(lambda: other.exporter.duplicates == (one.claim,))
+    assert "/robot1/second" not in control.names()
+
+    fleet.stop(one)
+    fleet.until_shown(control, "/robot1/second")
+    fleet.until_gone(control, "/robot1/first")
+
+
+def test_a_clock_that_differs_is_measured(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    numbers = publisher(fleet, robot, "/count", Int64)
+    importer = control.gateway(listens=True).importer
+    assert importer is not None
+    robot.gateway("robot1", clock=lambda: time.time_ns() + 3_600_000_000_000)
+    collect(fleet, control, "/robot1/count", Int64)
+    fleet.run(numbers.wait_for_subscribers(1, SECONDS))
+    fleet.until(lambda: importer.robots["robot1"].clock)
+    shown = importer.robots["robot1"]
+    assert shown.clock is not None
+    assert abs(shown.clock.offset - 3_600_000_000_000) <= shown.clock.round_trip
+
+    fleet.run(numbers.publish(1))
+    fleet.until(lambda: shown.topics["/count"].delay.count)
+    assert shown.topics["/count"].delay.longest < 60_000_000_000
+
+
+def test_a_robot_that_floods_does_not_stop_another(fleet: Fleet) -> None:
+    wild, calm, control = fleet.place(), fleet.place(), fleet.place()
+    images = publisher(fleet, wild, "/image", Image, queue_size=2)
+    numbers = publisher(fleet, calm, "/count", Int64)
+    importer = control.gateway(listens=True).importer
+    assert importer is not None
+    wild.gateway("wild")
+    calm.gateway("calm")
+    seen = collect(fleet, control, "/wild/image", Image, "viewer")
+    found = collect(fleet, control, "/calm/count", Int64)
+    fleet.run(images.wait_for_subscribers(1, SECONDS))
+    fleet.run(numbers.wait_for_subscribers(1, SECONDS))
+    image = Image(data=bytes(300_000))
+
+    async def both() -> None:
+        for number in range(50):
+            for _ in range(10):
+                await images.publish(image)
+            await numbers.publish(number)
+            await asyncio.sleep(0.005)
+
+    fleet.run(both())
+    fleet.until(lambda: len(found) == 50)
+    assert [each.data for each in found] == list(range(50))
+    assert len(seen) <= 500
+
+
+def test_a_rate_limit_holds_back_at_the_robot(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    numbers = publisher(fleet, robot, "/count", Int64)
+    control.gateway(listens=True)
+    gateway = robot.gateway("robot1", rules=GatewayRules(rates=parse_rates(["/count=0.01"])))
+    found = collect(fleet, control, "/robot1/count", Int64)
+    fleet.run(numbers.wait_for_subscribers(1, SECONDS))
+
+    async def publish() -> None:
+        for number in range(20):
+            await numbers.publish(number)
+
+    fleet.run(publish())
+    assert gateway.exporter is not None
+    outflow = gateway.exporter.outbound["/count"].outflow
+    fleet.until(lambda: outflow.throttled == 19)
+    fleet.until(lambda: found)
+    assert [each.data for each in found] == [0]
+
+
+def test_what_is_not_of_the_form_is_left_out(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    found = collect(fleet, robot, "/chat", String)
+    secret = collect(fleet, robot, "/secret", String, "other")
+    importer = control.gateway(listens=True).importer
+    assert importer is not None
+    gateway = robot.gateway("robot1", rules=GatewayRules(topics=lambda name: name == "/chat"))  # type: ignore[arg-type]
+    fleet.until_shown(control, "/robot1/chat")
+    stranger = fleet.run(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
+    try:
+        md5 = String._md5sum
+        fleet.call(
+            lambda: [
+                stranger.declare_token(f"{ROOT}/{key}")
+                for key in ("robot/1/x/y/z", "topic/a", "robot/evil/x/y", "service/robot1/a/b/c/d")
+            ]
+        )
+        ends = ("robot1", gateway.id)
+        for key, body in (
+            (in_key(*ends, md5, "/secret", "0" * 16), b"\3\0\0\0abc"),
+            (in_key(*ends, "0" * 32, "/chat", "0" * 16), b"\3\0\0\0abc"),
+            (in_key(*ends, md5, "/unknown", "0" * 16), b"\3\0\0\0abc"),
+            (f"{ROOT}/in/robot1/{gateway.id}/nonsense", b""),
+            (in_key(*ends, md5, "/chat", "0" * 16), b"\3\0\0\0abc"),
+        ):
+            stranger._session.put(key, body)  # type: ignore[attr-defined]
+        fleet.until(lambda: found)
+        assert [each.data for each in found] == ["abc"]
+        assert secret == []
+        fleet.until(lambda: importer.contents.refused >= 4)
+        assert list(importer.robots) == ["robot1"]
+        status = fleet.run(fleet_status(stranger, 5.0))
+        assert status[0][0].status["topics"] == 1
+    finally:
+        fleet.run(stranger.close())
+
+
+def test_a_user_without_the_password_is_refused(fleet: Fleet, tmp_path: Path) -> None:
+    (tmp_path / "users.txt").write_text("robot1:right\n")
+
+    def config(name: str, user: dict[str, str]) -> str:
+        file = tmp_path / f"{name}.json5"
+        file.write_text(json.dumps({"transport": {"auth": {"usrpwd": user}}}))
+        return str(file)
+
+    server = config(
+        "server", {"user": "control", "password": "x", "dictionary_file": str(tmp_path / "users.txt")}
+    )
+    control, robot = fleet.place(), fleet.place()
+    publisher(fleet, robot, "/chat", String)
+    gateway_of(control, "", NetworkOptions(listen=(fleet.endpoint,), config=server))
+    wrong = config("wrong", {"user": "robot1", "password": "wrong"})
+    with pytest.raises(BridgeError):
+        fleet.run(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,), config=wrong), waits=False))
+    right = config("right", {"user": "robot1", "password": "right"})
+    gateway_of(robot, "robot1", NetworkOptions(connect=(fleet.endpoint,), config=right))
+    fleet.until_shown(control, "/robot1/chat")
+
+
+def test_nothing_listens_without_a_word(fleet: Fleet, quick: str) -> None:
+    import psutil
+
+    def ports() -> set[tuple[str, int]]:
+        return {
+            each.laddr
+            for each in psutil.Process().net_connections(kind="inet")
+            if each.status == "LISTEN" or each.type == 2
+        }
+
+    router = fleet.run(FleetNetwork.open(NetworkOptions(listen=(fleet.endpoint,))))
+    before = ports()
+    for options in (NetworkOptions((fleet.endpoint,)), NetworkOptions((fleet.endpoint,), config=quick)):
+        session = fleet.run(FleetNetwork.open(options))
+        assert ports() == before
+        fleet.run(session.close())
+    fleet.run(router.close())
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [("{", "--config .*bad.json5: "), ('{ mode: "nonsense" }', "--config .*bad.json5: ")],
+)
+def test_a_bad_configuration_is_one_line(fleet: Fleet, tmp_path: Path, text: str, error: str) -> None:
+    file = tmp_path / "bad.json5"
+    file.write_text(text)
+    with pytest.raises(BridgeError, match=error) as caught:
+        fleet.run(FleetNetwork.open(NetworkOptions(config=str(file))))
+    assert "\n" not in str(caught.value)
+
+
+# --- processes
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Return a function that starts `minirospy fleet`; the processes are ended with the test."""
+    running: list[subprocess.Popen[str]] = []
+
+    def starting(*words: str, **environ: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "minirospy", "fleet", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env={**os.environ, **environ},
+        )
+        running.append(process)
+        return process
+
+    yield starting
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
+    text, _ = process.communicate(timeout=SECONDS)
+    return process.returncode, text
+
+
+def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subprocess.Popen[str]]) -> None:
+    robot, control = fleet.place(), fleet.place()
+    publisher(fleet, robot, "/chat", String)
+    endpoint = f"127.0.0.1:{free_port()}"
+    # The gateways come before their router.
+    gateway = start("gateway", "--name", "robot1", "--connect", endpoint, ROS_MASTER_URI=robot.uri)
+    room = start("control", "--connect", endpoint, ROS_MASTER_URI=control.uri)
+    router = start("router", "--listen", endpoint)
+    assert router.stdout is not None
+    assert router.stdout.readline() == f"router of the fleet at tcp/{endpoint}\n"
+    fleet.until_shown(control, "/robot1/chat")
+
+    code, text = ended(start("status", "--connect", endpoint))
+    assert code == 0
+    assert text.startswith("1 robot, 1 control room\nrobot1 (")
+    assert "1 topic, 0 services, clock " in text
+    fleet.run(robot.nodes[0].set_param("/speed", 1.5))
+    assert ended(start("param", "robot1", "/speed", "--connect", endpoint)) == (0, "1.5\n")
+    code, text = ended(start("param", "robot1", "/nothing", "--connect", endpoint))
+    assert (code, text) == (1, "minirospy fleet: ERROR: robot [robot1]: Parameter [/nothing] is not set\n")
+
+    gateway.kill()
+    fleet.until_gone(control, "/robot1/chat")
+    for process in (room, router):
+        process.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
+    if sys.platform != "win32":
+        assert ended(room)[0] == 0
+        assert ended(router)[0] == 0
+
+
+def test_a_gateway_that_waits_for_its_router_can_be_ended(
+    fleet: Fleet, start: Callable[..., subprocess.Popen[str]]
+) -> None:
+    robot = fleet.place()
+    endpoint = f"127.0.0.1:{free_port()}"
+    gateway = start("gateway", "--name", "robot1", "--connect", endpoint, ROS_MASTER_URI=robot.uri)
+    assert gateway.stdout is not None
+    assert f"nothing of the fleet answers at tcp/{endpoint} yet" in gateway.stdout.readline()
+    gateway.send_signal(signal.SIGTERM)
+    assert ended(gateway)[0] == (1 if sys.platform == "win32" else 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "error"),
+    [
+        (("gateway", "--name", "1robot"), 1, "[1robot] cannot be a robot's name"),
+        (("gateway", "--rate", "/scan=fast"), 1, "--rate /scan=fast: [fast] is not a rate in Hz"),
+        (("control", "--priority", "/scan=high"), 1, "[high] is not one of teleop, data, bulk"),
+        (("status", "--connect", "127.0.0.1:1"), 1, "nothing of the fleet answers at tcp/127.0.0.1:1"),
+        (("status", "--seconds", "0"), 2, "--seconds 0 is not between 0.1 and 60"),
+        (("router", "--listen", "nonsense/x"), 1, "minirospy fleet: ERROR: "),
+        (("control", "--config", "nothing.json5"), 1, "--config nothing.json5: there is no such file"),
+    ],
+)
+def test_usage_errors_are_one_line(
+    master: str, start: Callable[..., subprocess.Popen[str]], words: tuple[str, ...], code: int, error: str
+) -> None:
+    found, text = ended(start(*words))
+    assert found == code
+    assert error in text
+    assert "Traceback" not in text
+
+
+def test_a_local_process_connects_to_nobody_else(
+    master: str, start: Callable[..., subprocess.Popen[str]]
+) -> None:
+    for words in (("control", "--listen", "0.0.0.0"), ("control", "--scout")):
+        code, text = ended(start(*words, MINIROSPY_LOCAL="1"))
+        assert code == 2
+        assert "MINIROSPY_LOCAL=1 keeps all on this machine" in text
+
+
+def test_the_missing_library_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from minirospy.cli.fleet import main
+
+    def missing(name: str, *_: object) -> object:
+        if name == "zenoh":
+            raise ImportError(name=name)
+        return found(name)
+
+    found = importlib.import_module
+    monkeypatch.setattr("minirospy.bridge.fleet.network.importlib.import_module", missing)
+    assert main(["status"]) == 1
+    assert "python -m pip install 'minirospy[fleet]'" in capsys.readouterr().err
+
+
+def test_an_older_claim_takes_a_name(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    publisher(fleet, robot, "/chat", String)
+    importer = control.gateway(listens=True).importer
+    assert importer is not None
+    gateway = robot.gateway("robot1")
+    fleet.until_shown(control, "/robot1/chat")
+    stranger = fleet.run(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
+    claim = Claim("robot1", "0" * 16, 1, "0" * 16)
+    token = fleet.call(lambda: stranger.declare_token(claim_key(claim)))
+    fleet.until(lambda: "robot1" in importer.robots and importer.robots["robot1"].robot.claim == claim)
+    assert gateway.exporter is not None
+    fleet.until(lambda: gateway.exporter.duplicates)
+    fleet.call(token.undeclare)
+    fleet.until_shown(control, "/robot1/chat")
+    fleet.run(stranger.close())
