@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal, FibonacciResult
 from geometry_msgs.msg import TransformStamped, Twist
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
@@ -14,8 +15,10 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
+from minirospy.actionlib.aio import ActionClient, ActionServer, GoalError
 from minirospy.bridge.fleet.rules import GatewayRules
 from minirospy.errors import ServiceException
+from minirospy.idl.load import class_from_text
 from tests.bridge.fleet import SECONDS, Fleet, Place
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
@@ -166,3 +169,75 @@ def test_strings_flow_both_ways_without_loops(fleet: Fleet) -> None:
     fleet.run(asyncio.sleep(0.3))
     assert sorted(each.data for each in heard) == ["from the robot", "from the room"]
     assert sorted(each.data for each in there) == ["from the robot", "from the room"]
+
+
+def test_a_type_that_is_not_installed_passes(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    text = "int8 x\nstd_msgs/String[] words\n" + "=" * 80 + "\nMSG: std_msgs/String\nstring data\n"
+    cls = class_from_text("my_msgs/Thing", text)
+    things = publisher(fleet, robot, "/things", cls)
+    control.gateway(listens=True)
+    robot.gateway("robot1")
+    fleet.until_shown(control, "/robot1/things")
+    found = collect(fleet, control, "/robot1/things", cls)
+    fleet.run(things.wait_for_subscribers(1, SECONDS))
+    fleet.run(things.publish(5, [String("a")]))
+    fleet.until(lambda: found)
+    assert (found[0].x, found[0].words[0].data) == (5, "a")
+    assert found[0]._connection_header["message_definition"] == text
+
+
+def test_an_action_runs_on_a_robot_and_is_cancelled(fleet: Fleet) -> None:
+    robot, control = fleet.place(), fleet.place()
+    control.gateway(listens=True)
+    robot.gateway("robot1")
+    server_node, client_node = robot.node("server"), control.node("client")
+
+    async def execute(goal: Any) -> Any:
+        await goal.publish_feedback(sequence=[0, 1])
+        if goal.request.order > 10:
+            await asyncio.sleep(3600)
+        return FibonacciResult(sequence=[0, 1, 1])
+
+    async def act() -> None:
+        async with (
+            ActionServer(server_node, "fibonacci", FibonacciAction, execute),
+            ActionClient(client_node, "robot1/fibonacci", FibonacciAction) as client,
+        ):
+            await client.wait_for_server(SECONDS)
+            goal = client.send(FibonacciGoal(order=3))
+            assert list((await anext(aiter(goal))).sequence) == [0, 1]
+            assert list((await goal).sequence) == [0, 1, 1]
+            endless = client.send(FibonacciGoal(order=100))
+            await anext(aiter(endless))
+            endless.cancel()
+            with pytest.raises(GoalError):
+                await endless
+
+    fleet.run(act())
+
+
+def test_a_robot_sees_the_control_room_where_it_imports(fleet: Fleet) -> None:
+    robot, room = fleet.place(), fleet.place()
+    node = room.node("office")
+
+    async def grant(_: Any) -> SetBoolResponse:
+        return SetBoolResponse(True, "granted")
+
+    async def serve() -> None:
+        await node.serve("/door", SetBool, grant)
+
+    fleet.run(serve())
+    news = publisher(fleet, room, "/news", String, latch=True)
+    fleet.run(news.publish("hello robots"))
+    room.gateway("base", listens=True, imports=True)
+    robot.gateway("robot1", imports=True)
+    found = collect(fleet, robot, "/base/news", String)
+    fleet.until(lambda: found)
+    client = robot.node("client")
+    fleet.run(client.wait_for_service("/base/door", SECONDS))
+    assert fleet.run(client.call("/base/door", SetBool, True)).message == "granted"
+    fleet.run(asyncio.sleep(3))
+    # What comes from the other side is not shown to it again.
+    assert not {name for name in room.names() if name.startswith("/robot1/base")}
+    assert not {name for name in robot.names() if name.startswith("/base/robot1")}
