@@ -254,7 +254,7 @@ def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts:
     )
     from minirospy.environment import Environment
 
-    require_zenoh()
+    require_zenoh(has_many_links=bool(listen or config))
     options = NetworkOptions(
         tuple(map(to_endpoint, connect)), tuple(map(to_endpoint, listen)), config, scouts
     )
