@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-MOST_BYTES = 3_200_000
+MOST_BYTES = 3_000_000
 
 USE = """
 import site, sys
