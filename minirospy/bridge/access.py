@@ -51,6 +51,8 @@ class Grant(Enum):
 
     READ = "read-only"
     WRITE = "read-write"
+    OWN = "read-write, with the token"
+    """It may also start programs and open files of the user who runs the server: it was given that user's token."""
 
 
 class Refusal(NamedTuple):
@@ -140,7 +142,7 @@ class Access:
         # Both are compared, so that the time of the answer says nothing.
         is_write = bool(self.write_token) and hmac.compare_digest(given, self.write_token.encode())
         is_read = bool(self.read_token) and hmac.compare_digest(given, self.read_token.encode())
-        return Grant.WRITE if is_write else Grant.READ if is_read else None
+        return Grant.OWN if is_write else Grant.READ if is_read else None
 
     def _knows_host(self, host: str) -> bool:
         name = _host_name(host)

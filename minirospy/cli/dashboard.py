@@ -297,7 +297,6 @@ def _serve(
     from minirospy.bridge.addresses import host_names
     from minirospy.bridge.bridge import BridgeOptions
     from minirospy.bridge.serve import run
-    from minirospy.bridge.tokens import Tokens, kept_tokens
     from minirospy.dashboard.bag_folder import BagFolder
     from minirospy.dashboard.dashboard import PORT, Dashboard
     from minirospy.environment import Environment
@@ -310,10 +309,10 @@ def _serve(
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
     if not is_loopback(address) and not listen:
         raise Misuse(f"--address {address} lets other machines connect: add --listen")
-    tokens = kept_tokens(Environment.read().home) if listen else Tokens("", "")
+    tokens = _tokens(Environment.read().home, must_be_kept=listen)
     access = Access(
         hosts=tuple(host_names()),
-        read_token=tokens.read,
+        read_token=tokens.read if listen or read_only else "",
         write_token="" if read_only else tokens.write,
         requires_token=listen,
         default_is_read=read_only,
@@ -369,6 +368,23 @@ def _serve(
         )
 
     return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
+
+
+def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
+    """Return this user's tokens; where they cannot be kept in ROS_HOME, new ones, unless they have to be the same next time.
+
+    On loopback, too, the page needs the token to start programs and to open files: other users of the machine reach it.
+    """
+    from minirospy.bridge.access import new_token
+    from minirospy.bridge.tokens import Tokens, kept_tokens
+    from minirospy.errors import BridgeError
+
+    try:
+        return kept_tokens(home)
+    except BridgeError:
+        if must_be_kept:
+            raise
+        return Tokens(new_token(), new_token())
 
 
 def _announce(

@@ -5,7 +5,8 @@ play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {t
 thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
 ``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the message of the moment, 2 one for a
 thumbnail), the topic's number (u16), its time (f64), the serialized message.
-Times are seconds since the bag's start. Opening a bag and recording need a token that may write.
+Times are seconds since the bag's start. Only who has the read-write token may do any of it: files are read and written
+as the user of the dashboard.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ SUBPROTOCOL = "minirospy.bag.v1"
 
 _log = logging.getLogger(__name__)
 
+_OWNERS_ONLY = "record or open bags"
 _LOOK_SECONDS = 0.05
 _RECORDING_SECONDS = 0.25
 _MOST_WAITING = 200
@@ -139,8 +141,8 @@ class BagSession:
 
     def received_text(self, text: str) -> None:
         """Take over an operation."""
-        if not self._client.may_write:
-            self._send_error("this token is read-only: it can neither record nor open bags")
+        if not self._client.is_owner:
+            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
             return
         try:
             fields = json.loads(text)
@@ -166,13 +168,15 @@ class BagSession:
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
-        self._send("writes", self._client.may_write)
+        self._send("writes", self._client.is_owner)
+        if not self._client.is_owner:
+            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
         looked = -math.inf
         try:
             while True:
                 while not self._operations.empty():
                     await self._handle(self._operations.get_nowait())
-                if loop.time() - looked >= _RECORDING_SECONDS and self._client.may_write:
+                if loop.time() - looked >= _RECORDING_SECONDS and self._client.is_owner:
                     looked = loop.time()
                     self._send_recording()
                 if self._bag:

@@ -3,7 +3,7 @@
 A client sends ``{"op": NAME, ...}``: list; describe {package, file, args}; start {package, file, args}; stop, restart,
 remove {id}; end {id, node, restarts}; follow {id, node} (node "": roslaunch's own lines; id null: nothing). The server sends
 ``{"writes"}``, ``{"files"}``, ``{"describe"}``, ``{"launches"}``, ``{"log", "text", "isFirst"}``, ``{"error"}``.
-Starting programs needs a token that may write.
+Only who has the read-write token may do any of it: it starts programs as the user of the dashboard.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ SUBPROTOCOL = "minirospy.launch.v1"
 
 _log = logging.getLogger(__name__)
 
+_OWNERS_ONLY = "start programs"
 _LOOK_SECONDS = 0.1
 _MOST_WAITING = 100
 _MOST_RUNS = 50
@@ -146,8 +147,8 @@ class LaunchSession:
 
     def received_text(self, text: str) -> None:
         """Take over an operation."""
-        if not self._client.may_write:
-            self._send_error("this token is read-only: it starts no programs")
+        if not self._client.is_owner:
+            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
             return
         try:
             fields = json.loads(text)
@@ -172,12 +173,14 @@ class LaunchSession:
     # --- the session's task
 
     async def _run(self) -> None:
-        self._client.send_text(json.dumps({"writes": self._client.may_write}))
+        self._client.send_text(json.dumps({"writes": self._client.is_owner}))
+        if not self._client.is_owner:
+            self._send_error(self._client.why_not_owner(_OWNERS_ONLY))
         try:
             while True:
                 while not self._operations.empty():
                     await self._handle(self._operations.get_nowait())
-                if self._client.may_write:
+                if self._client.is_owner:
                     self._send_launches()
                     await self._send_log()
                 await asyncio.sleep(_LOOK_SECONDS)

@@ -1,7 +1,7 @@
 """Reading and saving .rviz files for the 3D view, by JSON over WebSocket: one operation, one answer.
 
 ``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the file of the command, null where it does not exist yet;
-``{"save": config}`` -> ``{"name"}``: saved there, for clients that may write; ``{"parse": text}`` -> ``{"config"}`` and
+``{"save": config}`` -> ``{"name"}``: saved there, for who has the read-write token; ``{"parse": text}`` -> ``{"config"}`` and
 ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``. No operation names a file.
 """
 
@@ -100,12 +100,12 @@ class RvizSession:
 
     def _read(self) -> dict[str, object]:
         file = self._file()
-        return {"config": read_file(file), "name": file.name, "writes": self._client.may_write}
+        return {"config": read_file(file), "name": file.name, "writes": self._client.is_owner}
 
     def _save(self, text: str) -> dict[str, object]:
         file = self._file()
-        if not self._client.may_write:
-            raise BridgeError("this token is read-only: the file cannot be saved with it")
+        if not self._client.is_owner:
+            raise BridgeError(self._client.why_not_owner("save the file"))
         parse_rviz(text)
         # Whole or not at all: a file that is half written would be lost.
         part = file.with_name(f".{file.name}.part")

@@ -86,7 +86,7 @@ def test_addresses_and_configured_names_are_known_hosts(host: str) -> None:
     ],
 )
 def test_token_is_read_from_header_subprotocol_and_query(given: Credentials) -> None:
-    assert GUARDED.check(given) is Grant.WRITE
+    assert GUARDED.check(given) is Grant.OWN
 
 
 def test_tokens_have_their_rights() -> None:

@@ -9,11 +9,13 @@ from typing import Any, TypeVar
 import pytest
 
 from minirospy import Node
+from minirospy.bridge.access import Access
 from minirospy.bridge.bridge import BridgeOptions
 from minirospy.dashboard.dashboard import Dashboard
 from minirospy.runtime.transport.loop import LoopThread
 
 _T = TypeVar("_T")
+TOKEN = "owner-token-0"
 
 
 class Served:
@@ -87,6 +89,7 @@ def serve(master: str) -> Iterator[Callable[..., Served]]:
     started: list[Served] = []
 
     def start(**options: Any) -> Served:
+        options.setdefault("access", Access(write_token=TOKEN))
         started.append(Served(BridgeOptions(foxglove_port=0, diagnostics=False, **options)))
         started[-1].start()
         return started[-1]

@@ -20,6 +20,7 @@ from minirospy.bridge.access import Access
 from minirospy.dashboard.bag_door import SUBPROTOCOL
 from minirospy.recording.sources import Bags
 from tests.dashboard.bags import make_bag, text_body
+from tests.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -65,7 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def client(serve: Callable[..., Served], folder: Path) -> Iterator[Callable[..., Client]]:
     with contextlib.ExitStack() as opened:
 
-        def start(served: Served | None = None, token: str = "") -> Client:
+        def start(served: Served | None = None, token: str = TOKEN) -> Client:
             names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
             address = f"ws://127.0.0.1:{(served or serve()).port}/"
             socket = connect(address, subprotocols=names, compression=None, max_size=None)
@@ -300,3 +301,11 @@ def test_read_only_client_neither_records_nor_opens(
     for op in ("list", "open", "record"):
         page.send(op, name="a.bag")
         assert "read-only" in json_error(page)
+
+
+def test_who_has_no_token_neither_records_nor_opens(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag", 1)
+    page = client(token="")
+    assert page.next("writes") is False
+    page.send("open", name="a.bag")
+    assert "only who has the token may record or open bags" in json_error(page)

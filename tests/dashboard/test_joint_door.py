@@ -191,7 +191,9 @@ def test_node_of_launch_files_publishes_without_a_page(master: str) -> None:
     node = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
     try:
         assert node.stdout
-        assert re.match(r"Open in a browser: http://localhost:\d+/#/joints$", node.stdout.readline())
+        assert re.match(
+            r"Open in a browser: http://localhost:\d+/#/joints\?token=[\w-]{22}$", node.stdout.readline()
+        )
         reading = (
             "import rospy; from sensor_msgs.msg import JointState; rospy.init_node('reader', disable_rosout=True);"
             "state = rospy.wait_for_message('joint_states', JointState);"

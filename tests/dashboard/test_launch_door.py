@@ -15,6 +15,7 @@ from websockets.typing import Subprotocol
 
 from minirospy.bridge.access import Access
 from minirospy.dashboard.launch_door import SUBPROTOCOL
+from tests.dashboard.conftest import TOKEN
 from tests.dashboard.lamp import make_lamp
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def client(
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     with contextlib.ExitStack() as opened:
 
-        def start(served: Served | None = None, token: str = "") -> Client:
+        def start(served: Served | None = None, token: str = TOKEN) -> Client:
             names = [Subprotocol(SUBPROTOCOL)] + ([Subprotocol(f"minirospy.token.{token}")] if token else [])
             address = f"ws://127.0.0.1:{(served or serve()).port}/"
             return Client(opened.enter_context(connect(address, subprotocols=names, compression=None)))
@@ -202,3 +203,10 @@ def test_read_only_client_starts_nothing(serve: Callable[..., Served], client: C
         for op in ("list", "start", "describe"):
             page.send(op, **FILE, args={"needed": "yes"})
             assert "read-only" in page.error()
+
+
+def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
+    page = client(token="")
+    assert page.next(lambda found: "writes" in found)["writes"] is False
+    page.send("start", **FILE, args={"needed": "yes"})
+    assert "only who has the token may start programs" in page.error()

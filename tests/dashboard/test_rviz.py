@@ -18,6 +18,7 @@ from minirospy.cli import dashboard as command
 from minirospy.dashboard.rviz_door import SUBPROTOCOL
 from minirospy.dashboard.rviz_file import format_rviz, parse_rviz
 from minirospy.errors import RvizFileError
+from tests.dashboard.conftest import TOKEN
 
 if TYPE_CHECKING:
     from tests.dashboard.conftest import Served
@@ -86,7 +87,7 @@ def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[obj
     """Return a function that opens the door of a dashboard with this file; what it returns sends an operation."""
     sockets = ExitStack()
 
-    def opening(file: Path | None, token: str = "", **options: Any) -> Callable[[object], Any]:
+    def opening(file: Path | None, token: str = TOKEN, **options: Any) -> Callable[[object], Any]:
         served = serve(**options)
         assert served.dashboard
         served.dashboard.rviz.file = file
@@ -148,9 +149,7 @@ def test_read_only_token_saves_nothing(
     send = opened(file, "read-token-00", access=access)
     found = send({"read": True})
     assert found["writes"] is False
-    assert send({"save": found["config"]}) == {
-        "error": "this token is read-only: the file cannot be saved with it"
-    }
+    assert "read-only" in send({"save": found["config"]})["error"]
     assert file.read_text(encoding="utf-8") == FILE
 
 

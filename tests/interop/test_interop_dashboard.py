@@ -25,7 +25,7 @@ from roslib.message import get_message_class
 from std_msgs.msg import String
 
 from minirospy.dashboard.views import VIEWS
-from tests.dashboard.conftest import Served, serve
+from tests.dashboard.conftest import TOKEN, Served, serve
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.test_interop_foreign import FOREIGN
 from tests.robots.conftest import start
@@ -161,7 +161,9 @@ def browse() -> Iterator[Callable[..., Page]]:
 
 
 def address(served: Served, view: str = "") -> str:
-    return f"http://localhost:{served.port}/#/{view}"
+    """Return the link of a view, with the owner's token unless it has another one."""
+    words = "" if "token=" in view else f"{'&' if '?' in view else '?'}token={TOKEN}"
+    return f"http://localhost:{served.port}/#/{view}{words}"
 
 
 def publisher(served: Served, topic: str, cls: type, **options: Any) -> Any:

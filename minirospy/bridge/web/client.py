@@ -133,7 +133,18 @@ class WebClient:
     @property
     def may_write(self) -> bool:
         """Return whether the client may publish, call services and set parameters."""
-        return self.grant is Grant.WRITE
+        return self.grant is not Grant.READ
+
+    @property
+    def is_owner(self) -> bool:
+        """Return whether the client may start programs and open files, as the user who runs the server."""
+        return self.grant is Grant.OWN
+
+    def why_not_owner(self, what: str) -> str:
+        """Return the line for a client that is no owner and so may not ``what``."""
+        if self.may_write:
+            return f"only who has the token may {what}: open the link that the command printed"
+        return f"this token is read-only: it does not let you {what}"
 
     @property
     def queue(self) -> SendQueue:

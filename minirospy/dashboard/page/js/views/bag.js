@@ -47,7 +47,6 @@ export class Bag {
       writes: (writes) => {
         this.writes = writes;
         this.recordButton.disabled = this.files.disabled = !writes;
-        if (!writes) this.say("This token is read-only: it can neither record nor open bags.");
       },
       files: (files, { folder, given }) => this.showFiles(files, folder, given),
       recording: (recording) => this.recorder.show(recording),

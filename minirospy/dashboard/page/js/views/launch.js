@@ -36,10 +36,7 @@ export class Launch {
         this.door.send({ op: "list" });
         if (this.followed) this.follow(this.followed);
       },
-      writes: (writes) => {
-        this.writes = writes;
-        if (!writes) this.say("This token is read-only: it starts no programs.");
-      },
+      writes: (writes) => { this.writes = writes; },
       files: (files) => {
         this.files = files;
         this.drawFiles();
