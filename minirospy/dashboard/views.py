@@ -13,31 +13,31 @@ from minirospy.errors import UsageError
 __all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields", "view_of_plugin"]
 
 VIEWS = (
-    "layout",
     "topics",
     "console",
     "plot",
     "graph",
     "image",
     "3d",
+    "tf",
     "board",
-    "bag",
-    "launch",
-    "joints",
-    "smach",
     "turtlesim",
     "teleop",
-    "diagnostics",
-    "panels",
     "publish",
     "services",
+    "actions",
     "parameters",
     "reconfigure",
     "nodes",
-    "actions",
-    "tf",
+    "launch",
+    "bag",
+    "joints",
+    "smach",
+    "diagnostics",
+    "panels",
+    "layout",
 )
-"""The names of the views, as in links; the page has one module for each."""
+"""The names of the views, as in links, in the order of their tabs; the page has one module for each."""
 
 LAYOUTS = ("workshop", "console", "teleop", "classroom")
 """The layouts that come with the page: several views side by side."""

@@ -13,6 +13,7 @@ export const GERMAN = {
   // names of views
   "Layouts": "Anordnungen", "Topics": "Topics", "Console": "Konsole", "Plot": "Kurven", "Graph": "Graph", "Image": "Bild", "Board": "Board", "Turtlesim": "Turtlesim",
   "Teleop": "Fahren", "Diagnostics": "Diagnose", "Panels": "Anzeigen", "Publish": "Senden", "Services": "Services", "Parameters": "Parameter", "Reconfigure": "Einstellen", "3D": "3D",
+  "Frames": "Koordinatensysteme", "Actions": "Actions", "Nodes": "Nodes", "Launch": "Launch", "Bags": "Bags", "Joints": "Gelenke", "State machines": "Zustandsautomaten",
   // words of several views
   "Topic": "Topic", "Node": "Node", "Service": "Service", "Filter": "Filter", "Search": "Suchen", "Clear": "Leeren", "Copy": "Kopieren", "Pause": "Anhalten", "Continue": "Weiter", "PNG": "PNG", "CSV": "CSV",
   "Stop": "Stopp", "Save": "Speichern", "Delete": "Löschen", "Label": "Beschriftung", "Name": "Name", "on": "an", "off": "aus", "type": "Typ", "done": "fertig",
